@@ -1,0 +1,45 @@
+# `make demo` and `make test` do their whole set-up on a machine with Python 3.11+ and make:
+# .ci/set-up makes .venv, installs the packages and finds (as root: installs) an LLVM library.
+SHELL := /bin/bash
+VENV := .venv
+BIN := $(VENV)/bin
+PYTEST := $(BIN)/python -m pytest
+INPUTS := pyproject.toml constraints.txt .ci/set-up
+
+.PHONY: help demo test test-all lint format clean
+
+help:
+	@echo "make demo      run the whole job on the office that the repository ships"
+	@echo "make test      lint and the quick tests"
+	@echo "make test-all  lint and all tests, the slow ones too"
+	@echo "make lint      check style; make format repairs what it can"
+	@echo "make clean     remove what these made, the virtual environment too"
+
+demo: $(VENV)/.run
+	$(BIN)/cfs demo
+
+test: lint
+	$(PYTEST) -m "not slow"
+
+test-all: lint
+	$(PYTEST)
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/.dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+$(VENV)/.run: $(INPUTS)
+	@bash .ci/set-up .
+	@touch $@
+
+$(VENV)/.dev: $(INPUTS)
+	@bash .ci/set-up '.[dev,peers]'
+	@touch $@ $(VENV)/.run
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis out cfs-demo
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

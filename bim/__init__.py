@@ -1,0 +1,1 @@
+"""From a building model (IFC) to rooms, surfaces, windows and sensors."""

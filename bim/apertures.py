@@ -1,0 +1,190 @@
+"""The glass of a window or door: its plane, its outline and the outline of its opening."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.defaults import FRAME_FRACTION
+from bim.model import Problem
+from bim.planes import Plane, area_vectors, plane_through, polygons_of
+
+FLAT = 0.95  # cosine: panes within 18 degrees of the main direction are in its plane
+SMALLEST_PANE = 0.01  # less glass than this is a spy hole, not a window [m2]
+OUTLINE = 0.004  # round openings become polygons this near [m]
+PANE_JOINT = 0.002  # gaps between drawn panes up to this are no frame [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Filling:
+    """A window, door or glazed panel as the file draws it; lengths in metres, world axes."""
+
+    guid: str
+    name: str
+    ifc_class: str
+    triangles: NDArray[np.float64]  # [N, 3, 3]
+    transparent: NDArray[np.bool_]  # [N]
+    opening: NDArray[np.float64] | None = None  # [M, 3, 3] body of its opening
+    host: str | None = None  # GUID of the wall or roof
+    frame_width: float | None = None  # lining and sash together, where stated [m]
+    glazed_fraction: float | None = None  # of the opening, where stated
+    u_value: float | None = None
+    g_value: float | None = None
+    visible_transmittance: float | None = None
+    type_name: str = ""
+    frame_reflectance: float | None = None
+
+    @property
+    def is_door(self) -> bool:
+        """Whether it is a door, which may have no glass at all."""
+        return self.ifc_class.startswith("IfcDoor")
+
+
+@dataclass(frozen=True, slots=True)
+class Aperture:
+    """A filling flattened into one plane; the plane's normal may still point either way."""
+
+    filling: Filling
+    plane: Plane
+    opening: shapely.Geometry  # outline of the whole opening in the plane [m]
+    glass: shapely.Geometry  # outline of the glass, inside the opening; empty for opaque doors
+
+    @property
+    def turned(self) -> Aperture:
+        """The same with the plane's normal (and u axis) the other way round."""
+        mirror = np.array([-1.0, 1.0])
+        return replace(
+            self,
+            plane=Plane(self.plane.origin, self.plane.axes * [[-1], [1], [-1]]),
+            opening=shapely.transform(self.opening, lambda p: p * mirror),
+            glass=shapely.transform(self.glass, lambda p: p * mirror),
+        )
+
+
+def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
+    """The filling in its plane (None if it has no extent), and what had to be assumed."""
+    problems: list[Problem] = []
+    clear = filling.triangles[filling.transparent]
+    source = clear if len(clear) else filling.triangles
+    if filling.opening is not None and not len(clear) and not len(source):
+        source = filling.opening
+    direction = main_direction(source)
+    if direction is None:
+        return None, [Problem(filling.guid, f"{filling.name}: has no extent", "left out")]
+    facing = np.abs(_unit(area_vectors(source)) @ direction) > FLAT
+    areas = np.linalg.norm(area_vectors(source), axis=1)
+    depth = source.mean(axis=1) @ direction
+    middle = np.average(depth[facing], weights=areas[facing])
+    plane = plane_through(source[0, 0] + (middle - source[0, 0] @ direction) * direction, direction)
+    silhouette = shadow(filling.triangles, plane)
+    opening = silhouette if filling.opening is None else shadow(filling.opening, plane)
+    if opening.area < SMALLEST_PANE:
+        return None, [Problem(filling.guid, f"{filling.name}: opening has no area", "left out")]
+    if filling.opening is None and filling.ifc_class.startswith("IfcWindow"):
+        problems.append(
+            Problem(filling.guid, f"{filling.name}: is hosted by no opening", "its outline is used")
+        )
+    if len(clear):
+        glass, more = _drawn_glass(filling, clear, facing, plane, opening)
+        problems += more
+    elif filling.is_door:
+        glass = shapely.Polygon()
+    else:
+        glass, more = _assumed_glass(filling, opening)
+        problems += more
+    return Aperture(filling, plane, opening, glass), problems
+
+
+def _drawn_glass(
+    filling: Filling,
+    clear: NDArray[np.float64],
+    facing: NDArray[np.bool_],
+    plane: Plane,
+    opening: shapely.Geometry,
+) -> tuple[shapely.Geometry, list[Problem]]:
+    """Outline of the transparent panes, clipped to the opening."""
+    problems = []
+    total = np.linalg.norm(area_vectors(clear), axis=1)
+    if total[~facing].sum() > 0.3 * total[facing].sum():
+        what = f"{filling.name}: glass in several planes"
+        problems.append(Problem(filling.guid, what, "flattened onto the biggest one"))
+    drawn = shadow(clear[facing], plane)
+    glass = drawn.intersection(opening)
+    if glass.area < 0.95 * drawn.area:
+        what = f"{filling.name}: {drawn.area - glass.area:.2f} m2 of its glass outside its opening"
+        problems.append(Problem(filling.guid, what, "clipped to the opening"))
+    glass = _polygonal(glass)
+    return (glass if glass.area >= SMALLEST_PANE else shapely.Polygon()), problems
+
+
+def _assumed_glass(
+    filling: Filling, opening: shapely.Geometry
+) -> tuple[shapely.Geometry, list[Problem]]:
+    """The opening less a frame of the stated or the default size."""
+    if filling.glazed_fraction is not None and 0 < filling.glazed_fraction <= 1:
+        glass = inset_to_fraction(opening, filling.glazed_fraction)
+        source = f"GlazingAreaFraction {filling.glazed_fraction:.2f}"
+    elif filling.frame_width is not None and opening.buffer(-filling.frame_width).area > 0:
+        glass = opening.buffer(-filling.frame_width, join_style="mitre")
+        source = f"frame {filling.frame_width * 1000:.0f} mm wide as stated"
+    else:
+        glass = inset_to_fraction(opening, 1 - FRAME_FRACTION)
+        source = f"default frame fraction {FRAME_FRACTION}"
+    what = f"{filling.name}: no transparent pane drawn"
+    return _polygonal(glass), [Problem(filling.guid, what, f"glass from {source}")]
+
+
+def inset_to_fraction(outline: shapely.Geometry, fraction: float) -> shapely.Geometry:
+    """The outline moved inwards all round until `fraction` of its area is left."""
+    if fraction >= 1:
+        return outline
+    low, high = 0.0, float(np.sqrt(outline.area))
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        left = outline.buffer(-middle, join_style="mitre").area
+        low, high = (middle, high) if left > fraction * outline.area else (low, middle)
+    return outline.buffer(-low, join_style="mitre")
+
+
+def shadow(triangles: NDArray[np.float64], plane: Plane) -> shapely.Geometry:
+    """Outline [m] in the plane of what the triangles [N, 3, 3] cover, seen along its normal."""
+    flat = plane.to_plane(triangles)[..., :2]
+    vectors = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    covering = np.abs(vectors[0][:, 0] * vectors[1][:, 1] - vectors[0][:, 1] * vectors[1][:, 0])
+    polygons = shapely.polygons(flat[covering > 1e-9])
+    merged = shapely.union_all(shapely.set_precision(polygons, 1e-6))
+    closed = merged.buffer(PANE_JOINT / 2, join_style="mitre")
+    return _polygonal(closed.buffer(-PANE_JOINT / 2, join_style="mitre").simplify(OUTLINE))
+
+
+def _polygonal(geometry: shapely.Geometry) -> shapely.Geometry:
+    """Only the polygons of a geometry, more than dust."""
+    return shapely.union_all(polygons_of(shapely.make_valid(geometry)))
+
+
+def main_direction(triangles: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Direction [3], of either sign, along which the triangles show most area; None without any."""
+    vectors = area_vectors(triangles)
+    areas = np.linalg.norm(vectors, axis=1)
+    if not len(areas) or areas.sum() < 1e-8:
+        return None
+    normals = _unit(vectors)
+    keys = np.round(normals, 2)
+    keys[keys[:, 2] < 0] *= -1
+    flat = np.abs(keys[:, 2]) < 1e-9
+    turn = flat & ((keys[:, 0] < 0) | ((np.abs(keys[:, 0]) < 1e-9) & (keys[:, 1] < 0)))
+    keys[turn] *= -1
+    _, inverse = np.unique(keys + 0.0, axis=0, return_inverse=True)
+    seed = normals[np.flatnonzero(inverse == np.bincount(inverse.ravel(), areas).argmax())[0]]
+    alike = np.abs(normals @ seed) > FLAT
+    signs = np.sign(normals[alike] @ seed)
+    mean = (vectors[alike] * signs[:, None]).sum(axis=0)
+    mean[np.abs(mean) < 1e-6 * np.abs(mean).max()] = 0.0
+    return mean / np.linalg.norm(mean)
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)

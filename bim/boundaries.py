@@ -1,0 +1,192 @@
+"""From pieces of a room's boundary to faces and windows with all their properties."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.defaults import (
+    EMISSIVITY,
+    GLASS_REFLECTANCE,
+    ROOM_REFLECTANCE,
+    default_construction,
+)
+from bim.model import Construction, Face, MaterialLayer, Window
+from bim.planes import area_vectors
+from bim.rooms import Piece
+from bim.shell import conforming_triangles
+from bim.surroundings import Beyond, Span
+
+SHALLOWEST_GAP = 0.01  # air between two elements from this on is a layer [m]
+GAP_RESISTANCE = 0.18  # of an unventilated air layer of 25 mm and more: EN ISO 6946:2017 [m2 K/W]
+THICKEST_SPAN = 1.0  # a ray that runs longer in one element runs along it, not through [m]
+
+
+@dataclass(frozen=True, slots=True)
+class ElementRecord:
+    """What the boundary of a room needs to know of an element."""
+
+    guid: str
+    name: str
+    ifc_class: str
+    material: MaterialLayer  # of unit thickness: for elements without layers
+    layers: tuple[MaterialLayer, ...] = ()
+    axis: NDArray[np.float64] | None = None  # [3] world: from the first layer to the last
+    is_roof: bool = False
+    stated: bool = False  # whether the thermal properties come from the file
+
+
+def faces_and_windows(
+    pieces: Sequence[Piece],
+    beyond: Sequence[Beyond],
+    records: Sequence[ElementRecord],
+    reflectances: NDArray[np.float64],
+) -> tuple[list[Face], list[Window], Counter]:
+    """Faces, windows, and how often something had to be assumed.
+
+    Args: beyond: for each piece (ignored for glass); reflectances: [N, 2] visible and solar
+        of each triangle of the elements' mesh, negative where the file has no colour.
+    """
+    assumed: Counter = Counter()
+    meshes = conforming_triangles([piece.facet for piece in pieces])
+    faces: list[Face] = []
+    glass: dict[str, list[tuple[Piece, NDArray[np.float64]]]] = {}
+    counts: Counter = Counter()
+    for piece, triangles, behind in zip(pieces, meshes, beyond, strict=True):
+        if not len(triangles) or np.linalg.norm(area_vectors(triangles).sum(axis=0)) < 1e-9:
+            continue
+        if piece.role == "glass":
+            key = (
+                f"{piece.attachment.aperture.filling.guid} {np.round(piece.facet.plane.normal, 3)}"
+            )
+            glass.setdefault(key, []).append((piece, triangles))
+            continue
+        kind = _kind(piece, behind, records)
+        counts[kind] += 1
+        faces.append(
+            _face(f"{kind} {counts[kind]}", kind, piece, triangles, behind, records, reflectances,
+                  assumed)
+        )  # fmt: skip
+    return faces, [_window(parts) for parts in glass.values()], assumed
+
+
+def _kind(piece: Piece, behind: Beyond, records: Sequence[ElementRecord]) -> str:
+    door = piece.attachment is not None and piece.attachment.aperture.filling.is_door
+    if piece.role in ("frame", "door"):
+        return "door" if door else "window frame"
+    if piece.role == "reveal":
+        return "reveal"
+    z = piece.facet.plane.normal[2]
+    if z < -0.7:
+        return "floor"
+    if z > 0.34:  # less than 70 degrees from level
+        roof = bool(behind.spans) and records[behind.spans[0].element].is_roof
+        return "roof" if roof or behind.adjacency == "outside" else "ceiling"
+    return "wall"
+
+
+def _face(
+    name: str,
+    kind: str,
+    piece: Piece,
+    triangles: NDArray[np.float64],
+    behind: Beyond,
+    records: Sequence[ElementRecord],
+    reflectances: NDArray[np.float64],
+    assumed: Counter,
+) -> Face:
+    """One opaque face with what the file says of it, defaults where it says nothing."""
+    filling = piece.attachment.aperture.filling if piece.attachment is not None else None
+    own = filling is not None and piece.role in ("frame", "door", "inner glass")
+    spans = behind.spans
+    record = records[spans[0].element] if spans else None
+    visible, solar = reflectances[spans[0].triangle].tolist() if spans else (-1.0, -1.0)
+    if own:
+        visible = solar = -1.0 if filling.frame_reflectance is None else filling.frame_reflectance
+    if piece.role == "inner glass":
+        visible = solar = GLASS_REFLECTANCE
+    if visible < 0:
+        assumed["reflectance"] += 1
+        visible = solar = ROOM_REFLECTANCE[kind]
+    if record is None and not own:
+        assumed["element"] += 1
+    frame = own and kind == "window frame"
+    construction = None if frame else construction_of(spans, records, piece.facet.plane.normal)
+    if construction is None:
+        assumed["construction"] += not frame
+        construction = default_construction(kind, behind.adjacency)
+    if behind.adjacency == "unknown":
+        assumed["adjacency"] += 1
+    guid = filling.guid if own else (record.guid if record is not None else None)
+    return Face(
+        name, kind, triangles, behind.adjacency, construction, visible, solar, EMISSIVITY,
+        behind.neighbour, guid,
+    )  # fmt: skip
+
+
+def construction_of(
+    spans: Sequence[Span], records: Sequence[ElementRecord], normal: NDArray[np.float64]
+) -> Construction | None:
+    """Layers, outermost first, of the elements that a ray out of the room went through."""
+    outwards: list[MaterialLayer] = []
+    reach, names, stated = 0.0, [], True
+    for span in spans:
+        if span.stop <= reach + 1e-3:  # inside an element that is already counted
+            continue
+        start = max(span.start, reach) if outwards else span.start
+        if outwards and start - reach > SHALLOWEST_GAP:
+            gap = start - reach
+            outwards.append(MaterialLayer("air layer", gap, gap / GAP_RESISTANCE, 1.23, 1008.0))
+        record = records[span.element]
+        outwards += _layers(record, span.stop - start, normal)
+        names.append(record.name)
+        stated &= record.stated
+        reach = span.stop
+    if not outwards:
+        return None
+    source = "IFC" if stated else "IFC, properties completed from EN ISO 10456"
+    return Construction(" + ".join(names), tuple(outwards[::-1]), source)
+
+
+def _layers(
+    record: ElementRecord, length: float, normal: NDArray[np.float64]
+) -> list[MaterialLayer]:
+    """Layers of one element from the room outwards; without layers one as thick as the ray."""
+    total = sum(layer.thickness for layer in record.layers)
+    fits = 0.5 * total < length < 1.6 * total or length > THICKEST_SPAN
+    across = record.axis is None or abs(record.axis @ normal) > 0.7
+    if record.layers and fits and across:
+        along = record.axis is not None and record.axis @ normal > 0
+        # without an axis the first layer is the outer one, as the authoring tools write it
+        return list(record.layers if along else record.layers[::-1])
+    m = record.material
+    thickness = min(max(length, 1e-3), THICKEST_SPAN)
+    return [MaterialLayer(m.name, thickness, m.conductivity, m.density, m.heat_capacity)]
+
+
+def _window(parts: Sequence[tuple[Piece, NDArray[np.float64]]]) -> Window:
+    """All panes of one filling in one plane as one window."""
+    attachment = parts[0][0].attachment
+    filling = attachment.aperture.filling
+    triangles = np.concatenate([triangles for _, triangles in parts])
+    return Window(
+        filling.guid, filling.name, triangles, filling.host, float(attachment.region.area),
+        filling.u_value, filling.g_value, filling.visible_transmittance, filling.type_name,
+    )  # fmt: skip
+
+
+def floor_area(faces: Sequence[Face]) -> float:
+    """Area [m2] of the room's floor seen from above, its window sills left out."""
+    floors = [face for face in faces if face.kind == "floor"]
+    return float(sum(face.area * -face.normal[2] for face in floors))
+
+
+def footprint_area(triangles: NDArray[np.float64]) -> float:
+    """Area [m2] of the outline of a solid [N, 3, 3] seen from above."""
+    polygons = shapely.make_valid(shapely.polygons(triangles[..., :2]))
+    return float(shapely.union_all(polygons).area)

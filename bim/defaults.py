@@ -1,0 +1,100 @@
+"""Optical and thermal properties where the model states none: one table, each row with its source.
+
+Reflectances.  Room: EN 17037:2018, B.3 and IES LM-83-12, 2.2.6 (ceiling 0.7, walls 0.5, floor 0.2);
+facades outdoors 0.3 and frames 0.5: IES LM-83-12.  Glass of other windows seen from outdoors: near
+normal reflectance of clear double glazing, 0.15 (Fresnel, four surfaces of n = 1.52).
+Solar reflectance equals the visible one where nothing is known; emissivity 0.9 as in EN ISO 6946
+for ordinary building surfaces.
+
+Layers: design values of EN ISO 10456:2007, table 3.  Thicknesses are ours: a heavy building with
+insulation of the first energy standards; each use is reported as a problem of the model.
+"""
+
+from __future__ import annotations
+
+from bim.model import Construction, MaterialLayer
+
+ROOM_REFLECTANCE = {
+    "floor": 0.2,
+    "ceiling": 0.7,
+    "roof": 0.7,
+    "wall": 0.5,
+    "door": 0.5,
+    "window frame": 0.5,
+    "reveal": 0.5,
+}
+FACADE_REFLECTANCE = 0.3
+SITE_REFLECTANCE = 0.2  # EN 17037:2018, B.3: ground outdoors
+GLASS_REFLECTANCE = 0.15
+EMISSIVITY = 0.9
+FRAME_FRACTION = 0.3  # of the opening: EN ISO 10077-1:2017, annex (typical window, 30 % frame)
+LOWEST_REFLECTANCE, HIGHEST_REFLECTANCE = 0.02, 0.9  # black paint; fresh white paint
+
+PLASTER = MaterialLayer("gypsum plaster", 0.015, 0.57, 1300.0, 1000.0)
+BRICK = MaterialLayer("brick masonry", 0.24, 0.80, 1800.0, 1000.0)
+CONCRETE = MaterialLayer("reinforced concrete", 0.20, 2.3, 2300.0, 1000.0)
+INSULATION = MaterialLayer("mineral wool", 0.12, 0.040, 50.0, 1030.0)
+RENDER = MaterialLayer("cement render", 0.015, 1.0, 1800.0, 1000.0)
+SCREED = MaterialLayer("cement screed", 0.05, 1.4, 2000.0, 1000.0)
+EPS = MaterialLayer("expanded polystyrene", 0.10, 0.040, 20.0, 1450.0)
+TIMBER = MaterialLayer("softwood", 0.04, 0.13, 500.0, 1600.0)
+FRAME = MaterialLayer("window frame, softwood", 0.068, 0.13, 500.0, 1600.0)
+
+EXTERIOR_WALL = Construction("default exterior wall", (RENDER, INSULATION, BRICK, PLASTER))
+INTERIOR_WALL = Construction("default interior wall", (PLASTER, BRICK, PLASTER))
+GROUND_FLOOR = Construction("default ground floor", (EPS, CONCRETE, SCREED))
+UPPER_FLOOR = Construction("default floor slab", (CONCRETE, SCREED))
+CEILING_SLAB = Construction("default ceiling slab", (SCREED, CONCRETE))
+ROOF = Construction("default roof", (INSULATION, CONCRETE, PLASTER))
+DOOR = Construction("default door", (TIMBER,))
+WINDOW_FRAME = Construction("default window frame", (FRAME,))
+
+
+def default_construction(kind: str, adjacency: str) -> Construction:
+    """Construction of a face of that kind towards that neighbour (see the table above)."""
+    if kind == "door":
+        return DOOR
+    if kind == "window frame":
+        return WINDOW_FRAME
+    outdoors = adjacency in ("outside", "ground")
+    if kind == "floor":
+        return GROUND_FLOOR if outdoors else UPPER_FLOOR
+    if kind == "roof" or (kind == "ceiling" and outdoors):
+        return ROOF
+    if kind == "ceiling":
+        return CEILING_SLAB
+    return EXTERIOR_WALL if outdoors else INTERIOR_WALL
+
+
+# words in material names (English, German, Dutch, French, Spanish, Italian) -> EN ISO 10456 table 3
+MATERIALS: tuple[tuple[tuple[str, ...], MaterialLayer], ...] = (
+    (("air gap", "airgap", "luft", "air space", "air infiltration", "lucht", "cavity", "misc. air"),
+     MaterialLayer("air layer 0.18 m2 K/W at 50 mm", 0.05, 0.28, 1.23, 1008.0)),
+    (("insul", "dämm", "daemm", "wool", "wolle", "isol", "aisl", "xps", "eps", "styro", "polyst",
+      "polyiso", "pur ", "pir "), INSULATION),
+    (("glas", "vidrio", "verre", "vetro"), MaterialLayer("soda lime glass", 0.006, 1.0, 2500, 750)),
+    (("gypsum", "gips", "plasterboard", "drywall", "yeso", "cartongesso", "placo"),
+     MaterialLayer("gypsum plasterboard", 0.0125, 0.25, 900.0, 1000.0)),
+    (("screed", "estrich", "dekvloer", "chape", "mortar", "mörtel"), SCREED),
+    (("plaster", "putz", "stucco", "enduit", "intonaco", "render"), PLASTER),
+    (("aerated", "porenbeton", "lightweight concrete", "leichtbeton", "gasbeton", "ytong"),
+     MaterialLayer("autoclaved aerated concrete", 0.24, 0.16, 500.0, 1000.0)),
+    (("concrete", "beton", "hormig", "calcestruzzo", "cmu", "stahlbeton"), CONCRETE),
+    (("brick", "ziegel", "masonry", "mauerwerk", "baksteen", "metselwerk", "brique", "ladrillo",
+      "kalksand", "block", "mattone"), BRICK),
+    (("steel", "stahl", "staal", "acier", "acero", "metal", "metall", "iron"),
+     MaterialLayer("steel", 0.005, 50.0, 7800.0, 450.0)),
+    (("alum",), MaterialLayer("aluminium alloy", 0.003, 160.0, 2800.0, 880.0)),
+    (("wood", "holz", "timber", "hout", "bois", "madera", "legno", "plywood", "osb", "parket",
+      "parquet", "oak", "eiche", "pine", "laminat", "truss", "joist"), TIMBER),
+    (("carpet", "teppich"), MaterialLayer("carpet", 0.008, 0.06, 200.0, 1300.0)),
+    (("tile", "fliese", "ceramic", "keramik", "tegel"),
+     MaterialLayer("ceramic tiles", 0.01, 1.3, 2300.0, 840.0)),
+    (("membrane", "bitum", "folie", "roofing", "epdm", "vapor", "damp"),
+     MaterialLayer("bitumen felt", 0.005, 0.23, 1100.0, 1000.0)),
+    (("gravel", "kies", "sand", "soil", "earth", "erde", "site"),
+     MaterialLayer("sand and gravel", 0.2, 2.0, 1950.0, 1045.0)),
+    (("stone", "stein", "marble", "granit", "pietra", "piedra"),
+     MaterialLayer("limestone, hard", 0.05, 1.7, 2200.0, 1000.0)),
+)  # fmt: skip
+UNKNOWN_MATERIAL = MaterialLayer("brick masonry (unknown material)", 0.24, 0.80, 1800.0, 1000.0)

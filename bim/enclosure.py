@@ -1,0 +1,127 @@
+"""Rooms that nobody drew: the voids that merged building elements enclose.
+
+The elements are united, small gaps between them closed, and the boundary of the union is split
+into parts that touch.  The part that a ray from outside the bounding box meets first is the
+building's outer face; the other parts are rooms.  This is the dissertation's algorithm (section
+2.4); the sign of each part's volume, a winding number, has to say the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import manifold3d
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from bim.mesh_repair import welded_mesh
+from bim.planes import area_vectors
+from bim.rays import ray_mesh
+from bim.shell import enclosed_volume
+from bim.solids import solid_of, triangles_of, union
+
+GAP = 0.02  # gaps between elements up to this are closed [m]
+FINEST = 1e-3  # smaller details of a found room are smoothed out [m]
+SMALLEST_ROOM = 2.0  # smaller voids are cavities and shafts [m3]
+LOWEST_ROOM = 1.5  # lower ones are no rooms either [m]
+MOST_TRIANGLES = 120  # elements with more are united as they are: widening takes a second each
+
+
+def rooms_enclosed_by(
+    elements: Sequence[NDArray[np.float64]], gap: float = GAP
+) -> list[manifold3d.Manifold]:
+    """Solids of the rooms between building elements, each of triangles [N, 3, 3], biggest first.
+
+    Every element is widened by half the gap; the voids that are left are widened back, less the
+    elements as they are, so that the rooms end at the elements' own faces.
+    """
+    solids = [solid.manifold for solid in map(solid_of, elements) if solid is not None]
+    if not solids:
+        return []
+    turn = main_wall_direction(np.concatenate(elements))
+    back = np.linalg.inv(turn)
+    turned = [_turned(solid, turn) for solid in solids]
+    cube = manifold3d.Manifold.cube((gap, gap, gap), True)
+    wide = union([_widened(solid, cube) for solid in turned])
+    original = union(turned)
+    rooms = []
+    for part in interior_parts(triangles_of(wide)[0]):
+        void = solid_of(part[:, ::-1])
+        if void is None:
+            continue
+        # one widening gives back what the elements' own widening took
+        room = (void.manifold.minkowski_sum(cube) - original).simplify(FINEST)
+        rooms += [piece for piece in room.decompose() if _is_room(piece)]
+    rooms.sort(key=lambda room: -room.volume())
+    return [_turned(room, back) for room in rooms]
+
+
+def _is_room(solid: manifold3d.Manifold) -> bool:
+    box = solid.bounding_box()
+    return solid.volume() > SMALLEST_ROOM and box[5] - box[2] > LOWEST_ROOM
+
+
+def _widened(solid: manifold3d.Manifold, cube: manifold3d.Manifold) -> manifold3d.Manifold:
+    return solid.minkowski_sum(cube) if solid.num_tri() <= MOST_TRIANGLES else solid
+
+
+def _turned(solid: manifold3d.Manifold, rotation: NDArray[np.float64]) -> manifold3d.Manifold:
+    return solid.transform(np.column_stack([rotation, np.zeros(3)]))
+
+
+def main_wall_direction(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation [3, 3] about z that brings most upright area [N, 3, 3] to face along x or y."""
+    vectors = area_vectors(triangles)
+    areas = np.linalg.norm(vectors, axis=1)
+    upright = (areas > 1e-9) & (np.abs(vectors[:, 2]) < 0.1 * areas)
+    if not upright.any():
+        return np.eye(3)
+    azimuth = np.mod(np.arctan2(vectors[upright, 1], vectors[upright, 0]), np.pi / 2)
+    quarter, weights = np.exp(4j * azimuth), areas[upright]
+    # the direction of the biggest heap of walls, not the mean of several
+    bins = np.round(np.degrees(azimuth)).astype(int) % 90
+    heap = bins == np.bincount(bins, weights, 90).argmax()
+    angle = np.angle(np.sum(quarter[heap] * weights[heap])) / 4
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def interior_parts(triangles: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Parts [N, 3, 3] of a closed surface that lie inside, as the outside does not see them.
+
+    Parts touch through shared vertices.  A part is interior if the ray from outside does not meet
+    it first and its enclosed volume is negative (its normals point into the void).
+    """
+    labels = touching_parts(triangles)
+    outer = outer_part(triangles, labels)
+    parts = [triangles[labels == k] for k in range(labels.max(initial=-1) + 1) if k != outer]
+    return [part for part in parts if enclosed_volume(part) < 0]
+
+
+def touching_parts(triangles: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Number of the connected part that each triangle [N, 3, 3] belongs to."""
+    vertices, faces = welded_mesh(triangles, 1e-6)
+    if len(faces) != len(triangles):  # collapsed triangles keep their corners' part
+        keys = np.round(triangles.reshape(-1, 3) / 1e-6).astype(np.int64)
+        faces = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    count = max(len(vertices), int(faces.max(initial=-1)) + 1)
+    rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
+    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    return connected_components(graph, directed=False)[1][faces[:, 0]]
+
+
+def outer_part(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> int:
+    """Part that a ray from a corner outside the bounding box meets first on its way in; -1: none.
+
+    The ray goes to the middle of the biggest triangle, so that it meets something.
+    """
+    if not len(triangles):
+        return -1
+    corners = triangles.reshape(-1, 3)
+    start = np.add(corners.max(axis=0), [1.0, 1.3, 0.7])
+    target = triangles[np.linalg.norm(area_vectors(triangles), axis=1).argmax()].mean(axis=0)
+    direction = (target - start) / np.linalg.norm(target - start)
+    _, hit = ray_mesh(triangles).first_hits(start[None], direction[None])
+    return -1 if hit[0] < 0 else int(labels[hit[0]])

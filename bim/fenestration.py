@@ -1,0 +1,66 @@
+"""What a window's manufacturer knows of it: BSDF, angular g-values and U, by shading state."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.errors import DataError
+
+
+@dataclass(frozen=True, slots=True)
+class AngularGValue:
+    """Total solar energy transmittance by direction of incidence."""
+
+    polar: NDArray[np.float64]  # [T] angle of incidence, rising [rad]
+    azimuth: NDArray[np.float64]  # [A] rising; one entry 0 where it does not matter [rad]
+    values: NDArray[np.float64]  # [T, A] g, 0 to 1
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (len(self.polar), len(self.azimuth)):
+            raise ValueError("g-values: expected one for each polar angle and azimuth")
+
+
+@dataclass(frozen=True, slots=True)
+class ShadingState:
+    """A window's optics and heat in one state of its shade."""
+
+    name: str = ""  # "" for the only or the usual state
+    bands: dict[str, Bsdf] = field(default_factory=dict)  # "Visible", "Solar" -> BSDF
+    g_value: AngularGValue | None = None
+    u_value: float | None = None  # [W/(m2 K)]
+
+
+def read_g_table(path: str | Path) -> AngularGValue:
+    """Angular g-values of a CSV file with columns polar_deg, g and, if it matters, azimuth_deg."""
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.DictReader(line for line in stream if line.strip()))
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"cannot be read: {error}", file=path) from None
+    if not rows or not {"polar_deg", "g"} <= set(rows[0]):
+        raise DataError("expected the columns polar_deg, g (and azimuth_deg)", file=path)
+    table: dict[tuple[float, float], float] = {}
+    for number, row in enumerate(rows, start=2):
+        try:
+            key = float(row["polar_deg"]), float(row.get("azimuth_deg") or 0.0)
+            table[key] = float(row["g"])
+        except (TypeError, ValueError):
+            raise DataError("is not a number", file=path, element=f"line {number}") from None
+        if not (0 <= key[0] <= 90 and 0 <= table[key] <= 1):
+            raise DataError(
+                f"polar {key[0]:g} or g {table[key]:g} out of range", file=path,
+                element=f"line {number}",
+            )  # fmt: skip
+    polar, azimuth = (sorted({key[i] for key in table}) for i in (0, 1))
+    missing = [(p, a) for p in polar for a in azimuth if (p, a) not in table]
+    if missing:
+        raise DataError(f"no g at polar {missing[0][0]:g}, azimuth {missing[0][1]:g}", file=path)
+    values = np.array([[table[p, a] for a in azimuth] for p in polar])
+    return AngularGValue(np.radians(polar), np.radians(azimuth), values)

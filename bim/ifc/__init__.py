@@ -1,0 +1,1 @@
+"""Reading and writing IFC: the only modules that know ifcopenshell."""

@@ -1,0 +1,132 @@
+"""A project's corrections of its model, kept beside it in a small TOML file.
+
+`model.corrections.toml` beside `model.ifc` is used without being asked for:
+
+    leave_out = ['IfcBuildingElementProxy', 'IfcSlab, type="Canopy"']   # selectors of ifcopenshell
+    only = ['IfcWall', 'IfcSlab', 'IfcWindow', 'IfcSpace']              # nothing else is read
+    join = [["Hall", "Living"]] # rooms open to each other that are to be one
+    surroundings = 0.2          # diffuse reflectance of everything outdoors
+
+    [[reflectance]]
+    select = 'IfcWall, material="Brick"'
+    visible = 0.3
+    solar = 0.35                # the visible one if left out
+
+Selectors choose by GUID, class, type, material, storey (location), layer, property and more:
+https://docs.ifcopenshell.org/ifcopenshell-python/selector_syntax.html
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import ifcopenshell
+import ifcopenshell.util.selector
+
+from mitsuba_cfs.errors import DataError
+
+KEYS = {"leave_out", "only", "join", "surroundings", "reflectance"}
+
+
+@dataclass(frozen=True, slots=True)
+class Paint:
+    """Reflectances for the elements that a selector chooses."""
+
+    select: str
+    visible: float
+    solar: float
+
+
+@dataclass(frozen=True, slots=True)
+class Corrections:
+    """What to leave out of a model and what to repaint."""
+
+    leave_out: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
+    paints: tuple[Paint, ...] = ()
+    surroundings: float | None = None
+    join: tuple[tuple[str, ...], ...] = ()  # names or GUIDs of rooms to make one
+    file: str = ""
+
+    def removed(self, model: ifcopenshell.file) -> set[int]:
+        """STEP ids of the products that are not to be read."""
+        gone: set[int] = set()
+        for query in self.leave_out:
+            gone |= self._chosen(model, query)
+        if self.only:
+            kept: set[int] = set()
+            for query in self.only:
+                kept |= self._chosen(model, query)
+            openings = {one.id() for one in model.by_type("IfcOpeningElement")}
+            gone |= {one.id() for one in model.by_type("IfcProduct")} - kept - openings
+        return gone
+
+    def painted(self, model: ifcopenshell.file) -> dict[int, tuple[float, float]]:
+        """Visible and solar reflectance by STEP id; later entries win."""
+        result: dict[int, tuple[float, float]] = {}
+        for paint in self.paints:
+            for step_id in self._chosen(model, paint.select):
+                result[step_id] = (paint.visible, paint.solar)
+        return result
+
+    def _chosen(self, model: ifcopenshell.file, query: str) -> set[int]:
+        try:
+            found = ifcopenshell.util.selector.filter_elements(model, query)
+        except Exception as error:  # the selector's parser raises many types
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
+            raise DataError(reason, file=self.file or None, field=query) from None
+        return {element.id() for element in found}
+
+
+def corrections_beside(model_path: str | Path) -> Corrections:
+    """The corrections of `<model>.corrections.toml` beside the model; none without that file."""
+    path = Path(model_path).with_suffix(".corrections.toml")
+    return read_corrections(path) if path.is_file() else Corrections()
+
+
+def read_corrections(path: str | Path) -> Corrections:
+    """Corrections from a TOML file; `DataError` names the entry that is wrong."""
+    path = Path(path)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DataError(f"is not TOML: {error}", file=path) from None
+    unknown = sorted(set(table) - KEYS)
+    if unknown:
+        raise DataError(f"expected one of {', '.join(sorted(KEYS))}", file=path, field=unknown[0])
+    paints = tuple(_paint(entry, path) for entry in table.get("reflectance", ()))
+    surroundings = table.get("surroundings")
+    if surroundings is not None:
+        surroundings = _share(surroundings, path, "surroundings")
+    groups = table.get("join", [])
+    if not isinstance(groups, list):
+        raise DataError("expected a list of lists of names", file=path, field="join")
+    join = tuple(_texts({"join": group}, "join", path) for group in groups)
+    return Corrections(
+        _texts(table, "leave_out", path), _texts(table, "only", path), paints, surroundings, join,
+        str(path),
+    )  # fmt: skip
+
+
+def _paint(entry: dict, path: Path) -> Paint:
+    if not isinstance(entry, dict) or not isinstance(entry.get("select"), str):
+        raise DataError("expected select = '...'", file=path, field="reflectance")
+    if "visible" not in entry:
+        raise DataError("expected visible = 0 to 1", file=path, field="reflectance")
+    visible = _share(entry["visible"], path, "visible")
+    return Paint(entry["select"], visible, _share(entry.get("solar", visible), path, "solar"))
+
+
+def _share(value: object, path: Path, field: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 1:
+        raise DataError(f"expected a number from 0 to 1, got {value!r}", file=path, field=field)
+    return float(value)
+
+
+def _texts(table: dict, key: str, path: Path) -> tuple[str, ...]:
+    values = table.get(key, [])
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise DataError("expected a list of texts", file=path, field=key)
+    return tuple(values)

@@ -1,0 +1,118 @@
+"""Building elements of an IFC file: what rooms border on, and what stands outdoors."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import replace
+
+import ifcopenshell
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.boundaries import ElementRecord
+from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE, SITE_REFLECTANCE
+from bim.ifc.materials import MaterialReader
+from bim.ifc.project import storey_of
+from bim.ifc.shapes import Shape
+from bim.model import Element, Problem
+
+SITE = ("IfcSite", "IfcGeographicElement")
+
+
+def bounding_elements(
+    model: ifcopenshell.file, shapes: Sequence[Shape], rotation: NDArray[np.float64]
+) -> tuple[list[ElementRecord], NDArray[np.float64], list[Problem]]:
+    """Record of each shape, visible and solar reflectance [N, 2] of their triangles, problems.
+
+    A reflectance of -1 stands for none stated.
+
+    Args: shapes: in world axes; rotation: [3, 3] from model axes to the world.
+    """
+    reader = MaterialReader(model)
+    records = [_record(model.by_id(shape.step_id), reader, rotation) for shape in shapes]
+    faults: dict[str, Problem] = {}
+    values = []
+    for shape in shapes:
+        by_look = np.full((len(shape.looks) + 1, 2), -1.0)
+        for i, look in enumerate(shape.looks):
+            by_look[i] = GLASS_REFLECTANCE if look.is_glass else look.reflectances
+            if look.fault and not look.is_glass:
+                faults.setdefault(look.name, Problem(look.name, "surface style", look.fault))
+        stated = reader.reflectances_of(model.by_id(shape.step_id))
+        if stated is not None and not shape.transparent.any() and not shape.is_painted:
+            by_look[:] = stated
+        values.append(by_look[shape.look])
+    problems = [*reader.problems.values(), *faults.values()]
+    return records, np.concatenate(values or [np.empty((0, 2))]), problems
+
+
+def _record(
+    element: ifcopenshell.entity_instance, reader: MaterialReader, rotation: NDArray[np.float64]
+) -> ElementRecord:
+    layers = reader.layers_of(element)
+    material, stated = None, True
+    if layers is None:
+        material, stated = reader.layer(reader.single_material(element), 1.0)
+    else:
+        material, stated = layers.layers[0], layers.stated
+    predefined = getattr(element, "PredefinedType", None)
+    return ElementRecord(
+        element.GlobalId,
+        element.Name or element.is_a(),
+        element.is_a(),
+        material,
+        () if layers is None else layers.layers,
+        None if layers is None or layers.axis is None else rotation @ layers.axis,
+        element.is_a("IfcRoof") or predefined == "ROOF",
+        stated,
+    )
+
+
+def outdoor_elements(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Element]:
+    """Every building element and terrain, one `Element` for each of its surface styles."""
+    result = []
+    for shape in shapes:
+        entity = model.by_id(shape.step_id)
+        default = SITE_REFLECTANCE if shape.ifc_class.startswith(SITE) else FACADE_REFLECTANCE
+        base = Element(
+            shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles, default,
+            default, _layer_of(entity), storey_of(entity), _material_name(entity),
+        )  # fmt: skip
+        for index in np.unique(shape.look):
+            visible = solar = default
+            if index >= 0:
+                look = shape.looks[index]
+                visible, solar = look.reflectances
+                if look.is_glass:
+                    visible = solar = GLASS_REFLECTANCE
+            result.append(
+                replace(
+                    base,
+                    triangles=shape.triangles[shape.look == index],
+                    reflectance_visible=visible,
+                    reflectance_solar=solar,
+                )
+            )
+    return result
+
+
+def _layer_of(entity: ifcopenshell.entity_instance) -> str:
+    """Name of the first presentation layer (CAD layer) of an element, "" if none."""
+    with contextlib.suppress(Exception):  # damaged representations
+        for representation in entity.Representation.Representations:
+            for layer in representation.LayerAssignments:
+                return layer.Name or ""
+            for item in representation.Items:
+                for layer in getattr(item, "LayerAssignment", None) or ():
+                    return layer.Name or ""
+    return ""
+
+
+def _material_name(entity: ifcopenshell.entity_instance) -> str:
+    with contextlib.suppress(Exception):  # damaged associations
+        import ifcopenshell.util.element as util
+
+        for material in util.get_materials(entity):
+            return material.Name or ""
+    return ""

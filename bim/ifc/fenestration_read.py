@@ -1,0 +1,152 @@
+"""Fenestration data out of an IFC model: the property sets that `fenestration_write` writes, and
+BSDF files that a document or library reference of the window or its type names."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+import ifcopenshell
+import ifcopenshell.util.element
+import numpy as np
+
+from bim.fenestration import AngularGValue, ShadingState
+from bim.ifc.fenestration_write import BLOCKS, SET_NAME, TREE
+from bim.ifc.project import open_ifc
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from mitsuba_cfs.errors import DataError
+
+Entity = ifcopenshell.entity_instance
+
+
+def read_fenestration(path: str | Path) -> dict[str, tuple[ShadingState, ...]]:
+    """Shading states that an IFC file holds for its windows, by GUID; see `read_states`."""
+    return read_states(open_ifc(path), Path(path).parent, file=path)
+
+
+def read_states(
+    model: ifcopenshell.file, folder: str | Path, *, file: str | Path = ""
+) -> dict[str, tuple[ShadingState, ...]]:
+    """Shading states of each window and door that has any, by GUID; its own before its type's.
+
+    Args: folder: where relative paths of BSDF files start.
+    Raises: `DataError` for a set of that name that cannot be understood.
+    """
+    found: dict[str, tuple[ShadingState, ...]] = {}
+    cache: dict[int, ShadingState] = {}
+    for kind in ("IfcWindow", "IfcDoor", "IfcPlate", "IfcCurtainWall"):
+        for element in model.by_type(kind):
+            states: dict[str, ShadingState] = {}
+            element_type = None
+            with contextlib.suppress(Exception):  # a damaged type has no data either
+                element_type = ifcopenshell.util.element.get_type(element)
+            for source in (element_type, element):
+                for pset in _own_sets(source):
+                    if pset.id() not in cache:
+                        cache[pset.id()] = _state(pset, file, element.GlobalId)
+                    states[cache[pset.id()].name] = cache[pset.id()]
+                for path in _referenced(source, Path(folder)):
+                    bands = read_bsdf_xml(path).bands
+                    states.setdefault("", ShadingState("", bands))
+            if states:
+                found[element.GlobalId] = tuple(states.values())
+    return found
+
+
+def _own_sets(source: Entity | None) -> Iterable[Entity]:
+    if source is None:
+        return
+    sets = list(getattr(source, "HasPropertySets", None) or ())
+    for relation in getattr(source, "IsDefinedBy", None) or ():
+        definition = getattr(relation, "RelatingPropertyDefinition", None)
+        if definition is not None:
+            sets.append(definition)
+    for one in sets:
+        name = one.Name or ""
+        if one.is_a("IfcPropertySet") and (name == SET_NAME or name.startswith(f"{SET_NAME}:")):
+            yield one
+
+
+def _referenced(source: Entity | None, folder: Path) -> Iterable[Path]:
+    """BSDF XML files that documents or libraries associated with an element name."""
+    for relation in getattr(source, "HasAssociations", None) or ():
+        reference = getattr(relation, "RelatingDocument", None) or getattr(
+            relation, "RelatingLibrary", None
+        )
+        location = getattr(reference, "Location", None)
+        if not location or not location.lower().endswith(".xml"):
+            continue
+        url = urlparse(location)
+        path = Path(unquote(url.path)) if url.scheme == "file" else folder / location
+        if url.scheme in ("", "file"):
+            yield path
+
+
+def _state(pset: Entity, file: str | Path, guid: str) -> ShadingState:
+    name = pset.Name[len(SET_NAME) :].lstrip(": ")
+    bands: dict[str, Bsdf] = {}
+    g_value, u_value = None, None
+    try:
+        for prop in pset.HasProperties:
+            if prop.is_a("IfcComplexProperty") and prop.Name.startswith("BSDF "):
+                bands[prop.Name[5:]] = _bsdf(prop)
+            elif prop.is_a("IfcComplexProperty") and prop.Name == "G-value":
+                g_value = _g_values(prop)
+            elif prop.Name == "U-value":
+                u_value = float(prop.NominalValue.wrappedValue)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise DataError(
+            f"cannot be understood: {error}", file=file or None, element=guid, field=pset.Name
+        ) from None
+    return ShadingState(name, bands, g_value, u_value)
+
+
+def _children(prop: Entity) -> dict[str, Entity]:
+    return {child.Name: child for child in prop.HasProperties}
+
+
+def _numbers(prop: Entity, kind: type = float) -> np.ndarray:
+    return np.array([value.wrappedValue for value in prop.ListValues], dtype=kind)
+
+
+def _bsdf(prop: Entity) -> Bsdf:
+    parts = _children(prop)
+    values = _children(parts["Transmittance and reflectance values"])
+    if (prop.UsageName or "").startswith(TREE):
+        rank = int(re.search(r"(\d+)$", prop.UsageName)[1])
+        trees = {
+            key: TensorTree(
+                rank, _numbers(parts[f"{name}: depths"], np.int64), _numbers(values[name])
+            )
+            for key, name in BLOCKS.items()
+            if name in values
+        }
+        return TensorTreeBsdf(**trees)
+    basis_in, basis_out = (_basis(parts, side) for side in ("Incident", "Outgoing"))
+    shape = (basis_out.size, basis_in.size)
+    blocks = {
+        key: _numbers(values[name]).reshape(shape) for key, name in BLOCKS.items() if name in values
+    }
+    return KlemsBsdf(basis_in, basis_out, **blocks)
+
+
+def _basis(parts: dict[str, Entity], side: str) -> KlemsBasis:
+    polar = parts[f"{side} polar angle ranges"]
+    ranges = polar.HasProperties
+    bounds = [float(one.LowerBoundValue.wrappedValue) for one in ranges]
+    bounds.append(float(ranges[-1].UpperBoundValue.wrappedValue))
+    rings = parts[f"{side} azimuthal angle ranges"].HasProperties
+    return KlemsBasis(polar.UsageName, tuple(bounds), tuple(len(r.HasProperties) for r in rings))
+
+
+def _g_values(prop: Entity) -> AngularGValue:
+    parts = _children(prop)
+    polar, azimuth = _numbers(parts["Polar angles"]), _numbers(parts["Azimuthal angles"])
+    values = _numbers(parts["G-values"]).reshape(len(polar), len(azimuth))
+    return AngularGValue(polar, azimuth, values)

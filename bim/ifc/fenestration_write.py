@@ -1,0 +1,180 @@
+"""Fenestration data into an IFC model: the property set of the dissertation's figures 21 and 22.
+
+A window or window type gets one IfcPropertySet for each shading state: "BlackBox Model", or
+"BlackBox Model: <state>".  It holds an IfcComplexProperty for each band of the BSDF, one for the
+angular g-values, and U as IfcThermalTransmittanceMeasure.  Two departures from figure 21: BSDF
+values are IfcReal, since values per steradian exceed the 1 that IfcNormalisedRatioMeasure allows;
+angles are radians with their unit beside them, so that no number is rounded on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import ifcopenshell
+import ifcopenshell.guid
+import numpy as np
+
+from bim.fenestration import AngularGValue, ShadingState
+from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+
+SET_NAME = "BlackBox Model"
+BLOCKS = {
+    "transmission_front": "Transmittance front values",
+    "transmission_back": "Transmittance back values",
+    "reflection_front": "Reflectance front values",
+    "reflection_back": "Reflectance back values",
+}
+WAVELENGTHS = {"Visible": (380.0, 780.0), "Solar": (300.0, 2500.0)}  # of the bands [nm]
+KLEMS, TREE = "BSDF matrix", "BSDF tensor tree"
+Entity = ifcopenshell.entity_instance
+
+
+def attach_state(model: ifcopenshell.file, targets: Sequence[Entity], state: ShadingState) -> None:
+    """Give windows or window types a shading state; one of that name is replaced."""
+    writer = _Writer(model)
+    properties = [writer.bsdf(band, bsdf) for band, bsdf in state.bands.items()]
+    if state.g_value is not None:
+        properties.append(writer.g_values(state.g_value))
+    if state.u_value is not None:
+        properties.append(writer.single("U-value", "IfcThermalTransmittanceMeasure", state.u_value))
+    if not properties:
+        raise ValueError("a shading state needs a BSDF, g-values or a U-value")
+    name = set_name(state.name)
+    for target in targets:
+        _detach(model, target, name)
+    pset = writer.create(
+        "IfcPropertySet", ifcopenshell.guid.new(), writer.owner, name,
+        "Optical and thermal properties of a fenestration system by direction", properties,
+    )  # fmt: skip
+    types = [target for target in targets if target.is_a("IfcTypeObject")]
+    for target in types:
+        target.HasPropertySets = [*(target.HasPropertySets or ()), pset]
+    objects = [target for target in targets if not target.is_a("IfcTypeObject")]
+    if objects:
+        writer.create(
+            "IfcRelDefinesByProperties", ifcopenshell.guid.new(), writer.owner, None, None,
+            objects, pset,
+        )  # fmt: skip
+
+
+def set_name(state: str) -> str:
+    """Name of the property set of a shading state."""
+    return f"{SET_NAME}: {state}" if state else SET_NAME
+
+
+def _detach(model: ifcopenshell.file, target: Entity, name: str) -> None:
+    """Take the property set of that name off a window or type."""
+    if target.is_a("IfcTypeObject"):
+        kept = [one for one in target.HasPropertySets or () if one.Name != name]
+        target.HasPropertySets = kept or None
+        return
+    for relation in list(target.IsDefinedBy or ()):
+        pset = getattr(relation, "RelatingPropertyDefinition", None)
+        if pset is None or pset.Name != name:
+            continue
+        others = [one for one in relation.RelatedObjects if one != target]
+        if others:
+            relation.RelatedObjects = others
+        else:
+            model.remove(relation)
+
+
+class _Writer:
+    """Makes property entities of one model."""
+
+    def __init__(self, model: ifcopenshell.file) -> None:
+        self._model = model
+        histories = model.by_type("IfcOwnerHistory")
+        self.owner = histories[0] if histories else None
+        self._radian = self.create("IfcSIUnit", None, "PLANEANGLEUNIT", None, "RADIAN")
+        self._nanometre = self.create("IfcSIUnit", None, "LENGTHUNIT", "NANO", "METRE")
+
+    def create(self, name: str, *values) -> Entity:
+        if name == "IfcSIUnit":
+            _, kind, prefix, unit = values
+            return self._model.create_entity(name, UnitType=kind, Prefix=prefix, Name=unit)
+        return self._model.create_entity(name, *values)
+
+    def single(self, name: str, measure: str, value: float) -> Entity:
+        number = self._model.create_entity(measure, float(value))
+        return self._model.create_entity("IfcPropertySingleValue", Name=name, NominalValue=number)
+
+    def complex(self, name: str, usage: str, properties: Sequence[Entity]) -> Entity:
+        return self._model.create_entity(
+            "IfcComplexProperty", Name=name, UsageName=usage, HasProperties=list(properties)
+        )
+
+    def bounded(self, name: str, low: float, high: float, measure: str, unit: Entity) -> Entity:
+        create = self._model.create_entity
+        return create(
+            "IfcPropertyBoundedValue", Name=name, UpperBoundValue=create(measure, float(high)),
+            LowerBoundValue=create(measure, float(low)), Unit=unit,
+        )  # fmt: skip
+
+    def numbers(self, name: str, values: np.ndarray, measure: str = "IfcReal", unit=None) -> Entity:
+        create = self._model.create_entity
+        kind = int if measure == "IfcInteger" else float
+        listed = [create(measure, kind(value)) for value in np.asarray(values).ravel()]
+        return create("IfcPropertyListValue", Name=name, ListValues=listed, Unit=unit)
+
+    def bsdf(self, band: str, bsdf: KlemsBsdf | TensorTreeBsdf) -> Entity:
+        """The BSDF of one band, figure 21."""
+        parts = []
+        if band in WAVELENGTHS:
+            low, high = WAVELENGTHS[band]
+            measure = "IfcPositiveLengthMeasure"
+            one = self.bounded("Wavelength range", low, high, measure, self._nanometre)
+            parts.append(self.complex("Wavelength ranges", band, [one]))
+        if isinstance(bsdf, KlemsBsdf):
+            parts += self._angles("Incident", bsdf.basis_in) + self._angles(
+                "Outgoing", bsdf.basis_out
+            )
+            values = [self.numbers(BLOCKS[k], block) for k, block in bsdf.blocks().items()]
+            usage = KLEMS
+        else:
+            values = []
+            for key, name in BLOCKS.items():
+                tree = getattr(bsdf, key)
+                if tree is not None:
+                    parts.append(self.numbers(f"{name}: depths", tree.depths, "IfcInteger"))
+                    values.append(self.numbers(name, tree.values))
+                    rank = tree.rank
+            usage = f"{TREE} rank {rank}"
+        parts.append(self.complex("Transmittance and reflectance values", "1/sr", values))
+        return self.complex(f"BSDF {band}", usage, parts)
+
+    def _angles(self, side: str, basis: KlemsBasis) -> list[Entity]:
+        """Polar ranges of the rings, azimuth ranges of the patches in each."""
+        bounds, measure = basis.theta_bounds, "IfcPlaneAngleMeasure"
+        polar = [
+            self.bounded(f"Angle range {i + 1}", low, high, measure, self._radian)
+            for i, (low, high) in enumerate(pairwise(bounds))
+        ]
+        azimuth = []
+        for ring, count in enumerate(basis.phi_counts):
+            step = 2 * np.pi / count
+            edges = (np.arange(count + 1) - 0.5) * step
+            ranges = [
+                self.bounded(f"Angle range {k + 1}", *edges[k : k + 2], measure, self._radian)
+                for k in range(count)
+            ]
+            azimuth.append(self.complex(f"Polar range {ring + 1}", "azimuths", ranges))
+        return [
+            self.complex(f"{side} polar angle ranges", basis.name or "Klems", polar),
+            self.complex(f"{side} azimuthal angle ranges", basis.name or "Klems", azimuth),
+        ]
+
+    def g_values(self, table: AngularGValue) -> Entity:
+        """Angular g-values, polar angle by polar angle."""
+        measure = "IfcPlaneAngleMeasure"
+        return self.complex(
+            "G-value", "total solar energy transmittance",
+            [
+                self.numbers("Polar angles", table.polar, measure, self._radian),
+                self.numbers("Azimuthal angles", table.azimuth, measure, self._radian),
+                self.numbers("G-values", table.values, "IfcNormalisedRatioMeasure"),
+            ],
+        )  # fmt: skip

@@ -1,0 +1,139 @@
+"""Windows, doors and glazed panels of an IFC file with their openings, hosts and stated values."""
+
+from __future__ import annotations
+
+import contextlib
+
+import ifcopenshell
+import ifcopenshell.util.element
+import ifcopenshell.util.unit
+import numpy as np
+
+from bim.apertures import Filling
+from bim.ifc.project import psets_of
+from bim.ifc.shapes import Shape
+from bim.model import Problem
+from bim.planes import area_vectors
+
+PANELS = (
+    "IfcPlate",
+    "IfcCurtainWall",
+    "IfcWall",
+    "IfcBuildingElementProxy",
+    "IfcMember",
+    "IfcRoof",
+    "IfcSlab",
+    "IfcCovering",
+)
+LEAST_GLASS = 0.05  # transparent area that makes a panel a window [m2]
+
+
+def read_fillings(
+    model: ifcopenshell.file, shapes: dict[int, Shape]
+) -> tuple[list[Filling], list[Problem]]:
+    """Every window and door, and every other element with transparent parts (curtain panels)."""
+    problems: list[Problem] = []
+    fillings = []
+    scale = _length_scale(model)
+    for element in [*model.by_type("IfcWindow"), *model.by_type("IfcDoor")]:
+        shape = shapes.get(element.id())
+        opening, host = _opening_and_host(element)
+        body = None if opening is None else shapes.get(opening.id())
+        if shape is None and body is None:
+            what = f"{element.is_a()} {element.Name or ''}: has no geometry and no opening"
+            problems.append(Problem(element.GlobalId, what, "left out"))
+            continue
+        if shape is None:
+            what = f"{element.is_a()} {element.Name or ''}: has no geometry"
+            problems.append(Problem(element.GlobalId, what, "drawn as its opening"))
+        fillings.append(_filling(element, shape or body, body, host, scale))
+    for class_name in PANELS:
+        with contextlib.suppress(RuntimeError):  # a class that this schema does not have
+            for element in model.by_type(class_name):
+                panel = _panel(element, shapes.get(element.id()), scale)
+                if panel is None:
+                    continue
+                fillings.append(panel)
+                if class_name in ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering"):
+                    what = f"{element.is_a()} {element.Name or ''}: is transparent"
+                    problems.append(Problem(element.GlobalId, what, "taken as a window"))
+    return fillings, problems
+
+
+def _length_scale(model: ifcopenshell.file) -> float:
+    try:
+        return float(ifcopenshell.util.unit.calculate_unit_scale(model))
+    except Exception:  # broken unit assignment: reported by length_problems
+        return 1.0
+
+
+def _opening_and_host(element: ifcopenshell.entity_instance):
+    for relation in getattr(element, "FillsVoids", None) or ():
+        opening = relation.RelatingOpeningElement
+        for voids in getattr(opening, "VoidsElements", None) or ():
+            return opening, voids.RelatingBuildingElement
+        return opening, None
+    return None, None
+
+
+def _panel(element, shape: Shape | None, scale: float) -> Filling | None:
+    """A curtain wall panel or other element as a window if enough of it is transparent."""
+    if shape is None or not shape.transparent.any():
+        return None
+    clear = shape.triangles[shape.transparent]
+    if 0.5 * np.linalg.norm(area_vectors(clear), axis=1).sum() < LEAST_GLASS:
+        return None
+    return _filling(element, shape, None, element, scale)
+
+
+def _filling(element, shape: Shape, body: Shape | None, host, scale: float) -> Filling:
+    psets = psets_of(element)
+    element_type = None
+    with contextlib.suppress(Exception):  # a damaged type must not stop the geometry
+        element_type = ifcopenshell.util.element.get_type(element)
+    opaque = [look for look in shape.looks if not look.is_glass]
+    return Filling(
+        guid=element.GlobalId,
+        name=element.Name or element.GlobalId,
+        ifc_class=element.is_a(),
+        triangles=shape.triangles,
+        transparent=shape.transparent,
+        opening=None if body is None else body.triangles,
+        host=None if host is None else host.GlobalId,
+        frame_width=_frame_width(element, element_type, scale),
+        glazed_fraction=_number(psets, "GlazingAreaFraction"),
+        u_value=_number(psets, "ThermalTransmittance"),
+        g_value=_number(psets, "SolarHeatGainTransmittance", "TotalSolarTransmittance"),
+        visible_transmittance=_number(psets, "VisibleLightTransmittance"),
+        type_name=(element_type.Name or "") if element_type is not None else "",
+        frame_reflectance=opaque[0].reflectance if opaque else None,
+    )
+
+
+def _number(psets: dict[str, dict], *names: str) -> float | None:
+    """First positive number of one of those names in any property set."""
+    for name in names:
+        for properties in psets.values():
+            value = properties.get(name)
+            if isinstance(value, int | float) and not isinstance(value, bool) and value > 0:
+                return float(value)
+    return None
+
+
+def _frame_width(element, element_type, scale: float) -> float | None:
+    """Lining thickness and panel frame thickness together [m], where stated."""
+    total = 0.0
+    for source in (element_type, element):
+        sets = list(getattr(source, "HasPropertySets", None) or ())
+        for relation in getattr(source, "IsDefinedBy", None) or ():
+            definition = getattr(relation, "RelatingPropertyDefinition", None)
+            sets += [definition] if definition is not None else []
+        for one in sets:
+            if one.is_a("IfcWindowLiningProperties"):
+                total += (one.LiningThickness or 0.0) * scale
+        panels = [one for one in sets if one.is_a("IfcWindowPanelProperties")]
+        if panels:
+            total += max((one.FrameThickness or 0.0) for one in panels) * scale
+        if total > 0:
+            return total
+    return None

@@ -1,0 +1,108 @@
+"""Rooms that are open to each other: found, reported, and joined where the user asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import manifold3d
+
+from bim.apertures import Filling, aperture_of
+from bim.ifc.source import Source
+from bim.ifc.spaces import SpaceRecord
+from bim.model import Problem
+from bim.rooms import OVERLAP, Attachment, attachments_of, room_solid
+from bim.solids import prism, union
+
+THROUGH = 0.02  # an opening that stops this near a room's face goes through the wall [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """An opening without door or window between two rooms."""
+
+    opening: str  # GUID
+    rooms: frozenset[str]  # GUIDs of the two
+    solid: manifold3d.Manifold  # fills the opening from one room into the other
+
+
+def passages(source: Source, records: Sequence[SpaceRecord]) -> list[Passage]:
+    """The openings that nothing fills and that lead from room to room."""
+    solids = [record.solid for record in records]
+    found = []
+    for opening in source.model.by_type("IfcOpeningElement"):
+        shape = source.shapes.get(opening.id())
+        if shape is None or getattr(opening, "HasFillings", None):
+            continue
+        body = shape.triangles
+        filling = Filling(
+            shape.guid, shape.name, "IfcOpeningElement", body, shape.look < -1, opening=body
+        )
+        aperture, _ = aperture_of(filling)
+        if aperture is None:
+            continue
+        sides = attachments_of(aperture, solids)
+        for one in sides:
+            others = [a for a in sides if a.room == one.neighbour and a.neighbour == one.room]
+            passage = _passage(one, others)
+            if passage is not None and passage.rooms not in {p.rooms for p in found}:
+                found.append(passage)
+    return found
+
+
+def _passage(one: Attachment, others: list[Attachment]) -> Passage | None:
+    """The passage between a room and its neighbour if the opening goes through to both."""
+    if one.neighbour is None or not others:
+        return None
+    other, plane = others[0], one.aperture.plane
+    heights = plane.to_plane(one.aperture.filling.triangles)[..., 2]
+    # this room lies below the plane, the other one above
+    if heights.min() > one.nearest + THROUGH or heights.max() < -other.nearest - THROUGH:
+        return None
+    solid = prism(one.region, plane, one.deepest - OVERLAP, -other.deepest + OVERLAP)
+    if solid is None:
+        return None
+    return Passage(one.aperture.filling.guid, frozenset((one.room, other.room)), solid)
+
+
+def joined_rooms(
+    source: Source, records: Sequence[SpaceRecord]
+) -> tuple[list[SpaceRecord], list[Problem]]:
+    """Rooms with those of the corrections' `join` made one; the other open passages reported."""
+    ways = passages(source, records)
+    records, problems = list(records), []
+    for names in source.corrections.join:
+        parts = [r for r in records if r.name in names or r.solid.guid in names]
+        one = _joined(parts, ways) if len(parts) > 1 else None
+        if one is None:
+            what = f"rooms {', '.join(names)}: nothing opens between them, or they do not exist"
+            problems.append(Problem(source.corrections.file or "join", what, "not joined"))
+            continue
+        records = [r for r in records if r not in parts] + [one]
+        problems.append(Problem(one.solid.guid, f"rooms {', '.join(names)}", "joined as asked for"))
+    named = {record.solid.guid: record.solid.name for record in records}
+    for way in ways:
+        if all(guid in named for guid in way.rooms):
+            pair = " and ".join(sorted(named[guid] for guid in way.rooms))
+            what = f"rooms {pair} are open to each other"
+            problems.append(Problem(way.opening, what, "closed by a wall face unless joined"))
+    return records, problems
+
+
+def _joined(parts: list[SpaceRecord], ways: list[Passage]) -> SpaceRecord | None:
+    """One room of several; None where they stay apart."""
+    guids = {part.solid.guid for part in parts}
+    solids = [part.solid.manifold for part in parts]
+    solids += [way.solid for way in ways if way.rooms <= guids]
+    body = union(solids)
+    if len(body.decompose()) != 1:
+        return None
+    first = parts[0]
+    name = " + ".join(part.name for part in parts)
+    areas, volumes = ([getattr(p, key) for p in parts] for key in ("stated_area", "stated_volume"))
+    return SpaceRecord(
+        room_solid(first.solid.guid, name, body.as_original()), name,
+        " + ".join(part.long_name for part in parts if part.long_name), first.storey,
+        body.volume(), None if None in areas else sum(areas),
+        None if None in volumes else sum(volumes),
+    )  # fmt: skip

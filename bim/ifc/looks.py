@@ -1,0 +1,102 @@
+"""Reflectance and transparency of surfaces: measured values first, then the colours on screen."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import ifcopenshell
+
+from bim.defaults import HIGHEST_REFLECTANCE, LOWEST_REFLECTANCE
+
+CLEAR = 0.25  # transparency from which a surface is glass
+Colour = tuple[float, float, float]
+BLACK: Colour = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a surface style reflects and whether it is glass."""
+
+    name: str
+    reflectance: float  # diffuse, visible
+    transparency: float  # 0 opaque to 1 clear
+    fault: str = ""  # what is wrong with the file's value, "" if nothing
+    solar: float | None = None  # diffuse, solar; None: as visible
+
+    @property
+    def reflectances(self) -> tuple[float, float]:
+        """Visible and solar reflectance."""
+        return self.reflectance, self.reflectance if self.solar is None else self.solar
+
+    @property
+    def is_glass(self) -> bool:
+        """Whether one sees through it."""
+        return self.transparency > CLEAR
+
+
+def look_of(
+    model: ifcopenshell.file, name: str, colour: Sequence[float], transparency: float
+) -> Look:
+    """The look of a style that the geometry engine names "<class>-<STEP id>".
+
+    In this order: IfcSurfaceStyleLighting.DiffuseReflectionColour and a DiffuseColour given as a
+    colour are coefficients of reflection as the schema defines them; else the surface colour is
+    what a screen shows (sRGB), times the diffuse factor where there is one.
+
+    Args: colour, transparency: the engine's own reading, for styles that cannot be found.
+    """
+    shading = None
+    with contextlib.suppress(Exception):  # names of other kinds, or ids that do not exist
+        shading = model.by_id(int(name.rsplit("-", 1)[1]))
+    label = name
+    value = _display_luminance(_bounded(colour))
+    if shading is not None and shading.is_a("IfcSurfaceStyleShading"):
+        style = _style_of(model, shading)
+        label = (style.Name if style is not None else None) or name
+        value = _reflectance(shading, style)
+        given = getattr(shading, "Transparency", None)
+        transparency = transparency if given is None else float(given)
+    bounded = min(max(value, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE)
+    fault = "" if bounded == value else f"reflects {value:.2f}: taken as {bounded:.2f}"
+    return Look(label, bounded, min(max(float(transparency), 0.0), 1.0), fault)
+
+
+def _style_of(model: ifcopenshell.file, shading: ifcopenshell.entity_instance):
+    for parent in model.get_inverse(shading):
+        if parent.is_a("IfcSurfaceStyle"):
+            return parent
+    return None
+
+
+def _reflectance(shading: ifcopenshell.entity_instance, style) -> float:
+    """Diffuse reflectance of a shading, from the most physical of its entries."""
+    for other in style.Styles if style is not None else ():
+        if other.is_a("IfcSurfaceStyleLighting"):
+            return _luminance(_rgb(other.DiffuseReflectionColour))
+    diffuse = getattr(shading, "DiffuseColour", None)
+    if diffuse is not None and diffuse.is_a("IfcColourRgb"):
+        return _luminance(_rgb(diffuse))
+    factor = 1.0 if diffuse is None else float(diffuse.wrappedValue)
+    return factor * _display_luminance(_rgb(shading.SurfaceColour))
+
+
+def _rgb(colour: ifcopenshell.entity_instance) -> Colour:
+    return _bounded((colour.Red, colour.Green, colour.Blue))
+
+
+def _bounded(values: Sequence[float]) -> Colour:
+    red, green, blue = (min(max(float(v), 0.0), 1.0) if v == v else 0.0 for v in values)
+    return red, green, blue
+
+
+def _luminance(linear: Colour) -> float:
+    """Luminance weights of IEC 61966-2-1:1999 on linear red, green, blue; grey keeps its value."""
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def _display_luminance(colour: Colour) -> float:
+    """Luminance of a colour given as display values (IEC 61966-2-1:1999, sRGB)."""
+    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
+    return _luminance((red, green, blue))

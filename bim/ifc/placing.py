@@ -1,0 +1,104 @@
+"""From model axes to the world: true north, size, and far-off origins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import ifcopenshell
+import ifcopenshell.util.placement
+import ifcopenshell.util.unit
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.ifc.shapes import Shape
+from bim.model import Problem
+
+FAR_OFF = 5000.0  # coordinates beyond this cost precision [m]
+STOREY_HEIGHTS = (1.2, 60.0)  # of rooms and walls that a building may have [m]
+UNIT_SLIPS = (1000.0, 0.001, 100.0, 0.01, 0.3048, 1 / 0.3048, 304.8, 1 / 304.8, 25.4, 1 / 25.4)
+GROUND_RANGE = 1.5  # the ground storey lies at most this far from height zero [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """Shapes in the world, and how they came there: world = scale * rotation @ model - offset."""
+
+    shapes: dict[int, Shape]
+    rotation: NDArray[np.float64]  # [3, 3]
+    scale: float
+    offset: NDArray[np.float64]  # [3] [m]
+    problems: tuple[Problem, ...]
+
+    def to_world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Model points [..., 3] [m] in the world."""
+        return self.scale * points @ self.rotation.T - self.offset
+
+
+def in_world(shapes: dict[int, Shape], rotation: NDArray[np.float64]) -> Placed:
+    """Shapes turned to true north, scaled if the unit is plainly wrong, moved near the origin."""
+    problems: list[Problem] = []
+    scale = _unit_slip(shapes)
+    if scale != 1.0:
+        height = _typical_height(shapes)
+        what = f"rooms and walls are {height:.3g} m tall: wrong length unit"
+        problems.append(Problem("project", what, f"all lengths multiplied by {scale:g}"))
+    offset = np.zeros(3)
+    boxes = [shape.triangles.reshape(-1, 3) for shape in shapes.values()]
+    if boxes:
+        middle = scale * np.median([points.mean(axis=0) for points in boxes], axis=0) @ rotation.T
+        if np.abs(middle[:2]).max() > FAR_OFF:
+            offset = np.array([*np.round(middle[:2], -1), 0.0])
+            what = f"model lies {np.hypot(*middle[:2]) / 1000:.0f} km from its origin"
+            done = f"moved by ({-offset[0]:.0f}, {-offset[1]:.0f}) m"
+            problems.append(Problem("project", what, done))
+    world = {
+        key: replace(shape, triangles=scale * shape.triangles @ rotation.T - offset)
+        for key, shape in shapes.items()
+    }
+    return Placed(world, rotation, scale, offset, tuple(problems))
+
+
+def _typical_height(shapes: dict[int, Shape]) -> float:
+    """Median height of spaces, else of walls [m]; 0 without either."""
+    for prefix in ("IfcSpace", "IfcWall"):
+        heights = [
+            float(np.ptp(shape.triangles[..., 2]))
+            for shape in shapes.values()
+            if shape.ifc_class.startswith(prefix)
+        ]
+        if heights:
+            return float(np.median(heights))
+    return 0.0
+
+
+def _unit_slip(shapes: dict[int, Shape]) -> float:
+    """Factor that makes the building's height possible; 1 where it already is or nothing helps."""
+    height = _typical_height(shapes)
+    low, high = STOREY_HEIGHTS
+    if height == 0.0 or 0.1 * low <= height <= high:
+        return 1.0
+    fits = [factor for factor in UNIT_SLIPS if low * 1.5 <= height * factor <= 0.1 * high]
+    return fits[0] if fits else 1.0
+
+
+def ground_level(model: ifcopenshell.file, placed: Placed) -> float:
+    """Height [m] in the world of the storey nearest to elevation zero, else of the lowest one."""
+    try:
+        unit = float(ifcopenshell.util.unit.calculate_unit_scale(model))
+    except Exception:  # broken unit assignment: reported by length_problems
+        unit = 1.0
+    levels: list[tuple[float, float]] = []
+    for storey in model.by_type("IfcBuildingStorey"):
+        if storey.ObjectPlacement is None or storey.Elevation is None:
+            continue
+        try:
+            z = ifcopenshell.util.placement.get_local_placement(storey.ObjectPlacement)[2][3]
+        except Exception:  # placements of damaged files
+            continue
+        levels.append((float(storey.Elevation) * unit * placed.scale, float(z) * unit))
+    if not levels:
+        bottoms = [shape.triangles[..., 2].min() for shape in placed.shapes.values()]
+        return float(min(bottoms, default=0.0))
+    near = [level for level in levels if abs(level[0]) <= GROUND_RANGE]
+    chosen = min(near, key=lambda level: abs(level[0])) if near else min(levels)
+    return placed.scale * chosen[1] - float(placed.offset[2])

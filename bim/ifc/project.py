@@ -1,0 +1,230 @@
+"""The IFC file itself: opening it, true north, site, units, and the text of its elements."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import tempfile
+import zipfile
+from pathlib import Path
+
+import ifcopenshell
+import ifcopenshell.util.element
+import ifcopenshell.util.unit
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Problem
+from mitsuba_cfs.errors import DataError
+
+SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
+
+
+def open_ifc(path: str | Path) -> ifcopenshell.file:
+    """The opened model (.ifc, or .ifczip with one model); `DataError` where it is none."""
+    path = Path(path)
+    if not path.is_file():
+        raise DataError("no such file", file=path)
+    if path.suffix.lower() in (".ifczip", ".zip"):
+        return _open_zipped(path)
+    with path.open("rb") as stream:
+        start = stream.read(4096)
+    if b"ISO-10303-21" not in start:
+        raise DataError("not an IFC file: 'ISO-10303-21' is missing at its start", file=path)
+    return _open_step(path, path)
+
+
+def _open_zipped(path: Path) -> ifcopenshell.file:
+    try:
+        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
+            names = [name for name in archive.namelist() if name.lower().endswith(".ifc")]
+            if len(names) != 1:
+                raise DataError(f"expected one .ifc inside, found {len(names)}", file=path)
+            inner = Path(folder) / "model.ifc"
+            inner.write_bytes(archive.read(names[0]))
+            return _open_step(inner, path)
+    except (zipfile.BadZipFile, NotImplementedError) as error:
+        raise DataError(f"cannot be unzipped: {error}", file=path) from None
+
+
+def _open_step(path: Path, shown: Path) -> ifcopenshell.file:
+    """Open a STEP file; errors name the file that the user gave."""
+    try:
+        model = ifcopenshell.open(str(path))
+    except Exception as error:  # the parser raises several unrelated types
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise DataError(f"cannot be read as IFC: {reason}", file=shown) from None
+    if not model.schema.startswith(SCHEMAS):
+        raise DataError(f"schema {model.schema}, expected one of {SCHEMAS}", file=shown)
+    if not model.by_type("IfcProject") and not model.by_type("IfcProduct"):
+        raise DataError("holds no project and no products: damaged or cut off", file=shown)
+    _mend_stars(model)
+    return model
+
+
+def _mend_stars(model: ifcopenshell.file) -> None:
+    """Empty the attributes that Renga writes as "*" (derived) though they are not derived.
+
+    The geometry engine gives up on products whose name is a star.
+    """
+    schema = ifcopenshell.ifcopenshell_wrapper.schema_by_name(model.schema_identifier)
+    for product in model.by_type("IfcProduct"):
+        if ",*" not in str(product):
+            continue
+        derived = schema.declaration_by_name(product.is_a()).as_entity().derived()
+        for index, value in enumerate(product):
+            if value is None and not derived[index]:
+                product[index] = None
+
+
+def ending_problems(path: str | Path) -> list[Problem]:
+    """A problem where a STEP file has lost its end."""
+    path = Path(path)
+    if path.suffix.lower() in (".ifczip", ".zip"):
+        return []
+    with path.open("rb") as stream:
+        stream.seek(max(path.stat().st_size - 4096, 0))
+        if b"END-ISO-10303-21" in stream.read():
+            return []
+    what = "file ends without END-ISO-10303-21: cut off"
+    return [Problem(path.name, what, "what could be read is used")]
+
+
+def length_problems(model: ifcopenshell.file) -> list[Problem]:
+    """A problem where the file states no length unit."""
+    with contextlib.suppress(Exception):
+        if ifcopenshell.util.unit.get_project_unit(model, "LENGTHUNIT") is not None:
+            return []
+    return [Problem("project", "states no length unit", "lengths taken as metres")]
+
+
+def area_scale(model: ifcopenshell.file, kind: str) -> float:
+    """Factor from the file's unit of "AREAUNIT" or "VOLUMEUNIT" to m2 or m3."""
+    try:
+        if ifcopenshell.util.unit.get_project_unit(model, kind) is not None:
+            return float(ifcopenshell.util.unit.calculate_unit_scale(model, kind))
+        length = float(ifcopenshell.util.unit.calculate_unit_scale(model))
+    except Exception:  # files without or with broken unit assignments
+        return 1.0
+    return length ** (2 if kind == "AREAUNIT" else 3)
+
+
+def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[Problem]]:
+    """Rotation [3, 3] about z from model axes to x east, y north; and what is odd about it.
+
+    TrueNorth is the direction of north in the model's own axes.  Without it the map conversion's
+    grid north is taken (IFC4: XAxisAbscissa, XAxisOrdinate), else +y is north.
+    """
+    for context in model.by_type("IfcGeometricRepresentationContext", include_subtypes=False):
+        north = getattr(context, "TrueNorth", None)
+        if north is None or context.ContextType == "Plan":
+            continue
+        ratios = [float(value) for value in north.DirectionRatios]
+        if len(ratios) == 2 and math.hypot(*ratios) > 1e-9:
+            return _turned(ratios[0], ratios[1]), []
+        where = f"TrueNorth {tuple(ratios)}"
+        return np.eye(3), [
+            Problem(where, "is not a direction in the plane", "north taken as the model's +y")
+        ]
+    conversions = [] if model.schema == "IFC2X3" else model.by_type("IfcMapConversion")
+    for conversion in conversions:
+        x, y = conversion.XAxisAbscissa, conversion.XAxisOrdinate
+        if x is not None and y is not None and math.hypot(x, y) > 1e-9:
+            # the model's x axis has map coordinates (x, y): the model is turned by their angle
+            north = (y / math.hypot(x, y), x / math.hypot(x, y))
+            note = Problem("IfcMapConversion", "TrueNorth is missing", "grid north taken as north")
+            return _turned(*north), [note]
+    return np.eye(3), [Problem("project", "states no TrueNorth", "north taken as the model's +y")]
+
+
+def _turned(x: float, y: float) -> NDArray[np.float64]:
+    """Rotation [3, 3] about z that takes the direction (x, y) to +y."""
+    length = math.hypot(x, y)
+    c, s = y / length, x / length
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def site_location(
+    model: ifcopenshell.file,
+) -> tuple[float | None, float | None, float, list[Problem]]:
+    """Latitude and longitude (east positive) [deg], elevation [m], and what is wrong with them."""
+    for site in model.by_type("IfcSite"):
+        latitude, longitude = _degrees(site.RefLatitude), _degrees(site.RefLongitude)
+        try:
+            scale = float(ifcopenshell.util.unit.calculate_unit_scale(model))
+        except Exception:  # broken unit assignment: reported by length_problems
+            scale = 1.0
+        elevation = float(site.RefElevation or 0.0) * scale
+        if latitude is None or longitude is None:
+            continue
+        if abs(latitude) > 90 or abs(longitude) > 180:
+            what = f"latitude {latitude:.3f}, longitude {longitude:.3f} are not on Earth"
+            return (
+                None,
+                None,
+                elevation,
+                [Problem(site.GlobalId, what, "left out: the weather file's are used")],
+            )
+        if latitude == 0 and longitude == 0:
+            return (
+                None,
+                None,
+                elevation,
+                [Problem(site.GlobalId, "site at 0 N 0 E", "left out: the weather file's is used")],
+            )
+        return latitude, longitude, elevation, []
+    return (
+        None,
+        None,
+        0.0,
+        [
+            Problem(
+                "IfcSite", "states no place", "the weather file's latitude and longitude are used"
+            )
+        ],
+    )
+
+
+def _degrees(parts: tuple[int, ...] | None) -> float | None:
+    """Decimal degrees from degrees, minutes, seconds and millionths of a second."""
+    if not parts:
+        return None
+    values = [abs(float(part)) for part in parts] + [0.0] * 4
+    sign = -1.0 if any(part < 0 for part in parts) else 1.0
+    return sign * (values[0] + values[1] / 60 + (values[2] + values[3] / 1e6) / 3600)
+
+
+def storey_of(element: ifcopenshell.entity_instance) -> str:
+    """Name of the storey that holds the element, "" if none."""
+    container = element
+    for _ in range(20):  # aggregates may be nested, a damaged file may hold a loop
+        if container is None or container.is_a("IfcBuildingStorey"):
+            break
+        container = parent_of(container)
+    return (container.Name or "") if container is not None else ""
+
+
+def parent_of(
+    element: ifcopenshell.entity_instance,
+) -> ifcopenshell.entity_instance | None:
+    """What contains, aggregates or is filled or voided by the element; None at the top."""
+    for relations, attribute in (
+        ("ContainedInStructure", "RelatingStructure"),
+        ("Decomposes", "RelatingObject"),
+        ("FillsVoids", "RelatingOpeningElement"),
+        ("VoidsElements", "RelatingBuildingElement"),
+    ):
+        for relation in getattr(element, relations, None) or ():
+            parent = getattr(relation, attribute, None)
+            if parent is not None:
+                return parent
+    return None
+
+
+def psets_of(element: ifcopenshell.entity_instance) -> dict[str, dict]:
+    """Property and quantity sets of an element and its type; empty where they cannot be read."""
+    try:
+        psets = ifcopenshell.util.element.get_psets(element)
+        return {name: values for name, values in psets.items() if name is not None}
+    except Exception:  # damaged property sets must not stop the geometry
+        return {}

@@ -1,0 +1,108 @@
+"""An IFC file opened, meshed, corrected and placed in the world: what every later step reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import ifcopenshell
+import numpy as np
+
+from bim.ifc.corrections import Corrections
+from bim.ifc.looks import Look
+from bim.ifc.placing import Placed, ground_level, in_world
+from bim.ifc.project import (
+    area_scale,
+    ending_problems,
+    length_problems,
+    north_rotation,
+    open_ifc,
+    site_location,
+)
+from bim.ifc.shapes import Shape, read_shapes
+from bim.model import Problem
+
+Progress = Callable[[str, float], None]
+NO_ELEMENTS = ("IfcSpace", "IfcOpeningElement", "IfcOpeningStandardCase")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A model with its shapes in world axes."""
+
+    path: Path
+    model: ifcopenshell.file
+    placed: Placed
+    corrections: Corrections
+    latitude_deg: float | None
+    longitude_deg: float | None
+    elevation: float
+    problems: tuple[Problem, ...]
+
+    @property
+    def shapes(self) -> dict[int, Shape]:
+        """Shapes by STEP id, in world axes [m]."""
+        return self.placed.shapes
+
+    @property
+    def elements(self) -> list[Shape]:
+        """Building elements and terrain."""
+        return [s for s in self.shapes.values() if s.ifc_class not in NO_ELEMENTS]
+
+    @property
+    def walls(self) -> list[Shape]:
+        """Building elements without the terrain: what rooms border on."""
+        return [shape for shape in self.elements if not shape.ifc_class.startswith("IfcSite")]
+
+    @property
+    def ground(self) -> float:
+        """Height of the ground in the world [m]."""
+        return ground_level(self.model, self.placed)
+
+    @property
+    def name(self) -> str:
+        """Name of the project, else of the file."""
+        project = self.model.by_type("IfcProject")
+        name = (project[0].LongName or project[0].Name or "") if project else ""
+        return name or self.path.stem
+
+    def quantity_scales(self) -> tuple[float, float]:
+        """Factors from the file's area and volume units to m2 and m3."""
+        return area_scale(self.model, "AREAUNIT"), area_scale(self.model, "VOLUMEUNIT")
+
+
+def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> Source:
+    """The opened model, its shapes meshed, corrected and placed."""
+    tell("opening", 0.0)
+    model = open_ifc(path)
+    problems = ending_problems(path) + length_problems(model)
+    rotation, more = north_rotation(model)
+    latitude, longitude, elevation, site = site_location(model)
+    removed = corrections.removed(model)
+    shapes, faults = read_shapes(
+        model, lambda fraction: tell("geometry", fraction), without=removed
+    )
+    problems += more + site + faults
+    for step_id, (visible, solar) in corrections.painted(model).items():
+        if step_id in shapes:
+            shapes[step_id] = painted(shapes[step_id], visible, solar)
+    if corrections.file:
+        what = f"{len(removed)} products left out, {len(corrections.painted(model))} repainted"
+        problems.append(Problem(corrections.file, "corrections are used", what))
+    placed = in_world(shapes, rotation)
+    return Source(
+        Path(path), model, placed, corrections, latitude, longitude, elevation,
+        tuple([*problems, *placed.problems]),
+    )  # fmt: skip
+
+
+def painted(shape: Shape, visible: float, solar: float) -> Shape:
+    """The shape with all that is not glass in one reflectance."""
+    looks = tuple(
+        look if look.is_glass else replace(look, reflectance=visible, solar=solar, fault="")
+        for look in shape.looks
+    )
+    plain = Look("correction", visible, 0.0, "", solar)
+    index = np.where(shape.look < 0, len(looks), shape.look)
+    return replace(shape, looks=(*looks, plain), look=index, is_painted=True)

@@ -1,0 +1,172 @@
+"""IfcSpace as closed solids, with names, storeys and stated quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import ifcopenshell
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.apertures import shadow
+from bim.ifc.project import psets_of, storey_of
+from bim.ifc.quantities import checked_volume, stated_quantities
+from bim.ifc.shapes import Shape
+from bim.model import Problem
+from bim.planes import Facet, plane_through
+from bim.rays import RayMesh
+from bim.rooms import RoomSolid, room_solid
+from bim.solids import prism, solid_of
+from bim.surroundings import sample_points
+
+SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3]
+UNCOVERED = 0.7  # share of the ceiling under the open sky from which a space has no roof
+WALLLESS = 0.5  # share of its sides without anything near from which it has no walls
+SIDE_REACH = 1.0  # how far from a side its wall may be [m]
+INSIDE = 0.3  # rays start this far inside: rooms drawn into their walls and roof [m]
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceRecord:
+    """A space of the file with its solid."""
+
+    solid: RoomSolid
+    name: str
+    long_name: str
+    storey: str
+    volume: float  # of the solid as drawn [m3]
+    stated_area: float | None
+    stated_volume: float | None
+
+
+def read_spaces(
+    model: ifcopenshell.file,
+    shapes: dict[int, Shape],
+    area_scale: float,
+    volume_scale: float,
+) -> tuple[list[SpaceRecord], list[Problem]]:
+    """Every space that is indoors and has a body; the others are problems."""
+    records: list[SpaceRecord] = []
+    problems: list[Problem] = []
+    seen: set[str] = set()
+    for space in model.by_type("IfcSpace"):
+        label = " ".join(part for part in (space.Name, space.LongName) if part) or space.GlobalId
+        guid = space.GlobalId
+        if guid in seen:
+            guid = f"{guid}-{space.id()}"
+            what = f"space {label}: GlobalId is used twice"
+            problems.append(Problem(space.GlobalId, what, f"called {guid} here"))
+        seen.add(guid)
+        psets = psets_of(space)
+        if is_outdoors(space, psets):
+            problems.append(Problem(guid, f"space {label}: is marked as external", "left out"))
+            continue
+        shape = shapes.get(space.id())
+        if shape is None:
+            problems.append(Problem(guid, f"space {label}: has no geometry", "left out"))
+            continue
+        solid, repair = closed_space(shape.triangles)
+        if solid is None:
+            what = f"space {label}: its geometry encloses no volume"
+            problems.append(Problem(guid, what, "left out"))
+            continue
+        if solid.volume() < SMALLEST_SPACE:
+            what = f"space {label}: holds {solid.volume():.3f} m3 only"
+            problems.append(Problem(guid, what, "no room: left out"))
+            continue
+        if repair:
+            problems.append(Problem(guid, f"space {label}: its shell was not sound", repair))
+        area, volume = stated_quantities(psets, area_scale, volume_scale)
+        volume, slip = checked_volume(volume, solid.volume())
+        if slip:
+            problems.append(Problem(guid, f"space {label}: {slip}", "the drawn one is used"))
+        records.append(
+            SpaceRecord(
+                room_solid(guid, label, solid),
+                space.Name or label,
+                space.LongName or "",
+                storey_of(space),
+                solid.volume(),
+                area,
+                volume,
+            )
+        )
+    return records, problems
+
+
+def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict]) -> bool:
+    """Whether the file says that a space is external."""
+    common = psets.get("Pset_SpaceCommon", {})
+    kinds = (
+        getattr(space, "InteriorOrExteriorSpace", None),
+        getattr(space, "PredefinedType", None),
+    )
+    return common.get("IsExternal") is True or "EXTERNAL" in kinds
+
+
+def closed_space(triangles: NDArray[np.float64]):
+    """Manifold of a space and the repair ("" if none); its outline extruded as a last resort."""
+    solid = solid_of(triangles)
+    if solid is not None:
+        return solid.manifold, solid.repair
+    low, high = triangles[..., 2].min(), triangles[..., 2].max()
+    if high - low < 0.1:
+        return None, ""
+    plane = plane_through(np.array([*triangles[0, 0, :2], low]), np.array([0.0, 0.0, 1.0]))
+    manifold = prism(shadow(triangles, plane), plane, 0.0, high - low)
+    return manifold, "replaced by its outline extruded over its height"
+
+
+def names_of_overlapping(records: Sequence[SpaceRecord]) -> list[Problem]:
+    """A problem for each pair of spaces that share more than 2 % of the smaller one."""
+    problems = []
+    for i, a in enumerate(records):
+        for b in records[i + 1 :]:
+            apart = np.any(a.solid.low > b.solid.high) or np.any(b.solid.low > a.solid.high)
+            if apart:
+                continue
+            shared = (a.solid.manifold ^ b.solid.manifold).volume()
+            if shared > 0.02 * min(a.volume, b.volume):
+                what = f"spaces {a.solid.name} and {b.solid.name} overlap by {shared:.2f} m3"
+                problems.append(Problem(a.solid.guid, what, "both kept as drawn"))
+    return problems
+
+
+def enclosed_spaces(
+    records: Sequence[SpaceRecord], building: RayMesh
+) -> tuple[list[SpaceRecord], list[Problem]]:
+    """The spaces that building elements enclose; those under the open sky are problems.
+
+    Rays from just below its ceiling go up, rays from its sides go out: a space is outdoors where
+    most of both meet nothing.  A room whose roof is only missing in the file is kept.
+    """
+    kept, problems = [], []
+    for record in records:
+        facets = record.solid.facets
+        upper = [facet for facet in facets if facet.plane.normal[2] > 0.3]
+        sides = [facet for facet in facets if abs(facet.plane.normal[2]) <= 0.3]
+        roofless = _open_share(upper, np.array([0.0, 0.0, 1.0]), np.inf, building) > UNCOVERED
+        if roofless and _open_share(sides, None, SIDE_REACH, building) > WALLLESS:
+            what = f"space {record.solid.name}: no roof covers it and no walls enclose it"
+            problems.append(Problem(record.solid.guid, what, "taken as outdoors, left out"))
+        else:
+            kept.append(record)
+    return kept, problems
+
+
+def _open_share(
+    facets: Sequence[Facet], direction: NDArray[np.float64] | None, reach: float, building: RayMesh
+) -> float:
+    """Share of the facets' area with nothing beyond; along their normals without a direction."""
+    if not facets or not len(building.triangles):
+        return 0.0
+    weights = np.array([facet.polygon.area for facet in facets])
+    points = [sample_points(facet) for facet in facets]
+    index = np.repeat(np.arange(len(facets)), [len(p) for p in points])
+    normals = np.array([facet.plane.normal for facet in facets])[index]
+    directions = normals if direction is None else np.tile(direction, (len(index), 1))
+    start = np.concatenate(points) - INSIDE * directions
+    _, hit = building.first_hits(start, directions, reach + INSIDE)
+    shares = np.bincount(index, hit < 0) / np.bincount(index)
+    return float(np.average(shares, weights=weights))

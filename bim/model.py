@@ -1,0 +1,227 @@
+"""The building as data: what every source (IFC, shoebox) yields and everything downstream reads.
+
+SI units; world x east, y north, z up, true north applied.  Face and window normals point out of
+the room: from its air towards what lies beyond.  The faces of a space and its windows together are
+one closed surface round the room's air: the room and the recesses of its windows up to the glass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "reveal")
+ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One fault of the input: where it is, what it is, what it means and what was done."""
+
+    where: str  # GUID or name of the element, or the file
+    what: str
+    consequence: str  # for the simulation, with the repair if there was one
+
+
+@dataclass(frozen=True, slots=True)
+class MaterialLayer:
+    """One homogeneous layer of a construction."""
+
+    name: str
+    thickness: float  # [m]
+    conductivity: float  # [W/(m K)]
+    density: float  # [kg/m3]
+    heat_capacity: float  # specific heat capacity [J/(kg K)]
+
+    def __post_init__(self) -> None:
+        for name in ("thickness", "conductivity", "density", "heat_capacity"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"layer {self.name}: {name} must be positive")
+
+    @property
+    def resistance(self) -> float:
+        """Thermal resistance [m2 K/W]."""
+        return self.thickness / self.conductivity
+
+
+@dataclass(frozen=True, slots=True)
+class Construction:
+    """Layers of an opaque building element, from the far side to the room."""
+
+    name: str
+    layers: tuple[MaterialLayer, ...]  # first layer: outermost
+    source: str = "default"  # where layers and properties come from
+
+    @property
+    def thickness(self) -> float:
+        """Sum of the layers' thickness [m]."""
+        return sum(layer.thickness for layer in self.layers)
+
+    @property
+    def resistance(self) -> float:
+        """Thermal resistance without surface resistances [m2 K/W]."""
+        return sum(layer.resistance for layer in self.layers)
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A plane opaque part of a room's boundary: one element, one construction, one neighbour."""
+
+    name: str
+    kind: str  # one of FACE_KINDS
+    triangles: NDArray[np.float64]  # [T, 3, 3] vertices [m], counter-clockwise seen from outside
+    adjacency: str  # one of ADJACENCIES: what lies beyond
+    construction: Construction
+    reflectance_visible: float
+    reflectance_solar: float
+    emissivity: float = 0.9
+    neighbour: str | None = None  # GUID of the other space where adjacency is "space"
+    element: str | None = None  # GUID of the building element
+    normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, out of the room
+    area: float = field(init=False)  # [m2]
+
+    def __post_init__(self) -> None:
+        if self.kind not in FACE_KINDS:
+            raise ValueError(f"face {self.name}: kind {self.kind!r} is none of {FACE_KINDS}")
+        if self.adjacency not in ADJACENCIES:
+            raise ValueError(f"face {self.name}: {self.adjacency!r} is none of {ADJACENCIES}")
+        for value in (self.reflectance_visible, self.reflectance_solar, self.emissivity):
+            if not 0 <= value <= 1:
+                raise ValueError(f"face {self.name}: reflectance or emissivity {value} not in 0..1")
+        set_normal_and_area(self)
+
+    def reflectance(self, band: str) -> float:
+        """Diffuse reflectance in the band "visible" or "solar"."""
+        return {"visible": self.reflectance_visible, "solar": self.reflectance_solar}[band]
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A plane glazed aperture of a room, with the opening it sits in."""
+
+    guid: str
+    name: str
+    triangles: NDArray[np.float64]  # [T, 3, 3] glass [m], counter-clockwise seen from outdoors
+    host: str | None = None  # GUID of the wall or roof
+    opening_area: float = 0.0  # area of the opening in the glazing plane [m2]
+    u_value: float | None = None  # of the whole window as the file states it [W/(m2 K)]
+    g_value: float | None = None  # as the file states it
+    visible_transmittance: float | None = None  # as the file states it
+    type_name: str = ""
+    normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
+    area: float = field(init=False)  # of the glass [m2]
+
+    def __post_init__(self) -> None:
+        set_normal_and_area(self)
+
+    @property
+    def frame_area(self) -> float:
+        """Area of the opening that is not glass [m2]."""
+        return max(self.opening_area - self.area, 0.0)
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Centre of the glass [3] [m]."""
+        return centroid(self.triangles)
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """A room: its air, what bounds it and its windows to the outside."""
+
+    guid: str
+    name: str
+    storey: str
+    volume: float  # of the air inside the faces and the glass [m3]
+    floor_area: float  # [m2]
+    faces: tuple[Face, ...]  # axis F
+    windows: tuple[Window, ...]
+    room_volume: float = 0.0  # of the room without its window recesses [m3]
+    stated_area: float | None = None  # the file's own floor area [m2]
+    stated_volume: float | None = None  # the file's own volume [m3]
+    long_name: str = ""
+
+    @property
+    def shell(self) -> NDArray[np.float64]:
+        """Triangles [N, 3, 3] of the closed surface: faces, then glass; normals out of the room."""
+        parts = [face.triangles for face in self.faces] + [w.triangles for w in self.windows]
+        return np.concatenate(parts) if parts else np.empty((0, 3, 3))
+
+    @property
+    def floor_level(self) -> float:
+        """Height of the biggest floor face, or of the lowest vertex without any [m]."""
+        floors = [face for face in self.faces if face.kind == "floor"]
+        if not floors:
+            return float(self.shell[..., 2].min())
+        return float(max(floors, key=lambda face: face.area).triangles[..., 2].mean())
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """A building element or object outdoors that shades and reflects."""
+
+    guid: str
+    name: str
+    ifc_class: str
+    triangles: NDArray[np.float64]  # [T, 3, 3] [m], openings cut
+    reflectance_visible: float
+    reflectance_solar: float
+    layer: str = ""
+    storey: str = ""
+    material: str = ""
+
+    def reflectance(self, band: str) -> float:
+        """Diffuse reflectance in the band "visible" or "solar"."""
+        return {"visible": self.reflectance_visible, "solar": self.reflectance_solar}[band]
+
+
+@dataclass(frozen=True, slots=True)
+class Building:
+    """Rooms, what stands around them, and the faults found on the way."""
+
+    name: str
+    spaces: tuple[Space, ...]
+    elements: tuple[Element, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    latitude_deg: float | None = None
+    longitude_deg: float | None = None  # east positive
+    elevation: float = 0.0  # above the sea [m]
+
+    @property
+    def windows(self) -> tuple[Window, ...]:
+        """The windows of all spaces."""
+        return tuple(window for space in self.spaces for window in space.windows)
+
+    def space(self, name_or_guid: str) -> Space:
+        """The space of that GUID or name; `KeyError` if there is none, `ValueError` if several."""
+        exact = [space for space in self.spaces if space.guid == name_or_guid]
+        found = exact or [s for s in self.spaces if name_or_guid in (s.name, s.long_name)]
+        if not found:
+            names = ", ".join(space.name for space in self.spaces)
+            raise KeyError(f"no space {name_or_guid!r}; there are: {names}")
+        if len(found) > 1:
+            guids = ", ".join(space.guid for space in found)
+            raise ValueError(f"{len(found)} spaces are named {name_or_guid!r}: {guids}")
+        return found[0]
+
+
+def set_normal_and_area(surface: Face | Window) -> None:
+    """Set normal and area of a frozen surface from its triangles; `ValueError` without area."""
+    t = np.asarray(surface.triangles, dtype=float)
+    if t.ndim != 3 or t.shape[1:] != (3, 3) or len(t) == 0:
+        raise ValueError(f"{surface.name}: expected triangles [T, 3, 3], got {t.shape}")
+    area_vectors = 0.5 * np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    vector = area_vectors.sum(axis=0)
+    if not np.linalg.norm(vector) > 0:
+        raise ValueError(f"{surface.name}: has no area")
+    object.__setattr__(surface, "triangles", t)
+    object.__setattr__(surface, "normal", vector / np.linalg.norm(vector))
+    object.__setattr__(surface, "area", float(np.linalg.norm(area_vectors, axis=1).sum()))
+
+
+def centroid(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area-weighted centre [3] [m] of triangles [T, 3, 3]."""
+    edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.average(triangles.mean(axis=1), axis=0, weights=np.linalg.norm(edges, axis=1))

@@ -1,0 +1,124 @@
+"""What stands outdoors before the windows, and the check that nothing blinds them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Element, Problem, Space, Window
+from bim.planes import area_vectors, merged_polygons, plane_through
+from bim.rays import hemisphere, ray_mesh
+from bim.solids import prism, solid_of, triangles_of
+
+COVERED = 0.9  # share of rays stopped at once that makes a window blind
+AT_ONCE = 0.35  # what stops rays this near before the glass lies on the window [m]
+CUT_DEPTH = 0.6  # how far a wall before the glass is cut open [m]
+SITE_CLASSES = ("IfcSite", "IfcGeographicElement")
+RAYS = 36
+GRAZING = 0.3  # cosine: flatter rays meet the reveals of every window
+
+
+@dataclass(frozen=True, slots=True)
+class Outdoors:
+    """Elements that no window is blinded by, and what had to be cut or left out for that."""
+
+    elements: tuple[Element, ...]
+    problems: tuple[Problem, ...]
+
+
+def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
+    """Elements with holes cut, or left out, where they lie on the glass of a window."""
+    elements = list(elements)
+    problems: list[Problem] = []
+    for _ in range(3):  # a second element may lie behind the first
+        mesh = ray_mesh(np.concatenate([e.triangles for e in elements] or [np.empty((0, 3, 3))]))
+        owner = np.repeat(np.arange(len(elements)), [len(e.triangles) for e in elements])
+        covers: dict[int, list[Window]] = {}
+        for space in spaces:
+            own = {window.guid for window in space.windows}
+            for window in space.windows:
+                for index in _covering(window, own, elements, mesh, owner):
+                    covers.setdefault(index, []).append(window)
+        if not covers:
+            break
+        for index in sorted(covers, reverse=True):
+            element, windows = elements[index], covers[index]
+            opened = _opened(element, windows)
+            done = "cut open there" if opened is not None else "left out"
+            what = (
+                f"{element.ifc_class} {element.name}: covers the glass of {len(windows)} window(s)"
+            )
+            problems.append(Problem(element.guid, what, done))
+            elements[index : index + 1] = [] if opened is None else [opened]
+    return Outdoors(tuple(elements), tuple(problems))
+
+
+def _covering(window: Window, own: set[str], elements, mesh, owner) -> set[int]:
+    """Elements that stop nearly every ray just outside the glass; empty if the window is free."""
+    areas = np.linalg.norm(area_vectors(window.triangles), axis=1)
+    points = window.triangles[np.argsort(-areas)[:3]].mean(axis=1) + 1e-4 * window.normal
+    directions = hemisphere(window.normal, RAYS)
+    directions = np.tile(directions[directions @ window.normal > GRAZING], (len(points), 1))
+    origins = np.repeat(points, len(directions) // len(points), axis=0)
+    mine = np.array([elements[i].guid in own for i in owner])
+    cover = np.full(len(origins), -1)
+    travelled, going = np.zeros(len(origins)), np.ones(len(origins), dtype=bool)
+    for _ in range(8):  # the window's own panes and frame do not count
+        start = origins + travelled[:, None] * directions
+        distance, hit = mesh.first_hits(start, directions, AT_ONCE / GRAZING)
+        travelled = travelled + distance + 1e-5
+        going &= (hit >= 0) & (travelled * (directions @ window.normal) < AT_ONCE)
+        cover[going & ~mine[hit]] = owner[hit[going & ~mine[hit]]]
+        going &= mine[hit]
+        travelled[~going] = 0.0
+        if not going.any():
+            break
+    if np.mean(cover >= 0) < COVERED:
+        return set()
+    index, counts = np.unique(cover[cover >= 0], return_counts=True)
+    return {int(i) for i, n in zip(index, counts, strict=True) if n > 0.2 * len(cover)}
+
+
+def _opened(element: Element, windows: Sequence[Window]) -> Element | None:
+    """The element with a hole before each window; None for thin or open ones: they are left out."""
+    walls = ("IfcWall", "IfcRoof", "IfcSlab", "IfcCovering", *SITE_CLASSES)
+    solid = solid_of(element.triangles)
+    if solid is None or not element.ifc_class.startswith(walls):
+        return None
+    body = solid.manifold
+    for window in windows:
+        plane = plane_through(window.triangles[0, 0], window.normal)
+        for polygon in merged_polygons(plane.to_plane(window.triangles)[..., :2]):
+            hole = prism(polygon, plane, -CUT_DEPTH, CUT_DEPTH)
+            if hole is not None:
+                body = body - hole
+    triangles, _ = triangles_of(body)
+    return replace(element, triangles=triangles) if len(triangles) else None
+
+
+def lifted_sites(
+    elements: Sequence[Element], windows: Sequence[Window]
+) -> tuple[list[Element], list[Problem]]:
+    """Elements without the terrain that buries the middle of a window; such terrain is reported."""
+    kept, problems = [], []
+    for element in elements:
+        if not element.ifc_class.startswith(SITE_CLASSES):
+            kept.append(element)
+            continue
+        mesh = ray_mesh(element.triangles)
+        buried = [window for window in windows if _below(mesh, window)]
+        if not buried:
+            kept.append(element)
+            continue
+        what = f"terrain {element.name}: lies above the middle of {len(buried)} window(s)"
+        problems.append(Problem(element.guid, what, "left out"))
+    return kept, problems
+
+
+def _below(mesh, window: Window) -> bool:
+    point: NDArray[np.float64] = window.centre + 0.05 * window.normal
+    distance, _ = mesh.first_hits(point[None], np.array([[0.0, 0.0, 1.0]]), 100.0)
+    return bool(np.isfinite(distance[0]))

@@ -1,0 +1,219 @@
+"""A building from an IFC file: rooms that are closed, windows that look out, problems named."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.apertures import aperture_of
+from bim.boundaries import ElementRecord, faces_and_windows, floor_area
+from bim.ifc.corrections import Corrections, corrections_beside
+from bim.ifc.defects import model_defects
+from bim.ifc.elements import bounding_elements, outdoor_elements
+from bim.ifc.fillings import read_fillings
+from bim.ifc.found_rooms import found_rooms
+from bim.ifc.joining import joined_rooms
+from bim.ifc.shapes import Shape, mesh_of
+from bim.ifc.source import Progress, Source, read_source
+from bim.ifc.spaces import SpaceRecord, enclosed_spaces, names_of_overlapping, read_spaces
+from bim.model import Building, Element, Problem, Space
+from bim.outdoors import lifted_sites, unblinded
+from bim.planes import SMALLEST_AREA
+from bim.rays import RayMesh, ray_mesh
+from bim.rooms import Attachment, attachments_of, room_pieces
+from bim.shell import enclosed_volume, open_edges
+from bim.solids import triangles_of
+from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
+
+
+def read_ifc(
+    path: str | Path,
+    *,
+    corrections: Corrections | None = None,
+    progress: Progress | None = None,
+) -> Building:
+    """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
+
+    Args:
+        corrections: what to leave out and repaint; by default those of the file
+            `<model>.corrections.toml` beside the model, if there is one.
+        progress: called with the stage's name and the fraction of it that is done.
+    Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
+        the building's `problems`.
+    """
+    tell = progress or (lambda stage, fraction: None)
+    corrections = corrections_beside(path) if corrections is None else corrections
+    source = read_source(path, corrections, tell)
+    tell("rooms", 0.0)
+    mesh = mesh_of(source.walls)
+    records, problems = _rooms(source, mesh)
+    problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
+    attachments, more = _attachments(source.model, source.shapes, records)
+    elements, reflectances, faults = bounding_elements(
+        source.model, source.walls, source.placed.rotation
+    )
+    problems += more + faults
+    around = _surroundings(mesh, source.walls, records, source.ground)
+    spaces = []
+    for index, record in enumerate(records):
+        tell("rooms", index / len(records))
+        own = [a for a in attachments if a.room == record.solid.guid]
+        try:
+            space, more = _space(record, own, records, around, index, elements, reflectances)
+        except (shapely.errors.ShapelyError, ValueError, RuntimeError) as error:
+            what = f"room {record.solid.name}: its boundary cannot be built"
+            problems.append(Problem(record.solid.guid, what, f"left out: {error}"))
+            continue
+        spaces.append(space)
+        problems += more
+    tell("surroundings", 0.0)
+    outside, more = _outdoors(source, spaces)
+    tell("surroundings", 1.0)
+    return Building(
+        source.name, tuple(spaces), outside, tuple(dict.fromkeys([*problems, *more])),
+        source.latitude_deg, source.longitude_deg, source.elevation,
+    )  # fmt: skip
+
+
+def _rooms(source: Source, mesh: RayMesh) -> tuple[list[SpaceRecord], list[Problem]]:
+    """The spaces of the file that are rooms; found from geometry where there are none."""
+    records, problems = read_spaces(source.model, source.shapes, *source.quantity_scales())
+    problems += names_of_overlapping(records)
+    records, more = enclosed_spaces(records, mesh)
+    problems += more
+    records, more = joined_rooms(source, records)
+    problems += more
+    if not records:
+        records, more = found_rooms(source)
+        problems += more
+    return records, problems
+
+
+def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Problem]]:
+    """What stands outdoors, free of what would blind a window."""
+    windows = [window for space in spaces for window in space.windows]
+    problems = []
+    if not windows:
+        what = "no window belongs to a room"
+        problems.append(Problem(source.path.name, what, "no daylight"))
+    elements = outdoor_elements(source.model, source.elements)
+    value = source.corrections.surroundings
+    if value is not None:
+        elements = [
+            replace(one, reflectance_visible=value, reflectance_solar=value) for one in elements
+        ]
+    elements, more = lifted_sites(elements, windows)
+    outdoors = unblinded(elements, spaces)
+    return outdoors.elements, [*problems, *more, *outdoors.problems]
+
+
+def _attachments(
+    model, shapes, records: Sequence[SpaceRecord]
+) -> tuple[list[Attachment], list[Problem]]:
+    """Which part of which window or door each room has."""
+    fillings, problems = read_fillings(model, shapes)
+    solids = [record.solid for record in records]
+    names = {solid.guid: solid.name for solid in solids}
+    attachments: list[Attachment] = []
+    for filling in fillings:
+        aperture, more = aperture_of(filling)
+        problems += more
+        if aperture is None:
+            continue
+        found = attachments_of(aperture, solids)
+        attachments += found
+        if not solids or aperture.glass.is_empty:
+            continue
+        if not found:
+            what = f"{filling.ifc_class} {filling.name}: no room behind it"
+            problems.append(Problem(filling.guid, what, "gives no daylight to any room"))
+        inner = sorted({names[a.room] for a in found if a.neighbour is not None})
+        if inner:
+            what = f"{filling.ifc_class} {filling.name}: glass between {' and '.join(inner)}"
+            problems.append(Problem(filling.guid, what, "taken as opaque"))
+        rooms = sorted({names[a.room] for a in found if a.neighbour is None})
+        if len(rooms) > 1:
+            what = f"{filling.name}: lies before the rooms {', '.join(rooms)}"
+            problems.append(Problem(filling.guid, what, "each gets its part"))
+    return attachments, problems
+
+
+def _surroundings(
+    mesh: RayMesh, shapes: Sequence[Shape], records: Sequence[SpaceRecord], ground: float
+) -> Surroundings:
+    empty = [np.empty((0, 3, 3))]
+    rooms = [triangles_of(record.solid.manifold)[0] for record in records]
+    return Surroundings(
+        mesh,
+        np.repeat(np.arange(len(shapes)), [len(shape.triangles) for shape in shapes]),
+        ray_mesh(np.concatenate(rooms or empty)),
+        np.repeat(np.arange(len(rooms)), [len(room) for room in rooms]),
+        tuple(record.solid.guid for record in records),
+        ground,
+    )
+
+
+def _space(
+    record: SpaceRecord,
+    attachments: Sequence[Attachment],
+    records: Sequence[SpaceRecord],
+    around: Surroundings,
+    index: int,
+    elements: Sequence[ElementRecord],
+    reflectances: NDArray[np.float64],
+) -> tuple[Space, list[Problem]]:
+    """One room with its faces and windows, checked to be closed."""
+    pieces, volume, problems = room_pieces(record.solid, attachments)
+    pieces = cut_by_neighbours(record.solid, pieces, [other.solid for other in records])
+    beyond = [
+        Beyond((), "outside") if piece.role == "glass" else what_lies_beyond(piece, around, index)
+        for piece in pieces
+    ]
+    faces, windows, assumed = faces_and_windows(pieces, beyond, elements, reflectances)
+    space = Space(
+        record.solid.guid, record.name, record.storey, volume, floor_area(faces), tuple(faces),
+        tuple(windows), record.volume, record.stated_area, record.stated_volume, record.long_name,
+    )  # fmt: skip
+    return space, problems + _assumptions(record, assumed) + _soundness(space)
+
+
+def _assumptions(record: SpaceRecord, assumed: Counter) -> list[Problem]:
+    texts = {
+        "reflectance": ("face(s) without a colour", "default reflectance of floor, wall, ceiling"),
+        "construction": ("face(s) without a construction", "default construction"),
+        "element": ("face(s) without a building element behind", "default properties"),
+        "adjacency": ("face(s) towards an enclosed void without a space", "taken as adiabatic"),
+    }
+    return [
+        Problem(record.solid.guid, f"room {record.solid.name}: {count} {texts[key][0]}",
+                texts[key][1])
+        for key, count in sorted(assumed.items())
+        if count
+    ]  # fmt: skip
+
+
+def _soundness(space: Space) -> list[Problem]:
+    """Problems of the finished shell: open edges, a volume that its faces do not enclose."""
+    problems = []
+    leaks = open_edges(space.shell)
+    if leaks:
+        what = f"room {space.name}: {leaks} open edges are left"
+        problems.append(Problem(space.guid, what, "light may leak there"))
+    enclosed = enclosed_volume(space.shell)
+    for what, stated, drawn, unit in (
+        ("floor area", space.stated_area, space.floor_area, "m2"),
+        ("volume", space.stated_volume, space.room_volume, "m3"),
+    ):
+        if stated is not None and abs(drawn - stated) > 0.02 * stated:
+            text = f"room {space.name}: states {stated:.2f} {unit} {what}, drawn {drawn:.2f} {unit}"
+            problems.append(Problem(space.guid, text, "the drawn one is used"))
+    if abs(enclosed - space.volume) > 1e-3 * space.volume + SMALLEST_AREA:
+        what = f"room {space.name}: faces enclose {enclosed:.3f} m3 of {space.volume:.3f} m3"
+        problems.append(Problem(space.guid, what, "its boundary is not sound"))
+    return problems

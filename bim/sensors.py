@@ -1,0 +1,142 @@
+"""Sensor points and view points of a room."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.model import Space
+from bim.planes import SMALLEST_AREA
+
+OFF_THE_VERTEX = 1.3e-5  # the cut is made this much higher, off sills at a round height [m]
+GRID = 1e-7  # coordinates of a cut are rounded to this [m]
+
+
+def horizontal_section(triangles: NDArray[np.float64], z: float) -> shapely.Geometry:
+    """Area inside the closed surface [N, 3, 3] at height `z`, as (multi)polygon in x, y [m].
+
+    A point counts as inside where the winding number of the cut's directed edges is not zero.
+    """
+    edges = _cut_edges(triangles, z + OFF_THE_VERTEX)
+    if not len(edges):
+        return shapely.Polygon()
+    lines = shapely.set_precision(shapely.linestrings(edges), GRID)
+    cells = shapely.get_parts(shapely.polygonize([shapely.union_all(lines)]))
+    inside = [
+        cell
+        for cell in cells
+        if cell.area > SMALLEST_AREA and abs(winding_number(_inner_point(cell), edges)) > 0.5
+    ]
+    return shapely.union_all(inside) if inside else shapely.Polygon()
+
+
+def winding_number(point: NDArray[np.float64], edges: NDArray[np.float64]) -> float:
+    """Times that closed directed edges [E, 2, 2] turn round a point [2]: sum of angles / 2 pi."""
+    a, b = (edges - point).transpose(1, 0, 2)
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return float(np.arctan2(cross, np.einsum("ij,ij->i", a, b)).sum() / (2 * np.pi))
+
+
+def _inner_point(polygon: shapely.Polygon) -> NDArray[np.float64]:
+    return shapely.get_coordinates(shapely.point_on_surface(polygon))[0]
+
+
+def _cut_edges(triangles: NDArray[np.float64], z: float) -> NDArray[np.float64]:
+    """Directed edges [E, 2, 2] where triangles cross the plane, inside to their left."""
+    above = triangles[..., 2] > z
+    crossing = triangles[above.any(axis=1) & ~above.all(axis=1)]
+    above = crossing[..., 2] > z
+    lone_is_above = above.sum(axis=1) == 1
+    lone = np.argmax(np.where(lone_is_above[:, None], above, ~above), axis=1)
+    rows = np.arange(len(crossing))
+    tip = crossing[rows, lone]
+    points = []
+    for k in (1, 2):
+        other = crossing[rows, (lone + k) % 3]
+        t = (z - tip[:, 2]) / (other[:, 2] - tip[:, 2])
+        points.append(tip[:, :2] + t[:, None] * (other - tip)[:, :2])
+    edges = np.stack(points, axis=1)
+    # with the tip above, tip -> first edge -> second is counter-clockwise seen from outside
+    edges[~lone_is_above] = edges[~lone_is_above][:, ::-1]
+    return edges[np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) > GRID]
+
+
+def sensor_grid(
+    space: Space, spacing: float = 0.5, height: float = 0.8, margin: float = 0.5
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points [S, 3] [m] on the room's work plane and their directions [S, 3], straight up.
+
+    A square grid of `spacing`, `height` above the floor, at least `margin` from what bounds the
+    room there (EN 17037:2018: 0.85 m and 0.5 m; LM-83: 0.76 m); its rows follow the longest wall
+    and its middle is the room's.  Where the margin leaves nothing it is halved until it does.
+    """
+    if spacing <= 0 or margin < 0:
+        raise ValueError("the spacing must be positive and the margin not negative")
+    z = space.floor_level + height
+    section = horizontal_section(space.shell, z)
+    if section.is_empty:
+        raise ValueError(f"space {space.name}: no room at {height} m above the floor")
+    work_plane = section.buffer(-margin, join_style="mitre")
+    while work_plane.area < SMALLEST_AREA and margin > 0.01:
+        margin *= 0.5
+        work_plane = section.buffer(-margin, join_style="mitre")
+    flat = _grid_inside(work_plane, spacing)
+    points = np.column_stack([flat, np.full(len(flat), z)])
+    return points, np.tile([0.0, 0.0, 1.0], (len(points), 1))
+
+
+def _grid_inside(area: shapely.Geometry, spacing: float) -> NDArray[np.float64]:
+    """Grid points [S, 2] inside the area; its middle if the grid misses it altogether."""
+    turned, back = _along_longest_edge(area)
+    x0, y0, x1, y1 = turned.bounds
+    # whole cells, centred; the small number keeps 4.0 / 0.5 at eight cells
+    nx, ny = (max(1, int(np.floor(d / spacing + 1e-6))) for d in (x1 - x0, y1 - y0))
+    x = (x0 + x1) / 2 + (np.arange(nx) - (nx - 1) / 2) * spacing
+    y = (y0 + y1) / 2 + (np.arange(ny) - (ny - 1) / 2) * spacing
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = grid[shapely.contains_xy(turned, grid)]
+    if not len(inside):
+        inside = shapely.get_coordinates(shapely.point_on_surface(turned))
+    return inside @ back.T
+
+
+def _along_longest_edge(
+    area: shapely.Geometry,
+) -> tuple[shapely.Geometry, NDArray[np.float64]]:
+    """The area turned so that its longest edge is along x, and the rotation [2, 2] back."""
+    biggest = max(shapely.get_parts(area), key=lambda part: part.area)
+    ring = np.asarray(biggest.exterior.coords)
+    steps = np.diff(ring, axis=0)
+    along = steps[np.argmax(np.round(np.linalg.norm(steps, axis=1), 4))]
+    c, s = along / np.linalg.norm(along)
+    if c < -1e-9 or (abs(c) <= 1e-9 and s < 0):  # rows run eastwards whichever way the ring turns
+        c, s = -c, -s
+    back = np.array([[c, -s], [s, c]])
+    return shapely.transform(area, lambda points: points @ back), back
+
+
+def view_point(
+    space: Space, eye_height: float = 1.2
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position [3] [m] in the middle of the room, horizontal direction [3] to its biggest window.
+
+    Without a window the view is along the room's longest edge; 1.2 m is a seated eye (EN 17037).
+    """
+    z = space.floor_level + eye_height
+    section = horizontal_section(space.shell, z)
+    if section.is_empty:
+        raise ValueError(f"space {space.name}: no room at {eye_height} m above the floor")
+    middle = section.centroid
+    if not section.buffer(-0.05).contains(middle):
+        middle = shapely.point_on_surface(section.buffer(-0.05) or section)
+    position = np.array([middle.x, middle.y, z])
+    direction = np.array([0.0, 0.0, 0.0])
+    if space.windows:
+        biggest = max(space.windows, key=lambda window: window.area)
+        direction = (biggest.centre - position) * [1, 1, 0]
+        if np.linalg.norm(direction) < 0.1:  # below a skylight
+            direction = biggest.normal * [1, 1, 0]
+    if np.linalg.norm(direction) < 1e-6:
+        direction = np.append(_along_longest_edge(section)[1][:, 0], 0.0)
+    return position, direction / np.linalg.norm(direction)

@@ -1,0 +1,102 @@
+"""Plane faces that close a room without a gap: neighbours share vertices and whole edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from bim.planes import Facet, polygons_of, rings_of, triangulated
+
+WELD = 1e-4  # vertices nearer than this become one: a tenth of a millimetre [m]
+
+
+def conforming_triangles(facets: list[Facet]) -> list[NDArray[np.float64]]:
+    """Triangles [T, 3, 3] of each facet such that neighbouring facets share whole edges.
+
+    Vertices of one facet that lie on an edge of another are inserted there, then every polygon is
+    triangulated with all its vertices (constrained Delaunay).  Facets that collapse give [0, 3, 3].
+    """
+    rings = [[facet.plane.to_world(ring) for ring in rings_of(facet.polygon)] for facet in facets]
+    vertices = welded(np.concatenate([ring for many in rings for ring in many]))
+    tree = cKDTree(vertices)
+    return [
+        _triangles(facet, [_with_touching(ring, vertices, tree) for ring in many], vertices)
+        for facet, many in zip(facets, rings, strict=True)
+    ]
+
+
+def welded(points: NDArray[np.float64], distance: float = WELD) -> NDArray[np.float64]:
+    """One representative [M, 3] for each cluster of points [N, 3] within `distance`."""
+    tree = cKDTree(points)
+    keep = np.ones(len(points), dtype=bool)
+    for i, near in enumerate(tree.query_ball_point(points, distance)):
+        if keep[i]:
+            keep[[j for j in near if j > i]] = False
+    return points[keep]
+
+
+def _with_touching(
+    ring: NDArray[np.float64], vertices: NDArray[np.float64], tree: cKDTree
+) -> list[int]:
+    """Indices of the welded vertices along a ring [N, 3], those of other facets included."""
+    corners = tree.query(ring)[1]
+    indices: list[int] = []
+    for start, end in zip(corners, np.roll(corners, -1), strict=True):
+        indices.append(int(start))
+        if start == end:
+            continue
+        a, edge = vertices[start], vertices[end] - vertices[start]
+        length = np.linalg.norm(edge)
+        near = np.array(tree.query_ball_point(a + edge / 2, length / 2 + WELD))
+        along = (vertices[near] - a) @ edge / length
+        off = np.linalg.norm(vertices[near] - a - np.outer(along / length, edge), axis=1)
+        between = (off < 2 * WELD) & (along > WELD) & (along < length - WELD)
+        order = np.argsort(along[between])
+        indices += [int(i) for i in near[between][order]]
+    return [i for i, before in zip(indices, [indices[-1], *indices], strict=False) if i != before]
+
+
+def _triangles(
+    facet: Facet, rings: list[list[int]], vertices: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of one facet on the welded vertices."""
+    rings = [ring for ring in rings if len(ring) >= 3]
+    if not rings:
+        return np.empty((0, 3, 3))
+    flat = [facet.plane.to_plane(vertices[ring])[:, :2] for ring in rings]
+    polygon = shapely.Polygon(flat[0], flat[1:])
+    if not polygon.is_valid:  # welding made holes touch the outline or each other
+        outline, *holes = (shapely.make_valid(shapely.Polygon(ring)) for ring in flat)
+        polygon = shapely.difference(outline, shapely.union_all(holes))
+    corners = np.concatenate(flat)
+    index = np.concatenate([np.asarray(ring) for ring in rings])
+    parts = [triangulated(p) for p in polygons_of(polygon)]
+    if not parts:
+        return np.empty((0, 3, 3))
+    nearest = index[cKDTree(corners).query(np.concatenate(parts))[1]]
+    whole = (nearest != np.roll(nearest, 1, axis=1)).all(axis=1)
+    return vertices[nearest[whole]]
+
+
+def open_edges(triangles: NDArray[np.float64]) -> int:
+    """Number of directed edges without their reverse: 0 for a closed, evenly wound surface."""
+    corners = triangles.reshape(-1, 3)
+    vertices = welded(corners)
+    index = cKDTree(vertices).query(corners)[1].reshape(-1, 3)
+    edges = np.concatenate([index[:, [0, 1]], index[:, [1, 2]], index[:, [2, 0]]])
+    key = edges[:, 0] * len(vertices) + edges[:, 1]
+    back = edges[:, 1] * len(vertices) + edges[:, 0]
+    there, counts = np.unique(key, return_counts=True)
+    reverse, reverse_counts = np.unique(back, return_counts=True)
+    balance = dict(zip(there.tolist(), counts.tolist(), strict=True))
+    for edge, count in zip(reverse.tolist(), reverse_counts.tolist(), strict=True):
+        balance[edge] = balance.get(edge, 0) - count
+    return int(sum(abs(count) for count in balance.values()) // 2)
+
+
+def enclosed_volume(triangles: NDArray[np.float64]) -> float:
+    """Signed volume [m3] in a closed surface [N, 3, 3]; positive when normals point outwards."""
+    a, b, c = (triangles - triangles.reshape(-1, 3).mean(axis=0)).transpose(1, 0, 2)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)

@@ -1,0 +1,78 @@
+"""Rooms that are alike, so that what depends on the room alone is computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from bim.model import Space, centroid
+
+ALIKE = 0.005  # lengths may differ by this between rooms that are alike [m]
+ALIKE_SHARE = 0.005  # and reflectances by this
+
+
+def template_rooms(spaces: Sequence[Space]) -> list[tuple[Space, ...]]:
+    """Groups of rooms alike in shape, orientation, reflectances, constructions and windows.
+
+    Alike means: one comes from the other by a shift; a turn would change what sun the room gets.
+    The first of each group is its template.  View matrices and heat capacities are the same for a
+    group; daylight matrices only where what stands outdoors is the same too.
+    """
+    groups: list[list[Space]] = []
+    features: list[NDArray[np.float64]] = []
+    for space in spaces:
+        mine = room_features(space)
+        for group, theirs in zip(groups, features, strict=True):
+            if _same(mine, theirs) and _same_constructions(space, group[0]):
+                group.append(space)
+                break
+        else:
+            groups.append([space])
+            features.append(mine)
+    return [tuple(group) for group in groups]
+
+
+def room_features(space: Space) -> NDArray[np.float64]:
+    """One row [N, 11] for each face and window: place, normal, size and optics, in lengths [m].
+
+    Places count from the room's lowest corner; normals and reflectances are scaled so that a
+    difference of `ALIKE` matters as much as that length.
+    """
+    corner = space.shell.reshape(-1, 3).min(axis=0)
+    scale = ALIKE / ALIKE_SHARE
+    rows = [
+        [*(centroid(face.triangles) - corner), *(scale * face.normal), np.sqrt(face.area), 0.0,
+         scale * face.reflectance_visible, scale * face.reflectance_solar, scale * face.emissivity]
+        for face in space.faces
+    ]  # fmt: skip
+    rows += [
+        [*(window.centre - corner), *(scale * window.normal), np.sqrt(window.area), 10.0,
+         np.sqrt(window.opening_area), window.u_value or 0.0, window.g_value or 0.0]
+        for window in space.windows
+    ]  # fmt: skip
+    return np.array(rows).reshape(-1, 11)
+
+
+def _same(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    """Whether each row has its own counterpart within the tolerance in every entry."""
+    if a.shape != b.shape:
+        return False
+    distance, nearest = cKDTree(b).query(a, p=np.inf)
+    return bool(distance.max(initial=0.0) <= ALIKE and len(set(nearest.tolist())) == len(a))
+
+
+def _same_constructions(a: Space, b: Space) -> bool:
+    def areas(space: Space) -> dict:
+        table: dict = {}
+        for face in space.faces:
+            key = face.kind, face.adjacency, face.construction.layers
+            table[key] = table.get(key, 0.0) + face.area
+        return table
+
+    mine, theirs = areas(a), areas(b)
+    return mine.keys() == theirs.keys() and all(
+        abs(mine[key] - theirs[key]) <= ALIKE * max(1.0, mine[key]) for key in mine
+    )

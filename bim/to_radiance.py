@@ -1,0 +1,149 @@
+"""A room as Radiance files that `oconv`, `rfluxmtx` and `rtrace` take as they are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Building, Element, Face, Space
+from bim.sensors import sensor_grid, view_point
+from bim.to_tracer import window_groups
+
+SKY = """# receivers of daylight: the ground, then the sky in Reinhart's patches
+#@rfluxmtx h=u u=Y
+void glow ground_glow
+0
+0
+4 1 1 1 0
+ground_glow source ground
+0
+0
+4 0 0 -1 180
+
+#@rfluxmtx h=r{division} u=Y
+void glow sky_glow
+0
+0
+4 1 1 1 0
+sky_glow source sky
+0
+0
+4 0 0 1 180
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class RadianceFiles:
+    """What `write_radiance` wrote."""
+
+    materials: Path  # of both scenes
+    room: Path  # opaque boundary of the room
+    outdoors: Path  # what stands outdoors
+    windows: dict[str, Path]  # group name -> glass with its rfluxmtx comment, normals into the room
+    sky: Path  # ground and sky as rfluxmtx receivers
+    sensors: Path  # x y z dx dy dz on each line
+    view: Path  # fisheye view file
+
+
+def write_radiance(
+    space: Space,
+    building: Building,
+    folder: str | Path,
+    *,
+    band: str = "visible",
+    sky_division: int = 1,
+    spacing: float = 0.5,
+    height: float = 0.8,
+    margin: float = 0.5,
+) -> RadianceFiles:
+    """Write the room, what stands outdoors, its window groups, sensors and a view into a folder.
+
+    The view matrix of a group is
+    `rfluxmtx -I+ -faa - windows_<group>.rad -i room.oct < sensors.pts`, its daylight matrix
+    `rfluxmtx windows_<group>.rad sky.rad -i outdoors.oct`, with room.oct made of materials and room
+    and outdoors.oct of materials and outdoors.
+
+    Args:
+        band: reflectances of "visible" or "solar".
+        sky_division: Reinhart division MF of sky.rad, 1 for Tregenza's 145 patches.
+        spacing, height, margin: of the sensor grid [m], see `sensor_grid`.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    own = {window.guid for window in space.windows}
+    outdoors = [element for element in building.elements if element.guid not in own]
+    values = {part.reflectance(band) for part in [*space.faces, *outdoors]}
+    materials = _write(folder / "materials.rad", (_plastic(value) for value in sorted(values)))
+    room = _write(folder / "room.rad", _parts(space.faces, band, inwards=True))
+    scene = _write(folder / "outdoors.rad", _parts(outdoors, band, inwards=False))
+    windows = {
+        group.name: _write(
+            folder / f"windows_{identifier(group.name)}.rad",
+            _window_group(identifier(group.name), [w.triangles for w in group.windows]),
+        )
+        for group in window_groups(space)
+    }
+    sky = _write(folder / "sky.rad", [SKY.format(division=sky_division)])
+    points, directions = sensor_grid(space, spacing, height, margin)
+    rows = np.concatenate([points, directions], axis=1)
+    sensors = _write(folder / "sensors.pts", (_numbers(row) + "\n" for row in rows))
+    position, direction = view_point(space)
+    fisheye = (
+        f"rvu -vta -vp {_numbers(position)} -vd {_numbers(direction)} -vu 0 0 1 -vh 180 -vv 180"
+    )
+    view = _write(folder / "view.vf", [fisheye + "\n"])
+    return RadianceFiles(materials, room, scene, windows, sky, sensors, view)
+
+
+def identifier(name: str) -> str:
+    """A name that Radiance takes: no blanks, no quotes, ASCII."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name) or "part"
+
+
+def _write(path: Path, parts: Iterable[str]) -> Path:
+    path.write_text("".join(parts), encoding="ascii")
+    return path
+
+
+def _material(value: float) -> str:
+    return f"diffuse_{value:.6f}"
+
+
+def _plastic(value: float) -> str:
+    """A grey diffuse material."""
+    return f"void plastic {_material(value)}\n0\n0\n5 {value:.6f} {value:.6f} {value:.6f} 0 0\n\n"
+
+
+def _parts(parts: Iterable[Face | Element], band: str, *, inwards: bool) -> Iterable[str]:
+    """Polygons of faces or elements; faces are turned to look into the room."""
+    for number, part in enumerate(parts):
+        triangles = part.triangles[:, ::-1] if inwards else part.triangles
+        material = _material(part.reflectance(band))
+        name = f"{identifier(part.name)}.{number}"
+        for index, triangle in enumerate(triangles):
+            yield _polygon(material, f"{name}.{index}", triangle)
+
+
+def _window_group(name: str, windows: list[NDArray[np.float64]]) -> Iterable[str]:
+    """The group's glass as one rfluxmtx surface: Klems full basis, up is up, normals inwards."""
+    normal = np.cross(windows[0][0, 1] - windows[0][0, 0], windows[0][0, 2] - windows[0][0, 0])
+    level = abs(normal[2]) > 0.99996 * np.linalg.norm(normal)  # as mitsuba_cfs.directions
+    yield f"#@rfluxmtx h=kf u={'Y' if level else 'Z'}\n"
+    yield f"void glow glass_{name}\n0\n0\n4 1 1 1 0\n\n"
+    for number, triangles in enumerate(windows):
+        for index, triangle in enumerate(triangles[:, ::-1]):
+            yield _polygon(f"glass_{name}", f"window_{name}.{number}.{index}", triangle)
+
+
+def _polygon(material: str, name: str, triangle: NDArray[np.float64]) -> str:
+    corners = "\n".join(_numbers(corner) for corner in triangle)
+    return f"{material} polygon {name}\n0\n0\n9\n{corners}\n\n"
+
+
+def _numbers(values: NDArray[np.float64]) -> str:
+    return " ".join(f"{value:.6f}" for value in values)

@@ -1,0 +1,80 @@
+"""Rooms as what the tracer of `mitsuba_cfs` reads: opaque triangles and window groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from bim.model import Building, Element, Face, Space, Window
+from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import Window as Aperture
+
+SAME_ORIENTATION = 5e-4  # difference between frame axes [1] within a group: 0.03 degrees
+COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
+
+
+def interior_surfaces(space: Space, band: str = "visible") -> Surfaces:
+    """The opaque boundary of a room: walls, reveals, frames; surface i is `space.faces[i]`."""
+    return _surfaces(space.faces, band)
+
+
+def exterior_surfaces(building: Building, space: Space, band: str = "visible") -> Surfaces:
+    """What stands outdoors before a room's windows: every element but those windows themselves."""
+    own = {window.guid for window in space.windows}
+    return _surfaces((e for e in building.elements if e.guid not in own), band)
+
+
+def _surfaces(parts: Iterable[Face | Element], band: str) -> Surfaces:
+    parts = list(parts)
+    if not parts:
+        return Surfaces(np.empty((0, 3, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+    counts = [len(part.triangles) for part in parts]
+    return Surfaces(
+        np.concatenate([part.triangles for part in parts]),
+        np.repeat([part.reflectance(band) for part in parts], counts),
+        np.repeat(np.arange(len(parts)), counts),
+        tuple(part.name for part in parts),
+    )
+
+
+def window_groups(space: Space) -> list[WindowGroup]:
+    """The room's windows in groups of one orientation, the biggest group first.
+
+    The order of windows inside the groups is that of `space.windows`.
+    """
+    groups: list[list[Window]] = []
+    for window in space.windows:
+        frame = window_frame(window.normal)
+        for group in groups:
+            difference = np.abs(window_frame(group[0].normal) - frame).max()
+            if difference < SAME_ORIENTATION:
+                group.append(window)
+                break
+        else:
+            groups.append([window])
+    groups.sort(key=lambda group: -round(sum(window.area for window in group), 6))
+    names = _unique([orientation_name(group[0]) for group in groups])
+    return [
+        WindowGroup(name, tuple(Aperture(w.name, w.triangles) for w in group))
+        for name, group in zip(names, groups, strict=True)
+    ]
+
+
+def orientation_name(window: Window) -> str:
+    """Compass point that the window faces, or "roof" within 30 degrees of straight up."""
+    if window.normal[2] > 0.866:
+        return "roof"
+    azimuth = np.degrees(np.arctan2(window.normal[0], window.normal[1]))
+    return COMPASS[int(np.round(azimuth / 45)) % 8]
+
+
+def _unique(names: list[str]) -> list[str]:
+    """Names with a number behind those that come again."""
+    seen: dict[str, int] = {}
+    result = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        result.append(name if seen[name] == 1 else f"{name} {seen[name]}")
+    return result

@@ -1,0 +1,253 @@
+"""A virtual goniophotometer: Klems and tensor tree BSDFs of a periodic layer, by Dr.Jit.
+
+Light enters evenly over the layer and over each incident patch (in cos(theta) d_omega), is
+followed from sheet to sheet, and is counted in the patch that it leaves through:
+
+    f[o, i] = E[weight that leaves in o] / omega_o
+
+Every path carries all spectral channels.  Paths are divided into batches with random shifts of
+one low-discrepancy sequence; their spread gives the standard error of every value.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.periodic import PeriodicLayer
+from mitsuba_cfs.bsdf.tensor_merge import culled_tree, reciprocal_means
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+from mitsuba_cfs.bsdf.traced_layer import TracedLayer, follow
+from mitsuba_cfs.progress import Progress, silent
+
+BATCHES = 16
+LANES = 1 << 21
+FIXED_POINT = 2.0**32
+
+
+@dataclass(frozen=True)
+class GeneratedBsdf:
+    """Klems BSDFs of each spectral channel and the standard errors of their values."""
+
+    bsdf: tuple[KlemsBsdf, ...]  # [C]
+    error: tuple[KlemsBsdf, ...]  # [C] one standard error of each value [1/sr]
+
+
+def generate_klems(
+    layer: PeriodicLayer,
+    basis: KlemsBasis = KLEMS_FULL,
+    *,
+    samples: int = 16_384,
+    reciprocal: bool = True,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> GeneratedBsdf:
+    """The four blocks of a layer's BSDF.
+
+    Args:
+        samples: paths for each incident patch and side; rounded up to whole batches.
+        reciprocal: take the mean of f(i -> o) and f(o -> i), which all materials here obey.
+        seed: of the random shifts; the result does not depend on how the work is divided.
+    """
+    variants.activate()
+    from mitsuba_cfs.bsdf.traced_klems import TracedBasis
+
+    patches = TracedBasis(basis)
+    sums, per_row = trace_bins(
+        TracedLayer(layer), patches, basis.size, patches, basis.size,
+        rows=BATCHES, samples=samples, seed=seed, progress=progress,
+    )  # fmt: skip
+    means = [total / per_row / basis.projected_solid_angles() for total in sums]
+    if reciprocal:
+        means = [_reciprocal(mean, basis) for mean in means]
+    spread = [mean.std(axis=0, ddof=1) / np.sqrt(BATCHES) for mean in means]
+    return GeneratedBsdf(
+        tuple(_klems(basis, m.mean(axis=0)) for m in means), tuple(_klems(basis, s) for s in spread)
+    )
+
+
+def generate_tensor_tree(
+    layer: PeriodicLayer,
+    levels: int = 5,
+    *,
+    rank: int = 4,
+    samples: int = 4096,
+    cull: float = 0.9,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> tuple[tuple[TensorTreeBsdf, ...], float]:
+    """Tensor trees [C] of a layer, and the relative error bound of their merging.
+
+    Args:
+        levels: 4^levels cells a hemisphere (6: 4096), as genBSDF's `-t4` and `-t3`.
+        rank: 4, or 3 for the mean over all azimuths of what is alike turned about the normal.
+        samples: paths for each incident cell and side.
+        cull: share of the cells that are merged away; see `culled_tree`.
+    """
+    variants.activate()
+    from mitsuba_cfs.bsdf.traced_squares import TracedRings, TracedSquares
+
+    if rank not in (3, 4):
+        raise ValueError(f"rank: expected 3 or 4, got {rank}")
+    squares, width = TracedSquares(levels), 1 << levels
+    incident = squares if rank == 4 else TracedRings(levels)
+    cells = width**2 if rank == 4 else width // 2
+    sums, per_row = trace_bins(
+        TracedLayer(layer), incident, cells, squares, width**2,
+        rows=1, samples=samples, seed=seed, turned=rank == 3, single=True, progress=progress,
+    )  # fmt: skip
+    noise = width**2 / np.pi / per_row / (2 if rank == 4 else 1)
+    systems, bounds = [], []
+    for total in sums:
+        values = total[0] * np.float32(width**2 / np.pi / per_row)
+        found = {
+            name: culled_tree(grid, cull, noise=noise)
+            for name, grid in _dense_grids(values, rank, width).items()
+        }
+        systems.append(TensorTreeBsdf(**{name: tree for name, (tree, _) in found.items()}))
+        bounds += [bound for _, bound in found.values()]
+    return tuple(systems), max(bounds)
+
+
+def _dense_grids(values: NDArray, rank: int, width: int) -> dict[str, NDArray]:
+    """Dense grids of the four blocks from values [side in, cell in, side out, cell out]."""
+    if rank == 3:
+        grids = {key: _isotropic(values, *key) for key in ((0, 1), (1, 0), (0, 0), (1, 1))}
+    else:
+        cut = values.reshape(2, width, width, 2, width, width)
+        grids = {}
+        grids[0, 1], grids[1, 0] = reciprocal_means(cut[0, :, :, 1], cut[1, :, :, 0])
+        for side in (0, 1):
+            grids[side, side], _ = reciprocal_means(cut[side, :, :, side], cut[side, :, :, side])
+    names = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
+    return dict(zip(names, (grids[k] for k in ((0, 1), (1, 0), (0, 0), (1, 1))), strict=True))
+
+
+def _isotropic(values: NDArray, side: int, out: int) -> NDArray:
+    """Dense rank 3 grid [2^n, 2^n, 2^n]: normal incidence at 0.5, zero in the unused half."""
+    width = 2 * values.shape[1]
+    grid = np.zeros((width,) * 3, dtype=values.dtype)
+    grid[: width // 2] = values[side, :, out].reshape(-1, width, width)
+    return grid
+
+
+def trace_bins(
+    layer: TracedLayer,
+    incident,
+    size_in: int,
+    outgoing,
+    size_out: int,
+    *,
+    rows: int,
+    samples: int,
+    seed: int,
+    turned: bool = False,
+    single: bool = False,
+    progress: Progress = silent,
+) -> tuple[list[NDArray[np.floating]], int]:
+    """Weights [C] of [rows, side in, bin in, side out, bin out] summed over paths, paths per bin.
+
+    Args:
+        incident, outgoing: the bins of directions, `TracedBasis` or like it.
+        rows: independent repetitions.
+        turned: whether outgoing directions are turned back by the azimuth of the incident one.
+        single: sum in float32, exact enough where a bin gets fewer than 1e6 paths.
+    """
+    per_row = -(-samples // rows)
+    shape = (rows, 2, size_in, 2, size_out)
+    kind = mi.Float if single else mi.Float64
+    sums = [dr.zeros(kind, int(np.prod(shape))) for _ in range(layer.channels)]
+    total = rows * 2 * size_in * per_row
+    work = _Work(layer, incident, size_in, outgoing, size_out, per_row, seed, turned)
+    for start in range(0, total, LANES):
+        lanes = min(LANES, total - start)
+        _count(work, sums, start, lanes)
+        dr.eval(sums)
+        progress("goniophotometer", (start + lanes) / total)
+    return [np.array(each).reshape(shape) for each in sums], per_row
+
+
+def _reciprocal(values: NDArray[np.float64], basis: KlemsBasis) -> NDArray[np.float64]:
+    """Values [batch, side in, patch in, side out, patch out] that the light's way back helps.
+
+    The mean of both ways is half as noisy from patch to patch, but not in what a direction
+    scatters in all, which the way there knows best: each is scaled to that.
+    """
+    turn, area = basis.opposite(), basis.projected_solid_angles()
+    back = np.moveaxis(values, (1, 2), (3, 4))[:, :, turn][..., turn]
+    mean = 0.5 * (values + back)
+    own, shared = (v.mean(axis=0, keepdims=True) @ area for v in (values, mean))
+    return mean * np.divide(own, shared, out=np.ones_like(own), where=shared > 0)[..., None]
+
+
+def _klems(basis: KlemsBasis, values: NDArray[np.float64]) -> KlemsBsdf:
+    """Blocks from values [side in, patch in, side out, patch out]; side 0 is the front."""
+    return KlemsBsdf(
+        basis,
+        basis,
+        transmission_front=values[0, :, 1].T.copy(),
+        transmission_back=values[1, :, 0].T.copy(),
+        reflection_front=values[0, :, 0].T.copy(),
+        reflection_back=values[1, :, 1].T.copy(),
+    )
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What the kernel of `trace_bins` needs."""
+
+    layer: TracedLayer
+    incident: object
+    size_in: int
+    outgoing: object
+    size_out: int
+    per_row: int
+    seed: int
+    turned: bool
+
+
+def _count(work: _Work, sums: list, start: int, lanes: int) -> None:
+    """Follow the paths numbered from `start` and add what leaves to its bins."""
+    index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, start)
+    count = dr.opaque(mi.UInt32, work.per_row)
+    row = index // count  # (repetition, side in, bin in)
+    point = index - row * count
+    side, patch = (row // work.size_in) % 2, row % work.size_in
+    u = [_lattice(point, row, axis, work.seed) for axis in range(3)]
+    x, y, z = work.incident.direction(patch, u[0], u[1])
+    front = side == 0
+    towards = mi.Vector3f(x, -y, dr.select(front, z, -z))
+    # both numbers are raised by the lane: what a path draws depends on its own number only
+    first = mi.UInt64(dr.opaque(mi.UInt32, start))
+    random = mi.PCG32(lanes, first + (mi.UInt64(work.seed) << 32), first)
+    start_at = mi.Point2f(random.next_float32(), u[2])
+    leaving, weights = follow(work.layer, start_at, -towards, front, random)
+    out_x, out_y = -leaving.x, leaving.y
+    if work.turned:
+        scale = dr.rsqrt(dr.maximum(x * x + y * y, 1e-20))
+        c, s = x * scale, y * scale
+        out_x, out_y = out_x * c + out_y * s, out_y * c - out_x * s
+    patch_out = work.outgoing.patch(out_x, out_y, leaving.z)
+    side_out = dr.select(leaving.z > 0, mi.UInt32(0), mi.UInt32(1))
+    bin_ = (row * 2 + side_out) * work.size_out + patch_out
+    for total, weight in zip(sums, weights, strict=True):
+        dr.scatter_add(total, type(total)(weight), bin_, weight > 0)
+
+
+def _lattice(point, row, axis: int, seed: int):
+    """Coordinate `axis` of the R3 sequence's `point`, shifted at random for each row."""
+    step = np.uint32(FIXED_POINT / ROOT ** (axis + 1) % FIXED_POINT)
+    shift = mi.sample_tea_32(row, mi.UInt32(4 * seed + axis))[0]
+    return mi.Float((point * mi.UInt32(int(step)) + shift) >> 8) * (1.0 / (1 << 24))
+
+
+# the root of x^4 = x + 1: powers of its inverse spread points evenly in three dimensions: the
+# direction and the height where light enters (Roberts 2018, "The unreasonable effectiveness of
+# quasirandom sequences"); in four, some layers of slats resonate with the sequence
+ROOT = 1.2207440846057596

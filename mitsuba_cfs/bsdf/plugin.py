@@ -1,0 +1,193 @@
+"""The Mitsuba plugin `klems_bsdf`: Klems matrices as a BSDF that samples itself exactly.
+
+    {"type": "klems_bsdf", "filename": "blind.xml", "band": "Visible", "up": [0, 0, 1],
+     "peak": False}
+
+The value is constant on each pair of patches; a patch is drawn in proportion to value x projected
+solid angle and then a point of it evenly in cos(theta) d_omega.  A file may differ between light
+that goes one way and the other: each transport mode has its own tables (see `plugin_base`).
+With `peak`, what the matrices send straight on beyond what surrounds it passes undisturbed.
+
+Importing this module registers the plugin, again for every Mitsuba variant that is set later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.plugin_base import window_bsdf
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from mitsuba_cfs.errors import DataError
+
+PLUGIN = "klems_bsdf"
+
+
+def klems_plugin(
+    klems: KlemsBsdf, *, up: tuple[float, float, float] | None = None, peak: bool = False
+) -> dict:
+    """The `load_dict` entry of a system's BSDF; `up` [3] is the world vector of its up."""
+    import mitsuba as mi
+
+    if klems.basis_in != klems.basis_out:
+        raise ValueError("klems_bsdf needs the same basis for incident and outgoing light")
+    basis = klems.basis_in
+    entry = {
+        "type": PLUGIN,
+        "peak": peak,
+        "theta_bounds": mi.TensorXf(np.array(basis.theta_bounds, dtype=np.float32)),
+        "phi_counts": mi.TensorXf(np.array(basis.phi_counts, dtype=np.float32)),
+    }
+    for name, block in klems.filled().blocks().items():
+        entry[name] = mi.TensorXf(np.ascontiguousarray(block, dtype=np.float32))
+    if up is not None:
+        entry["up"] = list(map(float, up))
+    return entry
+
+
+def scattering_tables(klems: KlemsBsdf) -> NDArray[np.float64]:
+    """BSDF by [side of the light, incident patch, same or other side, outgoing patch] [1/sr]."""
+    full = klems.filled()
+    front = np.stack([full.reflection_front.T, full.transmission_front.T], axis=1)
+    back = np.stack([full.reflection_back.T, full.transmission_back.T], axis=1)
+    return np.stack([front, back])
+
+
+def reversed_tables(tables: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same by [side the light leaves to, outgoing patch, same or other, incident patch]."""
+    reflection = tables[:, :, 0].transpose(0, 2, 1)
+    transmission = tables[::-1, :, 1].transpose(0, 2, 1)
+    return np.stack([reflection, transmission], axis=2)
+
+
+def cumulative_tables(
+    tables: NDArray[np.float64], solid_angles: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cumulative shares [.., K] of each row (the last 1), and all that it scatters [..]."""
+    cumulative = np.cumsum(tables * solid_angles, axis=-1)
+    amount = cumulative[..., -1].copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(amount[..., None] > 0, cumulative / amount[..., None], 1.0)
+    return share, amount
+
+
+def without_peak(klems: KlemsBsdf) -> tuple[KlemsBsdf, NDArray[np.float64]]:
+    """The system without its through beams, and their transmittances [front and back, K]."""
+    full = klems.filled()
+    peaks = [
+        through_peak(block, klems.basis_in)
+        for block in (full.transmission_front, full.transmission_back)
+    ]
+    rest = replace(
+        full, transmission_front=peaks[0].scattered, transmission_back=peaks[1].scattered
+    )
+    return rest, np.stack([peak.transmittance for peak in peaks])
+
+
+def _read(props) -> KlemsBsdf:
+    """The matrices that the plugin's properties name (a file) or hold (tensors)."""
+    if "filename" in props:
+        path, band = props["filename"], props.get("band", "Visible")
+        file = read_bsdf_xml(path)
+        bsdf = file.bands.get(band)
+        if not isinstance(bsdf, KlemsBsdf):
+            held = "tensor trees" if bsdf else ", ".join(file.bands)
+            raise DataError(
+                f"expected Klems matrices, the file holds {held}", file=path, element=band
+            )
+        return bsdf
+    bounds, counts = (np.array(props[name]).ravel() for name in ("theta_bounds", "phi_counts"))
+    bounds = tuple(np.clip(np.float64(bounds), 0, np.pi / 2).tolist())
+    basis = KlemsBasis("plugin", bounds, tuple(int(count) for count in counts))
+    names = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
+    blocks = {name: np.array(props[name], dtype=np.float64) for name in names if name in props}
+    return KlemsBsdf(basis, basis, **blocks)
+
+
+def _register(variant: str) -> None:
+    """Define the plugin on the types of `variant` and make Mitsuba know it."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from mitsuba_cfs.bsdf.traced_klems import TracedBasis, gather, table
+
+    class KlemsBsdfPlugin(window_bsdf()):
+        def __init__(self, props):
+            super().__init__(props)
+            klems = _read(props)
+            if klems.basis_in != klems.basis_out:
+                raise ValueError("klems_bsdf needs the same basis for incident and outgoing light")
+            self.size, self.basis = klems.basis_in.size, TracedBasis(klems.basis_in)
+            if self.peak:
+                klems, straight = without_peak(klems)
+                self.straight = table(straight)  # [side that the light comes from, K]
+            tables = scattering_tables(klems)
+            both = (reversed_tables(tables), tables)  # known: where the light goes, or comes from
+            areas = klems.basis_in.projected_solid_angles()
+            parts = [cumulative_tables(each, areas) for each in both]
+            self.matrix = table(np.stack(both))  # [mode, side, K, same or other side, K]
+            self.cumulative = table(np.stack([share for share, _ in parts]))
+            self.amounts = table(np.stack([amount for _, amount in parts]))
+
+        def row(self, ctx, known):
+            """Number of the table's row (mode, side, patch) for the direction that is known."""
+            incident = ctx.mode == mi.TransportMode.Importance
+            side = dr.select(known.z > 0, mi.UInt32(0), mi.UInt32(1))
+            row = side * self.size + self.patch(known, incident)
+            return row + 2 * self.size if incident else row
+
+        def patch(self, v, incident: bool):
+            """Patch of a direction; azimuths as in `mitsuba_cfs.directions`."""
+            return self.basis.patch(v.x if incident else -v.x, -v.y if incident else v.y, v.z)
+
+        def values(self, ctx, known, other, active):
+            through = known.z * other.z < 0
+            column = self.patch(other, ctx.mode != mi.TransportMode.Importance)
+            row = 2 * self.row(ctx, known) + dr.select(through, mi.UInt32(1), mi.UInt32(0))
+            value = gather(self.matrix, row * self.size + column, active)
+            return value, value
+
+        def totals(self, ctx, known, active):
+            row = 2 * self.row(ctx, known)
+            return gather(self.amounts, row, active), gather(self.amounts, row + 1, active)
+
+        def through(self, ctx, known, active):
+            """The beam keeps its patch, on whichever side it is looked at."""
+            incident = ctx.mode == mi.TransportMode.Importance
+            from_front = (known.z > 0) if incident else (known.z < 0)
+            side = dr.select(from_front, mi.UInt32(0), mi.UInt32(1))
+            return gather(self.straight, side * self.size + self.patch(known, incident), active)
+
+        def draw(self, ctx, known, through, u, point, active):
+            row = 2 * self.row(ctx, known) + dr.select(through, mi.UInt32(1), mi.UInt32(0))
+            patch = self.search(row * self.size, u)
+            incident = ctx.mode != mi.TransportMode.Importance  # so is the drawn direction
+            x, y, z = self.basis.direction(patch, point.x, point.y)
+            z = dr.select((known.z > 0) ^ through, z, -z)
+            other = mi.Vector3f(x, -y, z) if incident else mi.Vector3f(-x, y, z)
+            value = gather(self.matrix, row * self.size + patch, active)
+            return other, value, value
+
+        def search(self, offset, target):
+            """First entry of a row whose cumulative share exceeds `target`."""
+            low, high = mi.UInt32(0), mi.UInt32(self.size - 1)
+            for _ in range(int(np.ceil(np.log2(self.size))) + 1):
+                middle = (low + high) // 2
+                above = gather(self.cumulative, offset + middle) > target
+                searching = low < high
+                high = dr.select(searching & above, middle, high)
+                low = dr.select(searching, dr.select(above, low, middle + 1), low)
+            return low
+
+        def to_string(self):
+            return f"KlemsBsdf[{self.size} patches]"
+
+    mi.register_bsdf(PLUGIN, KlemsBsdfPlugin)
+
+
+variants.register(_register)

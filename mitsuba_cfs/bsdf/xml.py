@@ -1,0 +1,307 @@
+"""Reading (and, from `xml_write`, writing) BSDF XML files of LBNL WINDOW, genBSDF and the like.
+
+Front of a file is the exterior.  A wavelength's blocks may be spread over several
+`WavelengthData` elements; the last of one direction counts, as in Radiance.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
+from mitsuba_cfs.bsdf.klems import STANDARD_BASES, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
+from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.errors import DataError
+
+__all__ = ["BsdfFile", "check_energy", "read_bsdf_xml", "write_bsdf_xml"]
+
+ENERGY_LIMIT = 1.01  # hemispherical scattering above which Radiance's loader objects
+UNIT_METRES = {"meter": 1.0, "foot": 0.3048, "inch": 0.0254, "centimeter": 0.01, "millimeter": 1e-3}
+BAND_NAMES = {name.lower(): name for name in ("Visible", "Solar", "CIE-X", "CIE-Y", "CIE-Z")}
+BLOCK_NAMES = {
+    "transmission front": "transmission_front",
+    "transmission back": "transmission_back",
+    "reflection front": "reflection_front",
+    "reflection back": "reflection_back",
+}
+
+
+def read_bsdf_xml(path: str | PathLike[str], *, energy_limit: float = ENERGY_LIMIT) -> BsdfFile:
+    """The content of a BSDF XML file: Klems matrices or tensor trees, every band.
+
+    Negative values are read as zero (as Radiance does) and noted.  `DataError` for a file that is
+    not readable, not complete, not finite, or that scatters more than `energy_limit` of the light
+    of any direction.
+    """
+    notes: list[str] = []
+    layer = _optical_layer(path, notes)
+    structure = _text(_need(layer, "DataDefinition/IncidentDataStructure", path))
+    if structure.lower() in ("columns", "rows"):
+        bases = _angle_bases(layer, path)
+        bands = _read_blocks(layer, path, notes, _KlemsReader(bases, structure.lower() == "rows"))
+    elif structure.lower() in ("tensortree3", "tensortree4"):
+        bands = _read_blocks(layer, path, notes, _TreeReader(int(structure[-1])))
+    else:
+        raise DataError(
+            f"expected Columns, Rows, TensorTree3 or TensorTree4, got {structure!r}",
+            file=path,
+            element="DataDefinition",
+            field="IncidentDataStructure",
+        )
+    for band, bsdf in bands.items():
+        if band in ("Visible", "Solar"):
+            check_energy(bsdf, energy_limit, file=path, band=band)
+    return BsdfFile(bands, **_material(layer, path), notes=tuple(notes))
+
+
+def check_energy(bsdf: Bsdf, limit: float, *, file: str | PathLike[str], band: str) -> None:
+    """`DataError` where a block, or transmission and reflection together, exceed `limit`."""
+    for side in ("front", "back"):
+        blocks = {n: b for n, b in bsdf.blocks().items() if n.endswith(side)}
+        hemispherical = {n: bsdf.direct_hemispherical(b) for n, b in blocks.items()}
+        if len(hemispherical) == 2:
+            hemispherical[f"transmission and reflection {side}"] = bsdf.scattered(side)
+        for name, share in hemispherical.items():
+            if share.max() > limit:
+                where = int(np.argmax(share))
+                raise DataError(
+                    f"incident direction {where} scatters {100 * share.max():.1f} % of its light",
+                    file=file,
+                    element=band,
+                    field=name.replace("_", " "),
+                )
+
+
+def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.Element:
+    """The file's one Optical/Layer element, without namespaces."""
+    try:
+        content = Path(path).read_bytes()
+        start = max(content.find(b"<"), 0)
+        if content[:start].strip(b" \t\r\n\xef\xbb\xbf"):  # genBSDF may leave a line of its own
+            notes.append(f"{start} bytes before the XML left out")
+        root = ElementTree.fromstring(content[start:])
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise DataError(f"is not well-formed XML: {error}", file=path) from None
+    for element in root.iter():
+        if isinstance(element.tag, str):
+            element.tag = element.tag.rpartition("}")[2]
+    if root.tag != "WindowElement":
+        raise DataError(f"expected WindowElement as root, got {root.tag}", file=path)
+    layers = root.findall("Optical/Layer")
+    if len(layers) != 1:
+        raise DataError(f"expected one Optical/Layer, got {len(layers)}", file=path)
+    return layers[0]
+
+
+def _angle_bases(layer: ElementTree.Element, path: str | PathLike[str]) -> dict[str, KlemsBasis]:
+    """The standard bases and those that the file defines, by lower-case name."""
+    bases = {basis.name.lower(): basis for basis in STANDARD_BASES}
+    for element in layer.findall("DataDefinition/AngleBasis"):
+        name = _text(_need(element, "AngleBasisName", path))
+        bounds, counts = [0.0], []
+        for block in element.findall("AngleBasisBlock"):
+            lower = _number(_need(block, "ThetaBounds/LowerTheta", path), path)
+            if abs(lower - bounds[-1]) > 1e-3:
+                raise DataError(
+                    "theta bounds disagree", file=path, element=name, field="LowerTheta"
+                )
+            bounds.append(_number(_need(block, "ThetaBounds/UpperTheta", path), path))
+            counts.append(int(_number(_need(block, "nPhis", path), path)))
+        try:
+            basis = KlemsBasis(name, tuple(np.radians(bounds).tolist()), tuple(counts))
+        except ValueError as error:
+            raise DataError(str(error), file=path, element="AngleBasis", field=name) from None
+        known = bases.get(name.lower())
+        same = known is not None and known.phi_counts == basis.phi_counts
+        if not (same and np.allclose(known.theta_bounds, basis.theta_bounds, atol=1e-5)):
+            bases[name.lower()] = basis
+    return bases
+
+
+@dataclass(frozen=True)
+class _KlemsReader:
+    """Reads matrix blocks, and puts a band's blocks together."""
+
+    bases: dict[str, KlemsBasis]
+    rows: bool
+
+    def block(self, element: ElementTree.Element, where: str, path: str | PathLike[str]):
+        basis_in = self._basis(element, "ColumnAngleBasis", where, path)
+        basis_out = self._basis(element, "RowAngleBasis", where, path)
+        text = _text(_need(element, "ScatteringData", path))
+        values = parse_numbers(text, file=path, element=where)
+        expected = basis_in.size * basis_out.size
+        if len(values) != expected:
+            raise DataError(
+                f"expected {basis_out.size} x {basis_in.size} = {expected} values "
+                f"({basis_in.name}), got {len(values)}",
+                file=path,
+                element=where,
+                field="ScatteringData",
+            )
+        if self.rows:
+            return basis_in, basis_out, values.reshape(basis_in.size, basis_out.size).T.copy()
+        return basis_in, basis_out, values.reshape(basis_out.size, basis_in.size)
+
+    def band(self, blocks: dict, where: str, path: str | PathLike[str]) -> KlemsBsdf:
+        bases = {(basis_in, basis_out) for basis_in, basis_out, _ in blocks.values()}
+        if len(bases) != 1:
+            raise DataError("the blocks are on different angle bases", file=path, element=where)
+        return KlemsBsdf(*bases.pop(), **{name: block for name, (*_, block) in blocks.items()})
+
+    def _basis(self, element, tag: str, where: str, path: str | PathLike[str]) -> KlemsBasis:
+        name = _text(_need(element, tag, path))
+        if name.lower() not in self.bases:
+            raise DataError(f"unknown angle basis {name!r}", file=path, element=where, field=tag)
+        return self.bases[name.lower()]
+
+
+@dataclass(frozen=True)
+class _TreeReader:
+    """Reads tensor trees, and puts a band's trees together."""
+
+    rank: int
+
+    def block(self, element: ElementTree.Element, where: str, path: str | PathLike[str]):
+        basis = _text(_need(element, "AngleBasis", path))
+        if basis.lower() != "lbnl/shirley-chiu":
+            raise DataError(
+                f"expected LBNL/Shirley-Chiu, got {basis!r}",
+                file=path,
+                element=where,
+                field="AngleBasis",
+            )
+        text = _text(_need(element, "ScatteringData", path))
+        try:
+            return TensorTree.from_text(text, self.rank)
+        except ValueError as error:
+            raise DataError(str(error), file=path, element=where, field="ScatteringData") from None
+
+    def band(self, blocks: dict, where: str, path: str | PathLike[str]) -> TensorTreeBsdf:
+        return TensorTreeBsdf(**blocks)
+
+
+def _read_blocks(layer, path, notes: list[str], reader) -> dict[str, Bsdf]:
+    """Every band's BSDF; what a block holds is the `reader`'s business."""
+    blocks: dict[str, dict] = {}
+    for data in layer.findall("WavelengthData"):
+        band = _text(_need(data, "Wavelength", path))
+        band = BAND_NAMES.get(band.lower(), band)
+        for element in data.findall("WavelengthDataBlock"):
+            direction = _text(_need(element, "WavelengthDataDirection", path))
+            where = f"{band} {direction}"
+            name = BLOCK_NAMES.get(direction.lower())
+            if name is None:
+                notes.append(f"{where}: not a known direction, left out")
+                continue
+            if name in blocks.get(band, {}):
+                notes.append(f"{where}: given twice, the last counts")
+            block = reader.block(element, where, path)
+            blocks.setdefault(band, {})[name] = _without_negatives(block, where, notes)
+    if not blocks:
+        raise DataError("no scattering data", file=path, element="WavelengthData")
+    return {band: reader.band(found, band, path) for band, found in blocks.items()}
+
+
+def _without_negatives(block, where: str, notes: list[str]):
+    """The block with its negative values set to zero, and a note where there were any."""
+    values = block.values if isinstance(block, TensorTree) else block[-1]
+    negative = values < 0
+    if negative.any():
+        notes.append(
+            f"{where}: {np.count_nonzero(negative)} negative values "
+            f"(lowest {values.min():.3g}) read as zero"
+        )
+        values[negative] = 0.0
+    return block
+
+
+def parse_numbers(
+    text: str, *, file: str | PathLike[str], element: str, field: str = "ScatteringData"
+) -> NDArray[np.float64]:
+    """The finite numbers [N] of a text that separates them by commas or white space."""
+    words = text.replace(",", " ").split()
+    try:
+        values = np.array(words, dtype=np.float64)
+    except ValueError:
+        bad = next(word for word in words if not _is_number(word))
+        raise DataError(
+            f"not a number: {bad[:40]!r}", file=file, element=element, field=field
+        ) from None
+    if not np.isfinite(values).all():
+        where = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise DataError(
+            f"value {where} is not finite: {words[where]}", file=file, element=element, field=field
+        )
+    return values
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
+    """The fields of `BsdfFile` that stand in the Material element."""
+    material = layer.find("Material")
+    if material is None:
+        return {}
+    found = {
+        "name": _text(material.find("Name")),
+        "manufacturer": _text(material.find("Manufacturer")),
+        "device_type": _text(material.find("DeviceType")) or "Other",
+    }
+    for tag in ("Thickness", "Width", "Height"):
+        element = material.find(tag)
+        if _text(element):
+            unit = element.get("unit", "Meter")
+            if unit.lower() not in UNIT_METRES:
+                raise DataError(f"unknown unit {unit!r}", file=path, element="Material", field=tag)
+            found[tag.lower()] = _number(element, path) * UNIT_METRES[unit.lower()]
+    for tag, name in (
+        ("EmissivityFront", "emissivity_front"),
+        ("EmissivityBack", "emissivity_back"),
+        ("TIR", "infrared_transmittance"),
+        ("ThermalConductivity", "conductivity"),
+    ):
+        if _text(material.find(tag)):
+            found[name] = _number(material.find(tag), path)
+    return found
+
+
+def _need(
+    element: ElementTree.Element, tags: str, path: str | PathLike[str]
+) -> ElementTree.Element:
+    found = element.find(tags)
+    if found is None:
+        raise DataError("is missing", file=path, element=element.tag, field=tags)
+    return found
+
+
+def _text(element: ElementTree.Element | None) -> str:
+    return "" if element is None else (element.text or "").strip()
+
+
+def _number(element: ElementTree.Element, path: str | PathLike[str]) -> float:
+    try:
+        value = float(_text(element))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise DataError(
+            f"expected a number, got {_text(element)[:40]!r}", file=path, field=element.tag
+        )
+    return value

@@ -1,0 +1,29 @@
+"""The errors a user can cause: all derive from `CfsError` and carry one clear line."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+
+class CfsError(Exception):
+    """Root of every error that the command line prints as one line, without a traceback."""
+
+
+class DataError(CfsError, ValueError):
+    """A file or table that cannot be used: names the file, the element and the field."""
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: str | PathLike[str] | None = None,
+        element: str | None = None,
+        field: str | None = None,
+    ) -> None:
+        self.message, self.file, self.element, self.field = message, file, element, field
+        where = [str(part) for part in (file, element, field) if part is not None]
+        super().__init__(": ".join([*where, message]))
+
+
+class VariantError(CfsError, RuntimeError):
+    """No usable Mitsuba variant or LLVM library: says what to install."""

@@ -1,0 +1,1 @@
+"""Discomfort glare of luminance pictures: sources, position index, indices."""

@@ -1,0 +1,207 @@
+"""Glare of one view in every hour of a year, from matrices: pictures are made, rated and dropped.
+
+A picture is a matrix of pixels times the luminance of the windows' patches in that hour.  Hours are
+taken in batches, so that each batch is one product of matrices; only the ratings are kept.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
+from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.progress import Progress, silent
+
+BATCH_BYTES = 128 * 2**20  # of the pictures of a batch of hours
+ROW_BYTES = 16 * 2**20  # of a matrix that lies on disk, read at a time
+FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance")
+
+
+@dataclass(frozen=True, slots=True)
+class PictureMatrix:
+    """What a view's surfaces reflect per unit luminance of each window patch.
+
+    Pixels beside one another that show the same face share a row: reflected light varies slowly.
+    """
+
+    rows: NDArray[np.float32]  # [m, N] in memory or on disk (numpy.memmap); N = groups x patches
+    row: NDArray[np.int64]  # [n] row of each pixel
+    share: NDArray[np.float32]  # [n] of the pixel that shows surfaces, the rest shows windows
+
+    def __post_init__(self) -> None:
+        if self.rows.ndim != 2 or self.row.shape != self.share.shape or self.row.ndim != 1:
+            raise ValueError(
+                f"rows {self.rows.shape}, row {self.row.shape}, share {self.share.shape}: "
+                "expected [m, N], [n], [n]"
+            )
+
+    def add_to(self, values: NDArray[np.float32], luminance: NDArray[np.float32]) -> None:
+        """Add the pixels' luminance to values [h, n] under patch luminances [N, h]."""
+        across = np.ascontiguousarray(luminance.T, dtype=np.float32)
+        of_rows = np.empty((len(values), len(self.rows)), dtype=np.float32)
+        step = len(self.rows)
+        if isinstance(self.rows, np.memmap):
+            step = max(1, ROW_BYTES // (4 * self.rows.shape[1]))
+        for start in range(0, len(self.rows), step):
+            rows = np.asarray(self.rows[start : start + step])
+            np.matmul(across, rows.T, out=of_rows[:, start : start + step])
+        for hour, found in zip(values, of_rows, strict=True):
+            hour += found[self.row] * self.share
+
+
+@dataclass(frozen=True, slots=True)
+class AnnualGlare:
+    """Glare of one view in the hours that were rated; every array is [H]."""
+
+    dgp: NDArray[np.float64]
+    Ev: NDArray[np.float64]  # illuminance at the eye, of the picture [lx]
+    dgi: NDArray[np.float64]
+    ugr: NDArray[np.float64]
+    cgi: NDArray[np.float64]
+    vcp: NDArray[np.float64]  # [%]
+    sources: NDArray[np.float64]  # number of glare sources
+    background_luminance: NDArray[np.float64]  # [cd/m2]
+
+    def worst(self, count: int) -> NDArray[np.int64]:
+        """The hours [count] of the highest DGP, the worst first."""
+        return np.argsort(-self.dgp, kind="stable")[:count]
+
+
+class Pictures(Protocol):
+    """The luminance of a view's pixels in every hour, worked out when asked for."""
+
+    view: View
+    pixels: NDArray[np.int64]  # [n] row * width + column of the pixels that show something
+
+    @property
+    def hours(self) -> int:
+        """H, how many there are."""
+
+    def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Luminance [h, n] [cd/m2] of the pixels in some hours [h]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ThreePhasePictures:
+    """L[pixel, h] = sum over g, k of V[pixel, g, k] (T D s)[g, k, h]; V = reflected + seen."""
+
+    view: View
+    pixels: NDArray[np.int64]  # [n]
+    reflected: PictureMatrix  # of n pixels
+    seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel
+    luminance: NDArray[np.float32]  # [G, K, H] of the windows towards the room, T D s [cd/m2]
+
+    def __post_init__(self) -> None:
+        n, N = len(self.pixels), self.reflected.rows.shape[1]
+        if self.seen.shape != (n, N) or len(self.reflected.row) != n:
+            raise ValueError(f"matrices of {self.seen.shape} for {n} pixels and {N} patches")
+        flat(self.luminance, N)
+
+    @property
+    def hours(self) -> int:
+        """See `Pictures`."""
+        return self.luminance.shape[2]
+
+    def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """See `Pictures`."""
+        luminance = flat(self.luminance, self.seen.shape[1])[:, batch]
+        values = np.ascontiguousarray((self.seen @ luminance).T, dtype=np.float32)
+        self.reflected.add_to(values, luminance)
+        return values
+
+
+def annual_glare(
+    pictures: Pictures,
+    *,
+    geometry: GlareView | None = None,
+    options: GlareOptions | None = None,
+    threads: int | None = None,
+    keep: Path | None = None,
+    progress: Progress = silent,
+) -> AnnualGlare:
+    """Glare of every hour of one view.
+
+    Args:
+        geometry: of the pictures' view, where it is at hand.
+        threads: pictures rated at a time; the processor's cores by default.
+        keep: file of the ratings so far: a killed run goes on where it was.  The caller names it
+            so that other inputs have another file.
+    """
+    geometry = geometry or GlareView(pictures.view)
+    options = options or GlareOptions()
+    table = _begin(keep, pictures.hours)
+    left = np.flatnonzero(np.isnan(table[:, 0]))
+    size = max(1, BATCH_BYTES // (4 * max(1, len(pictures.pixels))))
+
+    def rated(values: NDArray[np.float32]) -> list[float]:
+        picture = full_picture(values, pictures.pixels, pictures.view)
+        return _figures(evaluate(picture, geometry, options=options))
+
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        for start in range(0, len(left), size):
+            batch = left[start : start + size]
+            table[batch] = list(pool.map(rated, pictures.values(batch)))
+            _save(keep, table)
+            progress("glare", (len(table) - len(left) + start + len(batch)) / len(table))
+    return AnnualGlare(*table.T)
+
+
+def full_picture(
+    values: NDArray[np.float32], pixels: NDArray[np.int64], view: View
+) -> NDArray[np.float32]:
+    """A picture [ny, nx] from the luminance [n] of the pixels that show something."""
+    picture = np.zeros(view.height * view.width, dtype=np.float32)
+    picture[pixels] = values
+    return picture.reshape(view.height, view.width)
+
+
+def flat(window_luminance: ArrayLike, columns: int) -> NDArray[np.float32]:
+    """Luminance [G, K, H] as [G * K, H]."""
+    luminance = np.asarray(window_luminance, dtype=np.float32)
+    if luminance.ndim != 3 or luminance.shape[0] * luminance.shape[1] != columns:
+        raise ValueError(
+            f"window luminance {luminance.shape}: expected [G, K, H] with {columns} patches"
+        )
+    return luminance.reshape(columns, -1)
+
+
+def _figures(result: GlareResult) -> list[float]:
+    """One row of the table, in the order of `FIGURES`."""
+    return [float(result.count if f == "sources" else getattr(result, f)) for f in FIGURES]
+
+
+def _begin(keep: Path | None, hours: int) -> NDArray[np.float64]:
+    """The ratings so far [H, figures], NaN where there is none."""
+    empty = np.full((hours, len(FIGURES)), np.nan)
+    if keep is None or not keep.is_file():
+        return empty
+    try:
+        table = np.load(keep, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise DataError(f"cannot be read: {error}", file=keep) from error
+    if table.shape != empty.shape:
+        raise DataError(
+            f"ratings of shape {table.shape}, expected {empty.shape}: of another year", file=keep
+        )
+    return table
+
+
+def _save(keep: Path | None, table: NDArray[np.float64]) -> None:
+    """Write the ratings; the file is the old one or the new one at any time."""
+    if keep is None:
+        return
+    keep.parent.mkdir(parents=True, exist_ok=True)
+    part = keep.with_suffix(".part")
+    with part.open("wb") as file:
+        np.save(file, table)
+    os.replace(part, keep)

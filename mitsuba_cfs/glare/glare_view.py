@@ -1,0 +1,105 @@
+"""A view's geometry as glare needs it: worked out once, used for every picture of that view."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.glare.position_index import position_index
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
+
+
+def in_scan_order(picture: NDArray) -> NDArray:
+    """A picture's array [ny, nx, ...], row 0 at the top, as [nx, ny, ...] with y = 0 the bottom."""
+    return np.ascontiguousarray(np.swapaxes(picture[::-1], 0, 1))
+
+
+def in_picture_order(scan: NDArray) -> NDArray:
+    """The inverse of `in_scan_order`."""
+    return np.swapaxes(scan, 0, 1)[::-1]
+
+
+class GlareView:
+    """Directions, solid angles and position indices of a view's pixels, in scan order [nx, ny].
+
+    Attributes:
+        view: the view.
+        directions: [nx, ny, 3] unit.
+        solid_angle: [nx, ny] [sr].
+        cosine: [nx, ny] of the angle to the line of sight.
+        valid: [nx, ny] pixels that count: with a solid angle and, in an angular fisheye, before
+            the eye.
+    """
+
+    def __init__(self, view: View) -> None:
+        if view.kind == "parallel":
+            raise ValueError("a parallel view has no solid angles: glare needs a fisheye")
+        directions, counts = pixel_directions(view)
+        self.view = view
+        self.directions = in_scan_order(directions)
+        self.solid_angle = in_scan_order(pixel_solid_angles(view))
+        self.cosine = self.directions @ np.asarray(view.direction)
+        self.valid = in_scan_order(counts) & (self.solid_angle > 0)
+
+    @cached_property
+    def weight(self) -> NDArray[np.float64]:
+        """Solid angle [nx, ny] [sr], 0 where the pixel does not count."""
+        return np.where(self.valid, self.solid_angle, 0.0)
+
+    @cached_property
+    def projected(self) -> NDArray[np.float64]:
+        """Projected solid angle [nx, ny] [sr]: E_v is its sum with the luminance."""
+        return self.weight * self.cosine
+
+    @cached_property
+    def total_solid_angle(self) -> float:
+        """Solid angle [sr] of the pixels that count."""
+        return float(self.weight.sum())
+
+    @cached_property
+    def guth(self) -> NDArray[np.float64]:
+        """Position index [nx, ny] (Guth, Iwata)."""
+        return position_index(self.directions, self.view)
+
+    def direction_at(self, x: int, y: int) -> NDArray[np.float64]:
+        """Unit vector [3] of a pixel in scan order."""
+        return self.directions[x, y]
+
+    def angle_between(self, x: int, y: int, other_x: int, other_y: int) -> float:
+        """Angle [rad] between two pixels in scan order."""
+        dot = self.directions[x, y] @ self.directions[other_x, other_y]
+        return float(np.arccos(np.clip(dot, -1.0, 1.0)))
+
+    def pixels_in(self, radius: float) -> float:
+        """Search radius `radius` [rad] in pixels, as evalglare estimates it at the centre."""
+        x, y = self.view.width // 2, self.view.height // 2
+        other_x, other_y = min(x + 10, self.view.width - 1), min(y + 10, self.view.height - 1)
+        distance = self.angle_between(x, y, other_x, other_y)
+        return radius / (2 * distance / 10) if distance > 0 else 0.0
+
+    def reach(self, radius: float) -> int:
+        """Pixels in either direction beyond which nothing is within `radius` [rad] of a pixel.
+
+        An angular fisheye stretches by theta/sin theta across the radius, a hemispherical one not
+        at all; other projections are not bounded here.
+        """
+        view = self.view
+        longest = max(view.width, view.height)
+        if view.kind == "hemispherical":
+            per_radian = max(
+                view.width / (2 * np.sin(np.radians(view.horizontal_deg) / 2)),
+                view.height / (2 * np.sin(np.radians(view.vertical_deg) / 2)),
+            )
+            stretch = 1.0
+        elif view.kind == "angular" and radius < 1.0:
+            widest = np.pi / 2 + radius
+            per_radian = max(
+                view.width / np.radians(view.horizontal_deg),
+                view.height / np.radians(view.vertical_deg),
+            )
+            stretch = widest / np.sin(widest)
+        else:
+            return longest
+        return min(int(np.ceil(radius * stretch * per_radian)) + 2, longest)

@@ -1,0 +1,1 @@
+"""Views, their pixel geometry, and Radiance pictures."""

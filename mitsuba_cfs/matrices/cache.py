@@ -1,0 +1,193 @@
+"""Matrices kept on disk by the hash of everything they depend on, finished or half done.
+
+A file holds the state of `mitsuba_cfs.trace.estimate.accumulate`: a finished matrix is read back, a
+killed run goes on after the last batch that was saved.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import sys
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+VARIABLE = "CFS_CACHE"  # environment variable with the folder
+DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
+UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """The running mean of batches: enough to go on with the next one."""
+
+    count: int  # batches so far
+    mean: NDArray[np.float64]
+    spread: NDArray[np.float64]  # same shape; sum of squared deviations from the mean
+    sum_spread: NDArray[np.float64]  # the same of the sum over the last axis
+    seconds: float  # spent so far
+    finished: bool
+
+
+def default_folder() -> Path:
+    """`$CFS_CACHE`, or the folder `cfs` in the user's cache folder of this platform."""
+    chosen = os.environ.get(VARIABLE)
+    if chosen:
+        return Path(chosen).expanduser()
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = str(Path.home() / "Library" / "Caches")
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "cfs"
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixCache:
+    """A folder of matrices."""
+
+    folder: Path
+    limit: int = DEFAULT_LIMIT  # [bytes]
+
+    @classmethod
+    def of_user(cls) -> MatrixCache:
+        """The user's cache."""
+        return cls(default_folder())
+
+    def entry(self, label: str, *inputs: object) -> CacheEntry:
+        """The place of the matrix that follows from these inputs and this program's code."""
+        key = digest(label, code_version(), *inputs)
+        return CacheEntry(self, self.folder / f"{label.replace(' ', '-')}-{key[:40]}.npz")
+
+    def trim(self, keep: Path | None = None) -> None:
+        """Delete the longest unused files until the folder holds less than the limit."""
+        found = [(file, _status(file)) for file in self.folder.glob("*.npz")]
+        files = sorted(
+            ((file, status) for file, status in found if status), key=lambda item: item[1].st_mtime
+        )
+        total = sum(status.st_size for _, status in files)
+        for file, status in files:
+            if total <= self.limit:
+                break
+            if file != keep:
+                file.unlink(missing_ok=True)
+                total -= status.st_size
+
+
+@dataclass(frozen=True, slots=True)
+class CacheEntry:
+    """One matrix's file."""
+
+    cache: MatrixCache
+    path: Path
+
+    def load(self) -> State | None:
+        """What is there; None where there is nothing, or nothing readable."""
+        try:
+            with np.load(self.path, allow_pickle=False) as data:
+                state = State(
+                    int(data["count"]),
+                    data["mean"].astype(float),
+                    data["spread"].astype(float),
+                    data["sum_spread"].astype(float),
+                    float(data["seconds"]),
+                    bool(data["finished"]),
+                )
+            os.utime(self.path)  # used now
+        except FileNotFoundError:
+            return None
+        except UNREADABLE as error:
+            log.info("%s: ignored, cannot be read: %s", self.path, error)
+            return None
+        shape = state.mean.shape
+        whole = state.count > 0 and (state.spread.shape, state.sum_spread.shape) == (
+            shape,
+            shape[:-1],
+        )
+        return state if whole else None
+
+    def save(self, state: State) -> None:
+        """Write the state; the file is the old one or the new one at any time.
+
+        A folder that cannot be written to costs a warning, not the run.
+        """
+        part = None
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(
+                dir=self.path.parent, prefix=self.path.stem, suffix=".part", delete=False
+            ) as file:
+                part = Path(file.name)
+                np.savez(
+                    file,
+                    count=state.count,
+                    mean=state.mean,
+                    spread=state.spread,
+                    sum_spread=state.sum_spread,
+                    seconds=state.seconds,
+                    finished=state.finished,
+                )
+            part.replace(self.path)
+            if state.finished:
+                self.cache.trim(keep=self.path)
+        except OSError as error:
+            log.warning("%s: the matrix is not kept: %s", self.path, error.strerror or error)
+            if part is not None:
+                part.unlink(missing_ok=True)
+
+
+def digest(*values: object) -> str:
+    """A hash of numbers, texts, arrays, dataclasses and sequences of them, by value."""
+    state = hashlib.sha256()
+    for value in values:
+        _feed(state, value)
+    return state.hexdigest()
+
+
+def _feed(state: hashlib._Hash, value: object) -> None:
+    """Add a value with its type and size, so that no two different inputs look alike."""
+    if isinstance(value, np.ndarray):
+        state.update(f"array {value.dtype.str} {value.shape};".encode())
+        state.update(np.ascontiguousarray(value).tobytes())
+    elif is_dataclass(value) and not isinstance(value, type):
+        state.update(f"{type(value).__qualname__} {len(fields(value))};".encode())
+        for field in fields(value):
+            _feed(state, getattr(value, field.name))
+    elif isinstance(value, (list, tuple)):
+        state.update(f"sequence {len(value)};".encode())
+        for item in value:
+            _feed(state, item)
+    elif value is None or isinstance(value, (bool, int, float, str, bytes, np.generic)):
+        text = repr(value).encode()
+        state.update(f"{type(value).__name__} {len(text)};".encode() + text)
+    else:
+        raise ValueError(f"cannot hash a {type(value).__name__}")
+
+
+@cache
+def code_version() -> str:
+    """The tracer's version: its own source and those of what it is built on."""
+    package = Path(__file__).parents[1]
+    sources = [*sorted((package / "trace").glob("*.py")), package / "bsdf" / "klems.py"]
+    sources += [package / "sky" / "patches.py", package / "surfaces.py", package / "directions.py"]
+    versions = [metadata.version(name) for name in ("mitsuba", "drjit")]
+    return digest(*versions, *(source.read_bytes() for source in sources))
+
+
+def _status(file: Path) -> os.stat_result | None:
+    try:
+        return file.stat()
+    except OSError:
+        return None

@@ -1,0 +1,1 @@
+"""Daylight metrics of annual illuminance: per sensor [S] and per room, with their schedules."""

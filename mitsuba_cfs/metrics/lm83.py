@@ -1,0 +1,120 @@
+"""IES LM-83: spatial daylight autonomy, annual sunlight exposure, and its rule for blinds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.metrics.autonomy import (
+    area_share,
+    daylight_autonomy,
+    scheduled,
+    sensor_weights,
+)
+
+FloatArray = NDArray[np.float64]
+
+SDA_THRESHOLD = 300.0  # [lx]
+SDA_TIME = 0.5  # share of the scheduled time
+ASE_THRESHOLD = 1000.0  # [lx] of direct sun
+ASE_HOURS = 250.0  # [h] in a year
+BLIND_AREA = 0.02  # share of the area that may have direct sun before blinds close
+
+
+def spatial_daylight_autonomy(
+    illuminance: ArrayLike,
+    hours: ArrayLike,
+    *,
+    areas: ArrayLike | None = None,
+    threshold: float = SDA_THRESHOLD,
+    time: float = SDA_TIME,
+) -> float:
+    """sDA300/50%: share (0 to 1) of the area with 300 lx for at least half the scheduled time.
+
+    Args:
+        illuminance: [H, S] [lx], with blinds operated (`blinds_operated`).
+        hours: [H] mask, `lm83_hours` for the standard's 3,650.
+        areas: [S] area of each sensor; equal unless given.
+
+    Source: ANSI/IES LM-83-12 (and -22), section 2.
+    """
+    return area_share(daylight_autonomy(illuminance, hours, threshold) >= time, areas)
+
+
+def sunlit_hours(
+    direct_illuminance: ArrayLike,
+    hours: ArrayLike,
+    *,
+    step_h: float = 1.0,
+    threshold: float = ASE_THRESHOLD,
+) -> FloatArray:
+    """Hours [S] of the scheduled time with more than `threshold` lx straight from the sun."""
+    return step_h * np.count_nonzero(scheduled(direct_illuminance, hours) > threshold, axis=0)
+
+
+def annual_sunlight_exposure(
+    direct_illuminance: ArrayLike,
+    hours: ArrayLike,
+    *,
+    areas: ArrayLike | None = None,
+    step_h: float = 1.0,
+    threshold: float = ASE_THRESHOLD,
+    most_hours: float = ASE_HOURS,
+) -> float:
+    """ASE1000,250h: share (0 to 1) of the area with direct sun for more than 250 hours.
+
+    Args:
+        direct_illuminance: [H, S] [lx] of the sun alone, not reflected, with blinds open.
+        hours: [H] mask, `lm83_hours` for the standard's.
+        step_h: length of a time step [h].
+
+    Source: ANSI/IES LM-83-12 (and -22), section 3.
+    """
+    lit = sunlit_hours(direct_illuminance, hours, step_h=step_h, threshold=threshold)
+    return area_share(lit > most_hours, areas)
+
+
+def blinds_closed(
+    direct_illuminance: ArrayLike,
+    *,
+    areas: ArrayLike | None = None,
+    threshold: float = ASE_THRESHOLD,
+    most_area: float = BLIND_AREA,
+) -> NDArray[np.bool_]:
+    """Time steps [H] in which a window group's blinds close: direct sun on over 2 % of the area.
+
+    Args: `direct_illuminance` [H, S] [lx] of the sun through this group alone, blinds open.
+    """
+    direct = np.asarray(direct_illuminance, dtype=float)
+    if direct.ndim != 2:
+        raise ValueError(f"direct_illuminance: expected [H, S], got {direct.shape}")
+    weights = sensor_weights(areas, direct.shape[1])
+    # the sum of equal weights has rounding errors, the area limit has none
+    return (direct >= threshold) @ weights > most_area * (1 + 1e-9)
+
+
+def blinds_operated(
+    blinds_open: ArrayLike,
+    blinds_down: ArrayLike,
+    direct_illuminance: ArrayLike,
+    *,
+    areas: ArrayLike | None = None,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Illuminance [H, S] with the blinds of each group as LM-83 moves them, and when [H, W] down.
+
+    Args:
+        blinds_open, blinds_down: [W, H, S] [lx] by window group, in either state.
+        direct_illuminance: [W, H, S] [lx] straight from the sun, blinds open.
+    """
+    up, down = np.asarray(blinds_open, dtype=float), np.asarray(blinds_down, dtype=float)
+    direct = np.asarray(direct_illuminance, dtype=float)
+    if up.ndim != 3 or up.shape != down.shape or up.shape != direct.shape:
+        raise ValueError(
+            f"expected three arrays [W, H, S], got {up.shape}, {down.shape}, {direct.shape}"
+        )
+    total = np.zeros(up.shape[1:])
+    closed = np.zeros((up.shape[1], len(up)), dtype=bool)
+    for i in range(len(up)):
+        closed[:, i] = blinds_closed(direct[i], areas=areas)
+        total += np.where(closed[:, i, None], down[i], up[i])
+    return total, closed

@@ -1,0 +1,223 @@
+"""Sky matrices [P, H]: the luminance or radiance of every sky patch in every time step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky import sun as sun_module
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.sky.perez import PerezSky, perez_sky, relative_luminance
+from mitsuba_cfs.sky.weather import Weather
+
+FloatArray = NDArray[np.float64]
+
+BANDS = ("visible", "solar")
+PARTS = ("all", "sky", "sun")
+SUN_PATCHES = 4  # gendaymtx spreads the sun over this many patches
+DARK = 1e-4  # [W/m2] gendaymtx's night: direct normal plus diffuse at or below it
+DEFAULT_DEW_POINT_C = 11.0  # gendaymtx's, for files without one
+CHUNK_BYTES = 2**20  # size of one temporary array: it stays in the cache, four times the speed
+
+
+@dataclass(frozen=True, slots=True)
+class SkySeries:
+    """The Perez sky and the sun of H moments, in one band (lx and cd/m2, or W/m2 and W/m2/sr)."""
+
+    sun: FloatArray  # [H, 3] unit vectors to the sun
+    model: PerezSky  # shape of the sky's luminance
+    diffuse_horizontal: FloatArray  # [H] illuminance [lx] or irradiance [W/m2]
+    direct_normal: FloatArray  # [H] illuminance [lx] or irradiance [W/m2]
+
+    @property
+    def global_horizontal(self) -> FloatArray:
+        """Horizontal illuminance or irradiance [H] of sky and sun."""
+        return self.diffuse_horizontal + self.direct_normal * np.maximum(self.sun[:, 2], 0.0)
+
+    def luminance(self, directions: FloatArray, hours: NDArray[np.int64]) -> FloatArray:
+        """Sky luminance or radiance [N, h] of directions [N, 3] at some of the moments.
+
+        Scaled so that the diffuse horizontal value comes out on the patches of MF:6.
+        """
+        fine = ReinhartSky(6)
+        level = self._relative(fine.directions[1:], hours)
+        scale = self.diffuse_horizontal[hours] / (fine.horizontal_weights[1:] @ level)
+        return self._relative(np.asarray(directions, dtype=float), hours) * scale
+
+    def patches(self, sky: ReinhartSky, hours: NDArray[np.int64]) -> FloatArray:
+        """Patch luminance or radiance [P - 1, h], without ground and sun.
+
+        Scaled so that the sum over patches gives the diffuse horizontal value exactly.
+        """
+        level = self._relative(sky.directions[1:], hours)
+        total = sky.horizontal_weights[1:] @ level
+        if np.any(total <= 0):  # no light by the model: a uniform sky, as in gendaymtx
+            level[:, total <= 0] = 1.0
+            total = sky.horizontal_weights[1:] @ level
+        level *= self.diffuse_horizontal[hours] / total
+        return level
+
+    def _relative(self, directions: FloatArray, hours: NDArray[np.int64]) -> FloatArray:
+        cosine = np.clip(directions @ self.model.sun[hours].T, -1.0, 1.0)
+        return relative_luminance(self.model.coefficients[:, hours], directions[:, 2], cosine)
+
+
+def sky_series(
+    weather: Weather,
+    band: str = "visible",
+    *,
+    sun_model: str = "spa",
+    rotation_deg: float = 0.0,
+    measured_illuminance: bool = False,
+) -> SkySeries:
+    """Sun and Perez sky in the middle of each interval; options as for `sky_matrix`."""
+    if band not in BANDS:
+        raise ValueError(f"band: expected one of {BANDS}, got {band!r}")
+    direct, diffuse = weather.direct_normal, weather.diffuse_horizontal
+    towards = sun_module.sun_directions(weather, model=sun_model)
+    towards = sun_module.rotated(towards, rotation_deg)
+    model = perez_sky(
+        direct,
+        diffuse,
+        towards,
+        day_of_year=weather.midpoints.day_of_year.to_numpy(),
+        dew_point_c=_dew_point(weather),
+    )
+    dark = direct + diffuse <= DARK
+    if band == "visible" and measured_illuminance:
+        direct, diffuse = weather.direct_normal_illuminance, weather.diffuse_horizontal_illuminance
+        if direct is None or diffuse is None:
+            raise ValueError(f"the weather of {weather.site} has no illuminance")
+    elif band == "visible":
+        direct, diffuse = direct * model.direct_efficacy, diffuse * model.diffuse_efficacy
+    return SkySeries(towards, model, np.where(dark, 0.0, diffuse), np.where(dark, 0.0, direct))
+
+
+def _dew_point(weather: Weather) -> FloatArray:
+    """Dew point [H] [deg C], the mean of three hours up to and with each, as gendaymtx takes it."""
+    dew = weather.dew_point_c
+    if dew is None:
+        return np.full(len(weather.times), DEFAULT_DEW_POINT_C)
+    span = max(1, round(3 / weather.step_h))
+    padded = np.concatenate([np.full(span - 1, dew[0]), dew])
+    return np.convolve(padded, np.full(span, 1 / span), mode="valid")
+
+
+def sky_matrix(
+    weather: Weather,
+    subdivision: int = 1,
+    band: str = "visible",
+    parts: str = "all",
+    *,
+    sun_model: str = "spa",
+    sun_patches: int = SUN_PATCHES,
+    rotation_deg: float = 0.0,
+    ground_reflectance: float | None = None,
+    measured_illuminance: bool = False,
+    sun_up_only: bool = False,
+    dtype: type = np.float64,
+    progress: Progress = silent,
+) -> NDArray:
+    """Perez sky on Reinhart patches [P, H]: luminance [cd/m2], or radiance [W/m2/sr] if `solar`.
+
+    The illuminance (irradiance) of a plane is the sum over patches of value, solid angle and
+    cosine.  Patch 0 is the ground: what it reflects of sky and sun, uniform over its hemisphere.
+
+    Args:
+        parts: `all`; `sky` without the sun (its light on the ground stays, as in `gendaymtx -s`);
+            `sun`: the direct sun alone, no ground (`gendaymtx -d`).  `all` = `sky` + `sun`.
+        sun_model: see `mitsuba_cfs.sky.sun`.
+        sun_patches: the sun is spread over so many nearest patches (1: only the nearest), weighted
+            by 1/(1.002 - cosine of the distance), each share divided by the patch's solid angle.
+        rotation_deg: turns sun and sky counter-clockwise seen from above, as `gendaymtx -r`.
+        ground_reflectance: the weather's albedo unless given.
+        measured_illuminance: use the file's illuminances rather than Perez's efficacies.
+        sun_up_only: leave out the time steps where `sun_up` is false.
+
+    Raises: `ValueError` for an unknown option, or illuminances that the weather does not have.
+    """
+    if parts not in PARTS:
+        raise ValueError(f"parts: expected one of {PARTS}, got {parts!r}")
+    sky = ReinhartSky(subdivision)
+    series = sky_series(
+        weather,
+        band,
+        sun_model=sun_model,
+        rotation_deg=rotation_deg,
+        measured_illuminance=measured_illuminance,
+    )
+    reflectance = weather.albedo if ground_reflectance is None else ground_reflectance
+    chosen = sun_module.is_up(series.sun) if sun_up_only else np.ones(len(series.sun), dtype=bool)
+    hours = np.flatnonzero(chosen)
+    lit = np.flatnonzero((series.diffuse_horizontal + series.direct_normal)[hours] > 0)
+    result = np.zeros((sky.size, len(hours)), dtype=dtype)
+    size = max(1, CHUNK_BYTES // (8 * sky.size))
+    for start in range(0, len(lit), size):
+        columns = lit[start : start + size]
+        h = hours[columns]
+        block = np.zeros((sky.size, len(h)))
+        if parts != "sun":
+            block[0] = reflectance / np.pi * series.global_horizontal[h]
+            block[1:] = series.patches(sky, h)
+        if parts != "sky":
+            _add_sun(block, sky, series.sun[h], series.direct_normal[h], sun_patches)
+        result[:, columns] = block
+        progress("sky matrix", (start + len(columns)) / len(lit))
+    return result
+
+
+def _add_sun(
+    block: FloatArray, sky: ReinhartSky, sun: FloatArray, direct: FloatArray, count: int
+) -> None:
+    """Add the direct sun [h] to its `count` nearest patches of `block` [P, h]."""
+    if not 1 <= count < sky.size:
+        raise ValueError(f"sun_patches: expected 1 or more, got {count}")
+    cosine = sky.directions[1:] @ sun.T
+    nearest = np.argpartition(-cosine, count - 1, axis=0)[:count]
+    weight = 1.0 / (1.002 - np.take_along_axis(cosine, nearest, axis=0))
+    weight *= direct / weight.sum(axis=0)
+    patch = nearest + 1
+    block[patch, np.arange(len(sun))] += weight / sky.solid_angles[patch]
+
+
+def sun_up(weather: Weather, *, sun_model: str = "spa") -> NDArray[np.bool_]:
+    """Time steps [H] with any of the sun's disc above the horizon (`gendaymtx -u`)."""
+    return sun_module.is_up(sun_module.sun_directions(weather, model=sun_model))
+
+
+def sun_matrix(
+    weather: Weather,
+    subdivision: int = 6,
+    band: str = "visible",
+    *,
+    sun_model: str = "spa",
+    rotation_deg: float = 0.0,
+    measured_illuminance: bool = False,
+) -> sparse.csc_array:
+    """Sun of each time step [P, H] as the luminance (radiance) of a 0.533 degree disc.
+
+    One entry per sunlit step, at the nearest patch: the disc stands at that patch's centre, so a
+    direct-sun matrix C_ds traced from discs of unit luminance at the centres times this matrix is
+    the sun's part of the five-phase method.  As `gendaymtx -5 0.533 -d -m 6`.
+    """
+    sky = ReinhartSky(subdivision)
+    series = sky_series(
+        weather,
+        band,
+        sun_model=sun_model,
+        rotation_deg=rotation_deg,
+        measured_illuminance=measured_illuminance,
+    )
+    hours = np.flatnonzero(series.direct_normal > 0)
+    size = max(1, CHUNK_BYTES // (8 * sky.size))
+    patch = np.empty(len(hours), dtype=np.int64)
+    for start in range(0, len(hours), size):
+        part = slice(start, start + size)
+        patch[part] = 1 + np.argmax(sky.directions[1:] @ series.sun[hours[part]].T, axis=0)
+    luminance = series.direct_normal[hours] / sun_module.SUN_SOLID_ANGLE
+    shape = (sky.size, len(weather.times))
+    return sparse.csc_array((luminance, (patch, hours)), shape=shape)

@@ -1,0 +1,119 @@
+"""Where the sun is, in the middle of each interval; world frame x east, y north, z up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.sky import air
+from mitsuba_cfs.sky.weather import Weather
+
+SUN_ANGLE_DEG = 0.533  # full angle of the disc that Radiance uses
+SUN_RADIUS = np.radians(SUN_ANGLE_DEG / 2)  # [rad]
+SUN_SOLID_ANGLE = 2 * np.pi * (1 - np.cos(SUN_RADIUS))  # [sr]
+LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam
+
+SUN_MODELS = ("spa", "radiance")
+
+
+def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float64]:
+    """Unit vectors [H, 3] towards the sun in the middle of each interval.
+
+    `spa` (the default): NREL's Solar Position Algorithm, good to 0.0003 deg, seen through the
+    refracting air.  `radiance`: the formula of gensky and gendaymtx, 0.45 deg off on average and
+    1.5 deg at worst, for agreement with them.
+
+    Source: Reda and Andreas 2004, Solar Energy 76:577 (pvlib's implementation); Radiance `sun.c`.
+    """
+    if model == "spa":
+        return _spa_directions(weather)
+    if model == "radiance":
+        return _radiance_directions(weather)
+    raise ValueError(f"sun model: expected one of {SUN_MODELS}, got {model!r}")
+
+
+def _spa_directions(weather: Weather) -> NDArray[np.float64]:
+    from pvlib import solarposition
+
+    utc = weather.midpoints - pd.Timedelta(hours=weather.timezone_h)
+    pressure, temperature = weather.pressure_pa, weather.dry_bulb_c
+    standard = air.standard_pressure(weather.elevation_m)
+    table = solarposition.spa_python(
+        utc.tz_localize("UTC"),
+        weather.latitude_deg,
+        weather.longitude_deg,
+        altitude=weather.elevation_m,
+        pressure=standard if pressure is None else float(np.mean(pressure)),
+        temperature=12.0 if temperature is None else float(np.mean(temperature)),
+    )
+    angles = np.radians(table[["apparent_elevation", "azimuth"]].to_numpy())
+    return direction(angles[:, 0], angles[:, 1])
+
+
+def _radiance_directions(weather: Weather) -> NDArray[np.float64]:
+    t = weather.midpoints
+    day = t.day_of_year.to_numpy().astype(float)
+    hour = (t.hour + t.minute / 60 + t.second / 3600).to_numpy()
+    declination = 0.4093 * np.sin(2 * np.pi / 365 * (day - 81))
+    equation_of_time = 0.170 * np.sin(4 * np.pi / 373 * (day - 80)) - 0.129 * np.sin(
+        2 * np.pi / 355 * (day - 8)
+    )
+    solar_time = hour + equation_of_time + weather.longitude_deg / 15 - weather.timezone_h
+    angle = solar_time * np.pi / 12  # 0 at midnight
+    latitude = np.radians(weather.latitude_deg)
+    sin_l, cos_l = np.sin(latitude), np.cos(latitude)
+    sin_d, cos_d = np.sin(declination), np.cos(declination)
+    east = cos_d * np.sin(angle)
+    north = cos_l * sin_d + sin_l * cos_d * np.cos(angle)
+    up = sin_l * sin_d - cos_l * cos_d * np.cos(angle)
+    return np.stack([east, north, up], axis=-1)
+
+
+def rotated(directions: ArrayLike, angle_deg: float) -> NDArray[np.float64]:
+    """Directions [..., 3] turned counter-clockwise seen from above, as `gendaymtx -r` does."""
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    return np.asarray(directions, dtype=float) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
+
+
+def direction(altitude: ArrayLike, azimuth: ArrayLike) -> NDArray[np.float64]:
+    """Unit vectors [..., 3] from altitude and azimuth (clockwise from north) [rad]."""
+    altitude, azimuth = np.asarray(altitude, dtype=float), np.asarray(azimuth, dtype=float)
+    level = np.cos(altitude)
+    return np.stack([level * np.sin(azimuth), level * np.cos(azimuth), np.sin(altitude)], axis=-1)
+
+
+def altitude(directions: ArrayLike) -> NDArray[np.float64]:
+    """Altitude [...] [rad] of unit vectors [..., 3]."""
+    return np.arcsin(np.clip(np.asarray(directions, dtype=float)[..., 2], -1.0, 1.0))
+
+
+def azimuth(directions: ArrayLike) -> NDArray[np.float64]:
+    """Azimuth [...] [rad, 0..2 pi), clockwise from north, of vectors [..., 3]."""
+    d = np.asarray(directions, dtype=float)
+    return np.mod(np.arctan2(d[..., 0], d[..., 1]), 2 * np.pi)
+
+
+def is_up(directions: ArrayLike) -> NDArray[np.bool_]:
+    """Whether any of the sun's disc is above the horizon [...], as gendaymtx decides it."""
+    return altitude(directions) > -SUN_RADIUS
+
+
+def direct_normal_from_global(
+    global_horizontal: ArrayLike,
+    diffuse_horizontal: ArrayLike,
+    sine_of_altitude: ArrayLike,
+    *,
+    least_altitude_deg: float = LEAST_ALTITUDE_DEG,
+) -> NDArray[np.float64]:
+    """Direct normal irradiance [H] [W/m2]: (global - diffuse)/sin(altitude), 0 at low sun.
+
+    Below `least_altitude_deg` the quotient of two small measured numbers is noise, so the beam is
+    taken as 0; a diffuse reading above the global one gives 0 too.  Never more than the sun gives
+    outside the atmosphere.
+    """
+    beam = np.asarray(global_horizontal, dtype=float) - np.asarray(diffuse_horizontal, dtype=float)
+    sine = np.asarray(sine_of_altitude, dtype=float)
+    usable = sine > np.sin(np.radians(least_altitude_deg))
+    normal = np.where(usable, beam / np.where(usable, sine, 1.0), 0.0)
+    return np.clip(normal, 0.0, 1361.0 * 1.035)  # solar constant at perihelion

@@ -1,0 +1,283 @@
+"""The text of EPW files as checked numbers: every fault names its line and field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mitsuba_cfs.errors import DataError
+
+FilePath = str | PathLike[str]
+
+# Years that stand for a file whose months come from different years: 1 January is a Sunday, as
+# nearly every EPW header says.
+TYPICAL_YEAR, TYPICAL_LEAP_YEAR = 2017, 2012
+STEPS_PER_DAY = 24
+
+# EPW field: column, value that means "missing" (at or above it), least and greatest valid value.
+# Source: EnergyPlus Auxiliary Programs, EPW data dictionary.  The irradiance bound is ours: more
+# than the sun gives outside the atmosphere (1,413 W/m2) plus broken-cloud enhancement.
+EPW_FIELDS: dict[str, tuple[int, float, float, float]] = {
+    "dry bulb temperature": (6, 99.9, -90.0, 70.0),
+    "dew point temperature": (7, 99.9, -90.0, 70.0),
+    "relative humidity": (8, 999.0, 0.0, 110.0),
+    "pressure": (9, 999999.0, 31000.0, 120000.0),
+    "horizontal infrared irradiance": (12, 9999.0, 0.0, 1000.0),
+    "global horizontal irradiance": (13, 9999.0, 0.0, 1800.0),
+    "direct normal irradiance": (14, 9999.0, 0.0, 1500.0),
+    "diffuse horizontal irradiance": (15, 9999.0, 0.0, 1500.0),
+    "global horizontal illuminance": (16, 999900.0, 0.0, 250000.0),
+    "direct normal illuminance": (17, 999900.0, 0.0, 250000.0),
+    "diffuse horizontal illuminance": (18, 999900.0, 0.0, 250000.0),
+    "wind direction": (20, 999.0, 0.0, 360.0),
+    "wind speed": (21, 999.0, 0.0, 80.0),
+    "total sky cover": (22, 99.0, 0.0, 10.0),
+    "opaque sky cover": (23, 99.0, 0.0, 10.0),
+}
+EPW_HEADER = (
+    "LOCATION",
+    "DESIGN CONDITIONS",
+    "TYPICAL/EXTREME PERIODS",
+    "GROUND TEMPERATURES",
+    "HOLIDAYS/DAYLIGHT SAVINGS",
+    "COMMENTS 1",
+    "COMMENTS 2",
+    "DATA PERIODS",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """Where a weather file is for."""
+
+    name: str
+    latitude_deg: float
+    longitude_deg: float
+    timezone_h: float
+    elevation_m: float
+
+
+def read_lines(path: FilePath) -> list[str]:
+    """The file's lines; `DataError` where it cannot be read or is empty."""
+    try:
+        text = Path(path).read_text(encoding="latin-1")  # city names in any encoding pass
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror}", file=path) from error
+    lines = text.removeprefix("ï»¿").rstrip().splitlines()  # the prefix: a UTF-8 byte order mark
+    if not lines:
+        raise DataError("the file is empty", file=path)
+    return lines
+
+
+def number(text: str, path: FilePath, line: int, field: str) -> float:
+    """One finite number; `DataError` where the text is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise DataError(
+            f"expected a number, got {text!r}", file=path, element=f"line {line}", field=field
+        )
+    return value
+
+
+def checked(
+    path: FilePath,
+    first_line: int,
+    field: str,
+    values: NDArray[np.float64],
+    low: float,
+    high: float,
+) -> NDArray[np.float64]:
+    """`values` if each is NaN or within its bounds; else `DataError` with the first that is not."""
+    wrong = (values < low) | (values > high)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(
+            f"expected {low:g} to {high:g}, got {values[row]:g}",
+            file=path,
+            element=f"line {first_line + row}",
+            field=field,
+        )
+    return values
+
+
+def location(path: FilePath, name: str, numbers: tuple[float, float, float, float]) -> Location:
+    """A checked location from latitude, longitude, time zone [h] and elevation [m]."""
+    bounds = (("latitude", 90.0), ("longitude", 180.0), ("time zone", 14.0), ("elevation", 9000.0))
+    for (field, bound), value in zip(bounds, numbers, strict=True):
+        if abs(value) > bound:
+            raise DataError(
+                f"expected -{bound:g} to {bound:g}, got {value:g}", file=path, field=field
+            )
+    return Location(name, *numbers)
+
+
+def epw_lines(path: FilePath) -> tuple[list[str], list[str]]:
+    """The eight header lines and the data lines of an EPW file."""
+    lines = read_lines(path)
+    if not lines[0].upper().startswith("LOCATION,"):
+        raise DataError("is not an EPW file: expected a first line LOCATION,...", file=path)
+    for i, keyword in enumerate(EPW_HEADER):
+        if i >= len(lines) or not lines[i].upper().startswith(keyword):
+            raise DataError(f"expected the header {keyword}", file=path, element=f"line {i + 1}")
+    return lines[: len(EPW_HEADER)], lines[len(EPW_HEADER) :]
+
+
+def epw_location(head: list[str], path: FilePath) -> Location:
+    """The site of the LOCATION line."""
+    parts = [part.strip() for part in head[0].split(",")]
+    if len(parts) < 10:
+        raise DataError(
+            f"expected 10 fields, got {len(parts)}", file=path, element="line 1", field="LOCATION"
+        )
+    names = ("latitude", "longitude", "time zone", "elevation")
+    numbers = [number(parts[6 + i], path, 1, name) for i, name in enumerate(names)]
+    name = ", ".join(part for part in (parts[1], parts[3]) if part not in ("", "-"))
+    return location(path, name, tuple(numbers))
+
+
+def epw_ground(
+    head: list[str], path: FilePath
+) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    """Depths [G] [m] and monthly temperatures [G, 12] [deg C] of the ground; None if not given."""
+    parts = [part.strip() for part in head[3].split(",")][1:]
+    count = int(number(parts[0], path, 4, "GROUND TEMPERATURES")) if parts and parts[0] else 0
+    if count <= 0:
+        return None, None
+    if len(parts) < 1 + 16 * count:
+        raise DataError(
+            f"expected {16 * count} fields for {count} depths, got {len(parts) - 1}",
+            file=path,
+            element="line 4",
+            field="GROUND TEMPERATURES",
+        )
+    depths, months = [], []
+    for i in range(count):
+        block = parts[1 + 16 * i : 17 + 16 * i]
+        depths.append(number(block[0], path, 4, "ground depth"))
+        months.append([number(text, path, 4, "ground temperature") for text in block[4:]])
+    return np.array(depths), np.array(months)
+
+
+class EpwColumns:
+    """The data lines of an EPW file, read column by column."""
+
+    def __init__(self, path: FilePath, header_lines: int, lines: list[str]) -> None:
+        self.path, self.first_line = path, header_lines + 1
+        self.rows = [line.split(",") for line in lines]
+        for i, row in enumerate(self.rows):
+            if len(row) < 24:
+                raise DataError(
+                    f"expected at least 24 fields, got {len(row)}",
+                    file=path,
+                    element=f"line {self.first_line + i}",
+                )
+
+    def error(self, field: str, row: int, message: str) -> DataError:
+        """The error for one field of one row, which says the date too."""
+        month, day, hour = (part.strip() for part in self.rows[row][1:4])
+        return DataError(
+            f"{message} (month {month}, day {day}, hour {hour})",
+            file=self.path,
+            element=f"line {self.first_line + row}",
+            field=field,
+        )
+
+    def _numbers(
+        self, column: int, field: str, rows: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
+        rows = np.arange(len(self.rows)) if rows is None else rows
+        texts = [self.rows[row][column] for row in rows]
+        try:
+            values = np.array(texts, dtype=float)
+        except ValueError:
+            values = np.array([_number_or_nan(text) for text in texts])
+        if not np.isfinite(values).all():
+            first = int(np.argmin(np.isfinite(values)))
+            raise self.error(field, rows[first], f"expected a number, got {texts[first]!r}")
+        return values
+
+    def optional(self, field: str) -> NDArray[np.float64]:
+        """The field's values [H], NaN where the file marks them missing."""
+        column, missing, low, high = EPW_FIELDS[field]
+        blank = np.array([not row[column].strip() for row in self.rows], dtype=bool)
+        values = np.full(len(self.rows), np.nan)
+        values[~blank] = self._numbers(column, field, np.flatnonzero(~blank))
+        values = np.where(values >= missing, np.nan, values)
+        return checked(self.path, self.first_line, field, values, low, high)
+
+    def required(self, field: str) -> NDArray[np.float64]:
+        """The field's values [H]; `DataError` where one is missing."""
+        values = self.optional(field)
+        if np.isnan(values).any():
+            row = int(np.argmax(np.isnan(values)))
+            raise self.error(
+                field, row, f"missing (the file has {self.rows[row][EPW_FIELDS[field][0]]})"
+            )
+        return values
+
+    def whole(self, field: str) -> NDArray[np.float64] | None:
+        """The field's values [H], or None where any is missing."""
+        values = self.optional(field)
+        return None if np.isnan(values).any() else values
+
+    def times(self) -> tuple[pd.DatetimeIndex, float]:
+        """Interval ends [H] and the step [h]; `DataError` where an hour is missing or misplaced."""
+        count = len(self.rows)
+        dates = np.stack(
+            [self._numbers(i, name) for i, name in enumerate(("year", "month", "day", "hour"))]
+        )
+        years = np.unique(dates[0]).astype(int)
+        leap = bool(np.any((dates[1] == 2) & (dates[2] == 29)))
+        year = year_of(years, leap)
+        steps, rest = divmod(count, STEPS_PER_DAY * (366 if leap else 365))
+        if rest or not steps or 60 % steps:
+            steps = max(1, steps)  # the first row out of order then says where rows are missing
+        ends = pd.date_range(f"{year}-01-01", periods=count + 1, freq=f"{3600 // steps}s")[1:]
+        expected = ends - pd.Timedelta(seconds=1)  # hour 24 ends on the next day
+        wanted = np.stack([expected.month, expected.day, expected.hour + 1])
+        wrong = np.any(dates[1:] != wanted, axis=0)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            month, day, hour = wanted[:, row]
+            raise self.error(
+                "time",
+                row,
+                f"hours missing or out of order: expected month {month}, day {day}, hour {hour}",
+            )
+        check_length(self.path, count, steps, leap)
+        return ends, 1.0 / steps
+
+
+def _number_or_nan(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
+
+
+def year_of(years: NDArray[np.int64], leap: bool) -> int:
+    """The file's own year if it has one that fits its days, else a typical year."""
+    if len(years) == 1 and 1900 <= years[0] <= 2100:
+        year = int(years[0])
+        if leap == bool(pd.Timestamp(year, 1, 1).is_leap_year):
+            return year
+    return TYPICAL_LEAP_YEAR if leap else TYPICAL_YEAR
+
+
+def check_length(path: FilePath, count: int, steps_per_hour: int, leap: bool) -> None:
+    """`DataError` where the rows are not a whole year of equal steps."""
+    days = 366 if leap else 365
+    if count != STEPS_PER_DAY * steps_per_hour * days:
+        raise DataError(
+            f"expected 8760 or 8784 hours, or a whole number of steps in each, got {count} rows",
+            file=path,
+            field="length",
+        )

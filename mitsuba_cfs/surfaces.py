@@ -1,0 +1,100 @@
+"""What the tracer knows of a building: opaque diffuse triangles, and windows in their groups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.directions import window_frame
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """Opaque triangles that reflect diffusely, the same on both sides, in one spectral band."""
+
+    triangles: NDArray[np.float64]  # [N, 3, 3] vertices [m]
+    reflectance: NDArray[np.float64]  # [N] diffuse reflectance, 0 to 1
+    surface: NDArray[np.int64]  # [N] index of the surface (axis F) that each triangle belongs to
+    names: tuple[str, ...] = ()  # [F] name of each surface
+
+    def __post_init__(self) -> None:
+        n = len(self.triangles)
+        if self.triangles.shape != (n, 3, 3):
+            raise ValueError(f"triangles: expected [N, 3, 3], got {self.triangles.shape}")
+        if self.reflectance.shape != (n,) or self.surface.shape != (n,):
+            raise ValueError(
+                f"reflectance and surface: expected one entry for each of {n} triangles"
+            )
+        if n and not (np.min(self.reflectance) >= 0 and np.max(self.reflectance) <= 1):
+            raise ValueError("reflectance: expected values from 0 to 1")
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of each triangle [N] [m2]."""
+        return triangle_areas(self.triangles)
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A plane glazed aperture; its normal points outdoors."""
+
+    name: str
+    triangles: NDArray[np.float64]  # [T, 3, 3] vertices [m], counter-clockwise seen from outside
+    up: NDArray[np.float64] | None = None  # [3] up of the BSDF; world up (north if horizontal)
+    normal: NDArray[np.float64] = field(init=False)  # [3] unit exterior normal
+
+    def __post_init__(self) -> None:
+        t = np.asarray(self.triangles, dtype=float)
+        if t.ndim != 3 or t.shape[1:] != (3, 3) or len(t) == 0:
+            raise ValueError(f"window {self.name}: expected triangles [T, 3, 3], got {t.shape}")
+        area_vector = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]).sum(axis=0)
+        length = np.linalg.norm(area_vector)
+        if not length > 0:
+            raise ValueError(f"window {self.name}: has no area")
+        object.__setattr__(self, "triangles", t)
+        object.__setattr__(self, "normal", area_vector / length)
+
+    @property
+    def area(self) -> float:
+        """Glazed area [m2]."""
+        return float(triangle_areas(self.triangles).sum())
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """Rows x, y, z [3, 3] of the window frame (see `mitsuba_cfs.directions`)."""
+        return window_frame(self.normal, self.up)
+
+
+@dataclass(frozen=True, slots=True)
+class WindowGroup:
+    """Windows of one orientation and one fenestration system: one set of phase matrices."""
+
+    name: str
+    windows: tuple[Window, ...]
+
+    def __post_init__(self) -> None:
+        if not self.windows:
+            raise ValueError(f"window group {self.name}: has no window")
+        first = self.windows[0].frame
+        for window in self.windows[1:]:
+            if not np.allclose(window.frame, first, atol=1e-3):
+                names = f"{window.name} is turned against {self.windows[0].name}"
+                raise ValueError(f"window group {self.name}: {names}")
+
+    @property
+    def area(self) -> float:
+        """Glazed area of all windows [m2]."""
+        return sum(window.area for window in self.windows)
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """Rows x, y, z [3, 3] of the frame that all windows of the group share."""
+        return self.windows[0].frame
+
+
+def triangle_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area of each triangle [N] [m2] from vertices [N, 3, 3] [m]."""
+    edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return 0.5 * np.linalg.norm(edges, axis=-1)

@@ -1,0 +1,229 @@
+"""A year of pictures of one view by the phase methods: the matrices that are traced for it.
+
+Three-phase   L = V T D s
+Five-phase    L = V T D s - V_d T D_d s_d + direct sun, with the sun's true disc
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, flat
+from mitsuba_cfs.images.view import View, pixel_directions
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.image import picture_matrix_blocks
+from mitsuba_cfs.trace.picture_outdoors import Outdoors
+from mitsuba_cfs.trace.picture_sun import PictureSun
+from mitsuba_cfs.trace.scene import TracedScene
+
+MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
+TILE = 4  # [px]
+FACE_STEPS = 8  # normals that differ less than 1/16 in each component are one face
+NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
+
+
+@dataclass(frozen=True, slots=True)
+class ViewMatrices:
+    """A view's matrix in three parts, none of which is negative: V = indirect + lit + seen."""
+
+    view: View
+    pixels: NDArray[np.int64]  # [n] row * width + column of the pixels that show something
+    indirect: PictureMatrix  # light after two reflections or more, V - V_d
+    lit: PictureMatrix  # light of the windows that falls on what the pixel shows, in V_d
+    seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel, in V_d
+
+    def three_phase(self, luminance: ArrayLike) -> ThreePhasePictures:
+        """Pictures of hours with window luminances T D s [G, K, H]."""
+        whole = PictureMatrix(self.indirect.rows + self.lit.rows, self.lit.row, self.lit.share)
+        luminance = np.asarray(luminance, dtype=np.float32)
+        return ThreePhasePictures(self.view, self.pixels, whole, self.seen, luminance)
+
+
+def view_matrices(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    view: View,
+    *,
+    tile: int = TILE,
+    memory: float = MEMORY,
+    folder: Path | None = None,
+    progress: Progress = silent,
+    **options,
+) -> ViewMatrices:
+    """The matrices of a picture's pixels, in memory or, where they are too large, on disk.
+
+    Args:
+        tile: pixels across of the squares that share their reflected light, each face of each
+            surface for itself; 1: every pixel has its own.
+        memory: budget [bytes]; 800 x 800 pixels and a window group take 45 MB, without tiles 582.
+        folder: of the files where they lie on disk (they go with the process); the system's
+            temporary folder by default.
+        options: basis, samples, max_depth, seed of `picture_matrix_blocks`.
+    """
+    pixels, row = _tiles(TracedScene(surfaces, groups), view, tile)
+    m = int(row.max()) + 1
+    columns = len(groups) * options.get("basis", KLEMS_FULL).size
+    indirect, lit = (_storage((m, columns), 8 * m * columns > memory, folder) for _ in range(2))
+    black = Surfaces(surfaces.triangles, np.zeros_like(surfaces.reflectance), surfaces.surface)
+    depth = options.pop("max_depth", 32)
+    traced = (
+        picture_matrix_blocks(
+            surfaces, groups, view, max_depth=depth, progress=progress, **options
+        ),
+        picture_matrix_blocks(surfaces, groups, view, max_depth=1, **options),
+        picture_matrix_blocks(black, groups, view, max_depth=1, **options),
+    )
+    seen, start = [], 0
+    for (block, whole), (_, one), (_, none) in zip(*traced, strict=True):
+        shape, part = (len(block), columns), row[start : start + len(block)]
+        # with equal random numbers each part holds the next; rounding alone can go below zero
+        _add_rows(indirect, part, np.maximum(whole - one, 0).reshape(shape))
+        _add_rows(lit, part, np.maximum(one - none, 0).reshape(shape))
+        seen.append(sparse.csr_array(none.reshape(shape)))
+        start += len(block)
+    seen = sparse.csr_array(sparse.vstack(seen))
+    share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0).astype(np.float32)
+    total = np.maximum(np.bincount(row, share, minlength=m), 0.5 / options.get("samples", 32))
+    for rows in (indirect, lit):
+        rows /= total[:, None].astype(np.float32)
+    parts = (PictureMatrix(rows, row, share) for rows in (indirect, lit))
+    return ViewMatrices(view, pixels, *parts, seen)
+
+
+def _tiles(
+    tracer: TracedScene, view: View, tile: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The pixels [n] that show something, and the number [n] of the row that each shares.
+
+    A row belongs to a square of pixels and to one face: surface and normal.
+    """
+    directions, counts = pixel_directions(view)
+    pixels = np.flatnonzero(counts.reshape(-1))
+    if tile == 1:
+        return pixels, np.arange(len(pixels))
+    way = mi.Vector3f(directions.reshape(-1, 3)[pixels].T.astype(np.float32))
+    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+    hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(eye, way), coherent=True)
+    valid = hit.is_valid()
+    normal = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid).numpy().T
+    surface = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, valid).numpy().astype(np.int64)
+    group = dr.gather(mi.Int32, tracer.group, hit.prim_index, valid).numpy().astype(np.int64)
+    face = np.round(normal * FACE_STEPS).astype(np.int64) + FACE_STEPS
+    key = np.ravel_multi_index(tuple(face.T), (2 * FACE_STEPS + 1,) * 3)
+    across = -(-view.width // tile)
+    square = pixels // view.width // tile * across + pixels % view.width // tile
+    table = np.stack([square, surface, group, key])
+    order = np.lexsort(table)
+    change = np.any(np.diff(table[:, order], axis=1) != 0, axis=0)
+    row = np.empty(len(pixels), dtype=np.int64)
+    row[order] = np.concatenate([[0], np.cumsum(change)])
+    return pixels, row
+
+
+def _add_rows(rows: NDArray, row: NDArray[np.int64], values: NDArray) -> None:
+    """Add values [b, N] to the rows [b] that they share."""
+    chosen, place = np.unique(row, return_inverse=True)
+    ones = np.ones(len(row), dtype=np.float32)
+    gather = sparse.csr_array((ones, (place, np.arange(len(row)))), (len(chosen), len(row)))
+    rows[chosen] += gather @ values
+
+
+class FivePhasePictures:
+    """Pictures of every hour by the five-phase method.
+
+        L = V T D s - V_d T D_d s_d + direct sun
+          = indirect (T D s) + (lit + seen) (T D s - T D_d s_d) + lit L_s + sun in each pixel
+
+    L_s is the sun that the windows scatter, on Klems patches; in a pixel that shows a window it is
+    the BSDF's value for the sun and that pixel, and the sun's beam falls on each pixel for itself.
+    With `show_outdoors` what a window's straight beam shows is no mean over patches either.
+    """
+
+    def __init__(
+        self,
+        matrices: ViewMatrices,
+        sun: PictureSun,
+        luminance: ArrayLike,
+        direct_luminance: ArrayLike,
+        directions: ArrayLike,
+        illuminance: ArrayLike,
+    ) -> None:
+        """From the hours' skies.
+
+        Args:
+            luminance: [G, K, H] of the windows towards the room, T D s [cd/m2].
+            direct_luminance: [G, K, H] T D_d s_d: D_d with `max_depth=1` and the seed and samples
+                of D, s_d the sun alone (`sky_matrix(..., parts="sun")`).
+            directions: [H, 3] to the sun; illuminance: [H] normal to it [lx].
+        """
+        self.view, self.pixels = matrices.view, matrices.pixels
+        self._matrices, self._sun = matrices, sun
+        self._whole = flat(luminance, matrices.lit.rows.shape[1])
+        rest = self._whole - flat(direct_luminance, matrices.lit.rows.shape[1])
+        if rest.min(initial=0) < -NEGATIVE * self._whole.max(initial=0):
+            raise ValueError("the direct sun's luminance exceeds the whole: D_d is not part of D")
+        self._rest = np.maximum(rest, 0)
+        self._scattered, self._outdoors = self._rest, ()
+        self._directions = np.asarray(directions, dtype=float)
+        self._illuminance = np.asarray(illuminance, dtype=float)
+        expected = self._whole.shape[1]
+        if self._directions.shape != (expected, 3) or self._illuminance.shape != (expected,):
+            raise ValueError(f"expected {expected} directions and illuminances of the sun")
+
+    def show_outdoors(
+        self, seen: Outdoors, daylight: ArrayLike, direct_daylight: ArrayLike, sky: ArrayLike,
+        sun: ArrayLike,
+    ) -> None:  # fmt: skip
+        """See the outdoors through the windows' straight beam pixel by pixel.
+
+        Args:
+            daylight, direct_daylight: D and D_d [G, K, P].
+            sky, sun: [P, H] the sky without the sun, and the sun alone: s = sky + sun.
+        """
+        sky, sun = np.asarray(sky), np.asarray(sun)
+        daylight, direct = np.asarray(daylight), np.asarray(direct_daylight)
+        outside = np.matmul(daylight, sky) + np.matmul(daylight - direct, sun)
+        beam = (seen.beam[:, :, None] * outside).reshape(self._rest.shape)
+        self._scattered = np.maximum(self._rest - beam, 0).astype(np.float32)
+        self._outdoors = (
+            (seen.sky, sky.astype(np.float32)),
+            (seen.reflected, (sky + sun).astype(np.float32)),
+        )
+
+    @property
+    def hours(self) -> int:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        return self._whole.shape[1]
+
+    def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        m, rest = self._matrices, self._rest[:, batch]
+        suns, strength = self._directions[batch], self._illuminance[batch]
+        scattered = self._sun.scattered_luminance(suns, strength)
+        windows = m.seen @ self._scattered[:, batch]
+        for rows, sky in self._outdoors:
+            windows += rows @ sky[:, batch]
+        values = np.ascontiguousarray(windows.T, dtype=np.float32)
+        m.indirect.add_to(values, self._whole[:, batch])
+        m.lit.add_to(values, rest + scattered.reshape(rest.shape))
+        self._sun.add_to(values, suns, strength)
+        return values
+
+
+def _storage(shape: tuple[int, int], on_disk: bool, folder: Path | None) -> NDArray[np.float32]:
+    """A matrix of zeros, in memory or in a file without a name."""
+    if not on_disk:
+        return np.zeros(shape, dtype=np.float32)
+    with tempfile.TemporaryFile(dir=folder) as file:  # the map keeps the file open
+        return np.memmap(file, dtype=np.float32, mode="w+", shape=shape)

@@ -1,0 +1,193 @@
+"""Daylight matrices: what reaches a window patch, or a sensor outdoors, from each sky patch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
+from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.scene import TracedScene
+
+
+@dr.syntax
+def _daylight_kernel(
+    tracer: TracedScene,
+    sky: SkyBins,
+    matrix: mi.Float64,  # [rows * P], accumulated in place
+    row: mi.UInt32,  # row of the matrix that each path adds to
+    position: mi.Point3f,  # on the window or the sensor
+    direction: mi.Vector3f,  # outdoors
+    generator: mi.PCG32,
+    max_depth: mi.UInt32,
+    active: mi.Bool,
+) -> None:
+    """Follow each path to the sky, where the patch it meets gains the product of reflectances."""
+    beta = mi.Float(1.0)
+    depth = mi.UInt32(0)
+    while active:
+        ray = mi.Ray3f(position, direction)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        free = active & ~hit.is_valid()
+        slot = row * mi.UInt32(sky.size) + sky.index(direction)
+        dr.scatter_add(matrix, mi.Float64(beta), slot, free)
+        active &= hit.is_valid()
+
+        face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
+        face = dr.mulsign(face, -dr.dot(face, direction))
+        position = mi.Point3f(position + direction * hit.t + face * tracer.epsilon)
+        beta *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)
+        u = mi.Point2f(generator.next_float32(), generator.next_float32())
+        direction = mi.Frame3f(face).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        depth += 1
+        survival = dr.select(depth > 2, dr.minimum(beta * 2.0, 0.95), 1.0)
+        active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
+        beta /= dr.maximum(survival, 1e-6)
+
+
+def daylight_matrix(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    *,
+    subdivision: int = 4,
+    basis: KlemsBasis = KLEMS_FULL,
+    samples: int = 4096,
+    max_depth: int = 16,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+    cache: MatrixCache | None = None,
+) -> Estimate:
+    """Daylight matrices [G, K, P]: mean radiance of each window patch per unit sky radiance.
+
+        L_window[g, k] = sum over p of D[g, k, p] s[p]
+
+    The mean is over the area of the group's windows and, weighted by the cosine, over the
+    directions of the patch, so the irradiance on the group is the sum of Omega_k L_window[k].
+    Sky patch 0 is the ground: a ray that leaves downwards and meets nothing.  A row of a window
+    that sees no obstruction sums to 1.
+
+    Args:
+        surfaces: what stands outdoors, in the band of the radiances; the windows' own panes and
+            whatever lies behind them must not be among it.
+        subdivision: Reinhart's MF (1, 2, 4, 6).
+        samples: paths for each window patch in each batch.
+        cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
+
+    Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
+    """
+    tracer = TracedScene(surfaces, groups, windows_block=False)
+    bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
+    K, P, n = bins.size, sky.size, int(samples)
+
+    def one_group(group: int, key: int) -> NDArray[np.float64]:
+        matrix = dr.zeros(mi.Float64, K * P)
+        count = dr.opaque(mi.UInt32, n)
+        path = dr.arange(mi.UInt32, K * n)
+        patch = path // count
+        sample = path - patch * count
+        opaque_key = dr.opaque(mi.UInt32, key & 0xFFFFFFFF)
+        stream = mi.sample_tea_32(patch, opaque_key)[0]
+        local = bins.sample(patch, lattice_2d(sample, stream, 0))
+        _daylight_kernel(
+            tracer,
+            sky,
+            matrix,
+            patch,
+            tracer.sample_group(group, lattice_2d(sample, stream, 2)),
+            tracer.to_world(group, local),
+            path_generator(path, opaque_key),
+            dr.opaque(mi.UInt32, max_depth),
+            mi.Bool(True),
+        )
+        return matrix.numpy().reshape(K, P) / n
+
+    def batch(number: int) -> NDArray[np.float64]:
+        first = (seed * 1_000_003 + number) * len(groups)
+        return np.stack([one_group(g, first + g) for g in range(len(groups))])
+
+    return accumulate(
+        batch,
+        stopping=stopping,
+        label="daylight matrix",
+        progress=progress,
+        entry=cache_entry(
+            cache, "daylight matrix", surfaces, groups, subdivision, basis, n, max_depth,
+            seed, stopping=stopping,
+        ),
+    )  # fmt: skip
+
+
+def sky_irradiance_matrix(
+    surfaces: Surfaces,
+    points: ArrayLike,
+    directions: ArrayLike,
+    *,
+    subdivision: int = 4,
+    samples: int = 16384,
+    max_depth: int = 16,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+    cache: MatrixCache | None = None,
+) -> Estimate:
+    """Irradiance at sensors outdoors per unit radiance of each sky patch [S, P] [sr, projected].
+
+        E[s] = sum over p of C[s, p] sky[p]
+
+    A row sums to pi where nothing around the sensor absorbs.
+
+    Args:
+        points, directions: [S, 3] sensor positions [m] and normals.
+        samples: paths for each sensor in each batch.
+    """
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    tracer = TracedScene(surfaces, centre=points.mean(axis=0))
+    sky = SkyBins(ReinhartSky(subdivision))
+    S, P, n = len(points), sky.size, int(samples)
+    place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
+    normal = mi.Vector3f(directions.T.astype(np.float32))
+
+    def batch(number: int) -> NDArray[np.float64]:
+        matrix = dr.zeros(mi.Float64, S * P)
+        count = dr.opaque(mi.UInt32, n)
+        path = dr.arange(mi.UInt32, S * n)
+        sensor = path // count
+        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        stream = mi.sample_tea_32(sensor, key)[0]
+        local = mi.warp.square_to_cosine_hemisphere(lattice_2d(path - sensor * count, stream, 0))
+        _daylight_kernel(
+            tracer,
+            sky,
+            matrix,
+            sensor,
+            mi.Point3f(dr.gather(mi.Point3f, place, sensor)),
+            mi.Frame3f(dr.gather(mi.Vector3f, normal, sensor)).to_world(local),
+            path_generator(path, key),
+            dr.opaque(mi.UInt32, max_depth),
+            mi.Bool(True),
+        )
+        return matrix.numpy().reshape(S, P) * (np.pi / n)
+
+    return accumulate(
+        batch,
+        stopping=stopping,
+        label="sky irradiance",
+        progress=progress,
+        entry=cache_entry(
+            cache, "sky irradiance", surfaces, points, directions, subdivision, n, max_depth,
+            seed, stopping=stopping,
+        ),
+    )  # fmt: skip

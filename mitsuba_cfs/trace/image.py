@@ -1,0 +1,161 @@
+"""Luminance pictures of a room lit through its windows, one matrix row for each pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.images.view import View, pixel_directions, rays
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.sampling import path_generator, pixel_places
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.view_paths import add_view_paths
+
+BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
+
+
+def luminance_pictures(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    view: View,
+    window_luminance: ArrayLike,
+    *,
+    samples: int = 32,
+    **options,
+) -> NDArray[np.float32]:
+    """Pictures [H, ny, nx]: luminance of each pixel for every hour's window luminance.
+
+        L[pixel, h] = sum over g, k of V[pixel, g, k] L_window[g, k, h]
+
+    Args:
+        window_luminance: [G, K, H] of the windows towards the room, T D s [cd/m2].
+        samples, options: see `picture_matrix_blocks`.
+    """
+    window_luminance = np.asarray(window_luminance, dtype=np.float32)
+    G, K, H = window_luminance.shape
+    flat = window_luminance.reshape(G * K, H)
+    pictures = np.zeros((H, view.height * view.width), dtype=np.float32)
+    blocks = picture_matrix_blocks(surfaces, groups, view, samples=samples, **options)
+    for pixels, matrix in blocks:
+        pictures[:, pixels] = (matrix.reshape(len(pixels), G * K) @ flat).T
+    return pictures.reshape(H, view.height, view.width)
+
+
+def picture_matrix_blocks(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    view: View,
+    *,
+    basis: KlemsBasis = KLEMS_FULL,
+    samples: int = 32,
+    max_depth: int = 32,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
+    """Blocks of the view matrix of a picture: pixel numbers [n] and their rows [n, G, K].
+
+    Pixels (row * width + column) that show nothing are left out.  The rows of a pixel hold its
+    radiance per unit radiance of each window patch: 1 shared among the patches that it sees
+    directly, and what the surfaces it sees reflect.  Results do not depend on the block size.
+
+    Args:
+        samples: paths for each pixel, at as many places within it.
+    """
+    tracer, bins = TracedScene(surfaces, groups), DirectionBins(basis)
+    shape = (len(groups), bins.size)
+    size = max(256, BLOCK_BYTES // (8 * int(np.prod(shape))))
+    size = min(size, max(1, 2**31 // samples))
+    _, counts = pixel_directions(view)
+    shown = np.flatnonzero(counts.reshape(-1))
+    for start in range(0, len(shown), size):
+        pixels = shown[start : start + size]
+        matrix = _block(tracer, bins, view, pixels, samples, max_depth, seed)
+        yield pixels, matrix.reshape(len(pixels), *shape)
+        progress("picture", (start + len(pixels)) / len(shown))
+
+
+def _block(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    view: View,
+    pixels: NDArray[np.int64],
+    samples: int,
+    max_depth: int,
+    seed: int,
+) -> NDArray[np.float32]:
+    """Rows [n, G * K] of some pixels."""
+    matrix = dr.zeros(mi.Float64, len(pixels) * bins.size * len(tracer.groups))
+    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+    number = mi.UInt32(pixels.astype(np.uint32))
+    for j, (dx, dy) in enumerate(pixel_places(samples)):
+        x = (pixels % view.width + dx) / view.width
+        y = 1.0 - (pixels // view.width + dy) / view.height
+        directions, exists = rays(view, x, y)
+        _picture_paths(
+            tracer,
+            bins,
+            matrix,
+            eye,
+            mi.Vector3f(directions.T.astype(np.float32)),
+            mi.Bool(exists),
+            number,
+            dr.opaque(mi.UInt32, j),
+            dr.opaque(mi.UInt32, (seed * 1_000_003 + j) & 0xFFFFFFFF),
+            dr.opaque(mi.UInt32, max_depth),
+        )
+        dr.eval(matrix)
+    return (matrix.numpy() / samples).astype(np.float32)
+
+
+def _picture_paths(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    matrix: mi.Float64,
+    eye: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+    pixel: mi.UInt32,
+    sample: mi.UInt32,
+    key: mi.UInt32,
+    max_depth: mi.UInt32,
+) -> None:
+    """One path for each pixel: L = 1 of the patch seen directly, else rho / pi E of the surface."""
+    K = mi.UInt32(bins.size)
+    width = mi.UInt32(bins.size * len(tracer.groups))
+    row = dr.arange(mi.UInt32, dr.width(pixel))
+    ray = mi.Ray3f(eye, direction)
+    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+    active = active & hit.is_valid()
+    group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
+
+    glazed = active & (group != OPAQUE)
+    local = tracer.to_local(group, direction, glazed)
+    glazed &= local.z > 0
+    slot = row * width + mi.UInt32(group) * K + bins.index(local)
+    dr.scatter_add(matrix, mi.Float64(1.0), slot, glazed)
+
+    active &= group == OPAQUE
+    face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
+    face = dr.mulsign(face, -dr.dot(face, direction))
+    reflectance = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)
+    add_view_paths(
+        tracer,
+        bins,
+        matrix,
+        row,
+        mi.Point3f(eye + direction * hit.t + face * tracer.epsilon),
+        face,
+        reflectance * dr.inv_pi,
+        sample,
+        mi.sample_tea_32(pixel, mi.UInt32(0x1F123BB5))[0],
+        path_generator(pixel, key),
+        max_depth,
+        active,
+    )

@@ -1,0 +1,108 @@
+"""A room ready to be traced under one sky: both sides of its windows, their systems, the sky."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mitsuba_cfs.bsdf.klems import KlemsBasis
+from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
+from mitsuba_cfs.trace.scene import TracedScene
+
+
+class AngularBeam:
+    """A share of light that keeps its beam, by the angle of incidence alone (clear glass)."""
+
+    def __init__(self, values: ArrayLike) -> None:
+        """From the shares [n] at n angles of incidence evenly spaced in cosine, 0 to 1."""
+        self._values = mi.Float(np.asarray(values, dtype=np.float32))
+        self._last = len(np.asarray(values)) - 1
+
+    def at(self, local: mi.Vector3f) -> mi.Float:
+        """Share at local directions, linear between the angles."""
+        place = dr.clip(dr.abs(local.z), 0, 1) * self._last
+        low = mi.UInt32(dr.minimum(place, self._last - 1))
+        a, b = (dr.gather(mi.Float, self._values, low + k) for k in (0, 1))
+        return dr.lerp(a, b, place - mi.Float(low))
+
+
+class PatchBeam:
+    """A share of light that keeps its beam, by the Klems patch of the outdoor direction."""
+
+    def __init__(self, basis: KlemsBasis, values: ArrayLike) -> None:
+        """From the shares [K]."""
+        self._bins = DirectionBins(basis)
+        self._values = mi.Float(np.asarray(values, dtype=np.float32))
+
+    def at(self, local: mi.Vector3f) -> mi.Float:
+        """Share at the local directions of light that passes along the line of `local`."""
+        outward = dr.mulsign(local, local.z)
+        return dr.gather(mi.Float, self._values, self._bins.index(outward))
+
+
+class System:
+    """How a window group passes light: a straight beam, mirrors, and a BSDF for the rest."""
+
+    def __init__(
+        self,
+        bsdf: mi.BSDF | None = None,
+        beam: AngularBeam | PatchBeam | None = None,
+        mirrors: tuple[AngularBeam | None, AngularBeam | None] = (None, None),
+    ) -> None:
+        """From a plugin that scatters, without the peak that `beam` stands for.
+
+        Args: mirrors: specular reflectance of the front (outdoors) and of the back.
+        """
+        self.bsdf, self.beam, self.mirrors = bsdf, beam, mirrors
+
+    def straight(self, local: mi.Vector3f) -> mi.Float:
+        """Transmittance of the straight beam."""
+        return mi.Float(0) if self.beam is None else self.beam.at(local)
+
+    def mirrored(self, local: mi.Vector3f) -> mi.Float:
+        """Specular reflectance for a ray along `local`: outwards (z > 0) it meets the back."""
+        front, back = (mi.Float(0) if m is None else m.at(local) for m in self.mirrors)
+        return dr.select(local.z > 0, back, front)
+
+
+class Sky:
+    """A sky without its sun on Reinhart patches, and the sun as a disc."""
+
+    def __init__(self, patches: ArrayLike, sun: ArrayLike, sun_radiance: float) -> None:
+        """From patch radiances [P] (the ground first), sun direction [3] and disc radiance."""
+        patches = np.asarray(patches, dtype=np.float32)
+        subdivision = next(
+            (mf for mf in (1, 2, 4, 6) if ReinhartSky(mf).size == len(patches)), None
+        )
+        if subdivision is None:
+            raise ValueError(f"a sky of {len(patches)} patches is no Reinhart sky of MF 1, 2, 4, 6")
+        towards = normalize(sun)
+        self.bins = SkyBins(ReinhartSky(subdivision))
+        self.radiance = mi.Float(patches)
+        self.sun = mi.Vector3f(*(dr.opaque(mi.Float, float(v)) for v in towards))
+        self.sun_radiance = dr.opaque(mi.Float, float(sun_radiance) if towards[2] > 0 else 0.0)
+
+
+class Room:
+    """The scenes on both sides of the windows, and the systems in them."""
+
+    def __init__(
+        self,
+        interior: Surfaces,
+        exterior: Surfaces,
+        groups: Sequence[WindowGroup],
+        systems: Sequence[System],
+    ) -> None:
+        """Build both scenes; they share the origin of their coordinates."""
+        if len(systems) != len(groups):
+            raise ValueError(f"{len(systems)} systems for {len(groups)} window groups")
+        self.inside = TracedScene(interior, groups)
+        self.outside = TracedScene(exterior, groups)
+        self.systems = tuple(systems)

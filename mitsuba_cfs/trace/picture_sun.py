@@ -1,0 +1,229 @@
+"""The sun in the pixels of a view: its disc, its beam on surfaces, its light in the windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles, rays
+from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+
+LANES = 1 << 23  # pairs of pixel and sun traced at a time
+SUBPIXEL = np.radians(0.025)  # places on the sun's disc lie so close: the disc holds 360
+WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
+PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered sun
+
+
+class PictureSun:
+    """What a view shows of the sun, without any reflection but the pixel's own.
+
+    Every pixel is looked at through its middle, and the sun's beam falls on it or not; the sun's
+    disc itself is cut into small pieces, so that it has its solid angle whatever the pixels' size.
+    """
+
+    def __init__(
+        self,
+        interior: Surfaces,
+        exterior: Surfaces,
+        groups: Sequence[WindowGroup],
+        scattering: Sequence[Scattering],
+        view: View,
+        *,
+        basis: KlemsBasis = KLEMS_FULL,
+    ) -> None:
+        """Find what each pixel shows; arguments as for `direct_sun_matrix`."""
+        if len(scattering) != len(groups):
+            raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
+        self._inside = TracedScene(interior, groups)
+        self._outside = TracedScene(exterior, groups, windows_block=False)
+        self._free = len(exterior.triangles) == 0  # nothing stands before the windows
+        self._scattering, self._bins = tuple(scattering), DirectionBins(basis)
+        self._view = view
+        directions, counts = pixel_directions(view)
+        shown = np.flatnonzero(counts.reshape(-1))
+        self.pixels = shown
+        self._directions = directions.reshape(-1, 3)[shown]
+        self._tree = cKDTree(self._directions)
+        self._size = float(np.sqrt(pixel_solid_angles(view).max()))  # of a pixel [rad]
+        self._eye = mi.Point3f(*map(float, np.asarray(view.position) - self._inside.centre))
+        self._look()
+
+    def _look(self) -> None:
+        """Trace every pixel's middle: its window group, place, normal and reflectance."""
+        tracer = self._inside
+        direction = mi.Vector3f(self._directions.T.astype(np.float32))
+        hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(self._eye, direction), coherent=True)
+        valid = hit.is_valid()
+        group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
+        face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid)
+        face = dr.mulsign(face, -dr.dot(face, direction))
+        place = self._eye + direction * hit.t + face * tracer.epsilon
+        reflectance = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, valid)
+        dull = valid & (group == OPAQUE) & (reflectance > 0)
+        self._surface = np.flatnonzero(dull.numpy())
+        chosen = mi.UInt32(self._surface.astype(np.uint32))
+        self._place = dr.gather(mi.Point3f, mi.Point3f(place), chosen)
+        self._normal = dr.gather(mi.Vector3f, face, chosen)
+        self._reflectance = dr.gather(mi.Float, reflectance, chosen)
+        groups, self._panes = group.numpy(), []
+        for g in range(len(tracer.groups)):
+            pane = np.flatnonzero(groups == g)
+            chosen = mi.UInt32(pane.astype(np.uint32))
+            towards = tracer.to_group(g, dr.gather(mi.Vector3f, direction, chosen))
+            point = dr.gather(mi.Point3f, mi.Point3f(self._eye + direction * hit.t), chosen)
+            step = mi.Vector3f(*map(float, tracer.groups[g].frame[2])) * tracer.epsilon
+            self._panes.append((pane, mi.Point3f(point + step), towards))
+
+    def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
+        """Add the sun's luminance [cd/m2] to the pixels' values [h, n].
+
+        Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
+        """
+        facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
+        lit = np.flatnonzero(facing & (illuminance > 0) & (suns[:, 2] > 0))
+        if not len(lit):
+            return
+        towards, strength = suns[lit], illuminance[lit]
+        self._add(values, lit, self._surface, towards, strength, self._beam_on_surfaces)
+        for g, (pane, _, _) in enumerate(self._panes):
+            self._add(values, lit, pane, towards, strength, self._scattered_in_panes, g)
+        self._add_disc(values, lit, towards, strength)
+
+    def _add(self, values, lit, columns, suns, strength, kernel, *options) -> None:
+        """Add what a kernel gives for pairs of hours and pixels, some hours at a time."""
+        if not len(columns):
+            return
+        step = max(1, LANES // len(columns))
+        for start in range(0, len(lit), step):
+            part = slice(start, start + step)
+            towards = mi.Vector3f(suns[part].T.astype(np.float32))
+            light = mi.Float(strength[part].astype(np.float32))
+            lane = dr.arange(mi.UInt32, len(columns) * dr.width(light))
+            width = dr.opaque(mi.UInt32, len(columns))
+            hour = lane // width
+            found = kernel(lane - hour * width, hour, towards, light, *options)
+            found = found.numpy().reshape(-1, len(columns))
+            for row, hour_values in zip(lit[part], found, strict=True):
+                values[row, columns] += hour_values
+
+    def _beam_on_surfaces(self, pixel, hour, suns, light) -> mi.Float:
+        """Luminance of the surfaces where the windows' straight beam falls on them."""
+        to_sun = _on_disc(dr.gather(mi.Vector3f, suns, hour), pixel)
+        cosine = dr.dot(dr.gather(mi.Vector3f, self._normal, pixel), to_sun)
+        place = dr.gather(mi.Point3f, self._place, pixel)
+        tau = self._straight(place, to_sun, cosine > 0)
+        rho = dr.gather(mi.Float, self._reflectance, pixel)
+        value = rho * dr.inv_pi * cosine * tau * dr.gather(mi.Float, light, hour)
+        return dr.select(tau > 0, value, 0.0)
+
+    def _straight(self, place: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:
+        """Transmittance of the straight way from places in the room to the sun; 0 if hidden."""
+        ray = mi.Ray3f(place, to_sun)
+        hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        active = active & hit.is_valid()
+        group = dr.gather(mi.Int32, self._inside.group, hit.prim_index, active)
+        active &= group != OPAQUE
+        local = self._inside.to_local(group, to_sun, active)
+        active &= local.z > 0
+        tau = mi.Float(0)
+        for g, system in enumerate(self._scattering):
+            tau = dr.select(active & (group == g), system.through(local), tau)
+        if not self._free:
+            beyond = mi.Ray3f(mi.Point3f(place + to_sun * hit.t), to_sun)
+            active &= tau > 0
+            hidden = self._outside.scene.ray_test(beyond, coherent=True, active=active)
+            tau = dr.select(hidden, 0.0, tau)
+        return tau
+
+    def _scattered_in_panes(self, pixel, hour, suns, light, g: int) -> mi.Float:
+        """Luminance of window pixels: f(sun, pixel) times the sun's illuminance on the pane."""
+        _, place, towards = self._panes[g]
+        to_sun = _on_disc(dr.gather(mi.Vector3f, suns, hour), pixel)
+        local = self._inside.to_group(g, to_sun)
+        lit = local.z > 0
+        if not self._free:
+            ray = mi.Ray3f(dr.gather(mi.Point3f, place, pixel), to_sun)
+            lit &= ~self._outside.scene.ray_test(ray, coherent=True, active=lit)
+        f = self._scattering[g].scattered(local, dr.gather(mi.Vector3f, towards, pixel))
+        return dr.select(lit, f * local.z * dr.gather(mi.Float, light, hour), 0.0)
+
+    def scattered_luminance(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.float32]:
+        """Luminance [G, K, h] of the windows by the sun that they scatter, mean over each group.
+
+        f is the mean over each patch; where part of the group lies in shadow, its share counts.
+        """
+        K, h, G = self._bins.size, len(suns), len(self._panes)
+        result = np.zeros((G, K, h), dtype=np.float32)
+        strength = np.where((suns[:, 2] > 0) & (illuminance > 0), illuminance, 0.0)
+        if not strength.any():
+            return result
+        towards = mi.Vector3f(suns.T.astype(np.float32))
+        lane = dr.arange(mi.UInt32, K * PATCH_POINTS * h)
+        hours = dr.opaque(mi.UInt32, h)
+        sample = lane // hours
+        patch = sample // PATCH_POINTS
+        to_sun = dr.gather(mi.Vector3f, towards, lane - sample * hours)
+        u = lattice_2d(sample - patch * PATCH_POINTS, patch, 0)
+        outward = self._bins.sample(patch, u)
+        for g, system in enumerate(self._scattering):
+            local = self._inside.to_group(g, to_sun)
+            f = dr.select(local.z > 0, system.scattered(local, outward) * local.z, 0.0)
+            mean = f.numpy().reshape(K, PATCH_POINTS, h).mean(axis=1)
+            result[g] = mean * (strength * self._sunlit_share(g, towards))
+        return result
+
+    def _sunlit_share(self, g: int, suns: mi.Vector3f) -> NDArray[np.float64] | float:
+        """Share [h] of a group's area that the sun reaches."""
+        if self._free:
+            return 1.0
+        lane = dr.arange(mi.UInt32, WINDOW_POINTS * dr.width(suns))
+        hour = lane // WINDOW_POINTS
+        place = self._inside.sample_group(
+            g, lattice_2d(lane - hour * WINDOW_POINTS, mi.UInt32(g), 0)
+        )
+        step = mi.Vector3f(*map(float, self._inside.groups[g].frame[2])) * self._inside.epsilon
+        ray = mi.Ray3f(place + step, dr.gather(mi.Vector3f, suns, hour))
+        hidden = self._outside.scene.ray_test(ray, coherent=False)
+        return 1.0 - hidden.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
+
+    def _add_disc(self, values, lit, suns, strength) -> None:
+        """Add the sun's disc seen through the straight beam, by its share of each pixel."""
+        reach = 2 * np.sin((SUN_RADIUS + self._size) / 2)
+        near = self._tree.query_ball_point(suns, reach)
+        hour = np.repeat(np.arange(len(lit)), [len(found) for found in near])
+        if not len(hour):
+            return
+        pixel = np.concatenate([found for found in near if found]).astype(np.int64)
+        count = int(np.clip(np.ceil(self._size / SUBPIXEL), 4, 64))
+        inner = (np.arange(count) + 0.5) / count
+        dx, dy = (a.ravel()[None] for a in np.meshgrid(inner, inner))
+        number = self.pixels[pixel][:, None]
+        x = (number % self._view.width + dx) / self._view.width
+        y = 1.0 - (number // self._view.width + dy) / self._view.height
+        directions, exists = rays(self._view, x, y)
+        cosine = np.einsum("ijk,ik->ij", directions, suns[hour])
+        pair, place = np.nonzero(exists & (cosine >= np.cos(SUN_RADIUS)))
+        if not len(pair):
+            return
+        way = mi.Vector3f(directions[pair, place].T.astype(np.float32))
+        tau = self._straight(mi.Point3f(self._eye), way, mi.Bool(True)).numpy()
+        share = np.bincount(pair, tau, minlength=len(hour)) / count**2
+        np.add.at(values, (lit[hour], pixel), share * strength[hour] / SUN_SOLID_ANGLE)
+
+
+def _on_disc(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
+    """A direction on the sun's disc, another one for each pixel: the edges of shadows are soft."""
+    u = lattice_2d(number, mi.UInt32(0x5BD1E995), 2)
+    local = mi.warp.square_to_uniform_cone(u, float(np.cos(SUN_RADIUS)))
+    return mi.Frame3f(centre).to_world(local)

@@ -1,0 +1,355 @@
+"""Point-in-time path tracing: sensors or pixels of a room under one sky, through the real BSDF."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.images.view import View, pixel_directions, rays
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
+from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
+from mitsuba_cfs.trace.lit_room import Room, Sky
+from mitsuba_cfs.trace.sampling import path_generator, pixel_places
+from mitsuba_cfs.trace.scene import OPAQUE
+
+CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
+TO_WINDOW, TO_SUN = 0.5, 0.15  # shares of a room path's directions; the rest follows the cosine
+PIXEL_BLOCK = 2**18  # paths of a picture traced at a time
+
+
+def _interaction(room: Room, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
+    """What a plugin needs to know of a ray along `direction` that meets a window from the room."""
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
+    normal = mi.Normal3f(*map(float, room.inside.groups[group].frame[2]))
+    si.n = normal
+    si.sh_frame = mi.Frame3f(normal)
+    si.wi = si.to_local(-direction)
+    return si
+
+
+def _on_disc(sky: Sky, u: mi.Point2f) -> mi.Vector3f:
+    """A direction uniform on the sun's disc."""
+    local = mi.warp.square_to_uniform_cone(u, float(np.cos(SUN_RADIUS)))
+    return mi.Frame3f(sky.sun).to_world(local)
+
+
+def _sun_at(
+    room: Room,
+    sky: Sky,
+    position: mi.Point3f,
+    normal: mi.Vector3f,
+    outdoors: mi.Bool,
+    u: mi.Point2f,
+    active: mi.Bool,
+) -> mi.Float:
+    """Irradiance straight from the sun: outdoors, or in the room through a window's beam."""
+    towards = _on_disc(sky, u)
+    cosine = dr.dot(normal, towards)
+    active = active & (cosine > 0) & (sky.sun_radiance > 0)
+    ray = mi.Ray3f(position, towards)
+    tau = mi.Float(1)
+    if any(system.beam is not None for system in room.systems):
+        indoors = active & ~outdoors
+        hit = room.inside.scene.ray_intersect_preliminary(ray, coherent=False, active=indoors)
+        group = dr.gather(mi.Int32, room.inside.group, hit.prim_index, indoors & hit.is_valid())
+        glazed = indoors & hit.is_valid() & (group != OPAQUE)
+        straight = mi.Float(0)
+        for g, system in enumerate(room.systems):
+            beam = system.straight(room.inside.to_group(g, towards))
+            straight = dr.select(glazed & (group == g), beam, straight)
+        tau = dr.select(outdoors, 1.0, straight)
+        beyond = position + towards * hit.t + room.inside.outward(group, glazed)
+        ray.o = dr.select(outdoors, position, mi.Point3f(beyond))
+        active &= tau > 0
+    else:
+        active &= outdoors
+    free = active & ~room.outside.scene.ray_test(ray, coherent=False, active=active)
+    return dr.select(free, cosine * tau * sky.sun_radiance * float(SUN_SOLID_ANGLE), 0.0)
+
+
+def _leave(
+    room: Room,
+    sky: Sky,
+    position: mi.Point3f,
+    normal: mi.Vector3f,
+    outdoors: mi.Bool,
+    generator: mi.PCG32,
+    active: mi.Bool,
+) -> tuple[mi.Vector3f, mi.Bool]:
+    """A direction from a diffuse vertex, and whether it aims at a window.
+
+    Directions follow the cosine; in the room some aim at the windows and some round the sun.
+    """
+    u = mi.Point2f(generator.next_float32(), generator.next_float32())
+    choice = dr.select(outdoors, 1.0, generator.next_float32())
+    cosine = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
+    point, _ = room.inside.sample_window(u, active & ~outdoors)
+    to_window = dr.normalize(mi.Vector3f(point - position))
+    to_sun = mi.Frame3f(sky.sun).to_world(mi.warp.square_to_uniform_cone(u, CONE_COSINE))
+    aimed = choice < TO_WINDOW
+    direction = dr.select(aimed, to_window, cosine)
+    near_sun = ~aimed & (choice < TO_WINDOW + TO_SUN)
+    return dr.select(near_sun, to_sun, direction), aimed
+
+
+def _density(
+    room: Room,
+    sky: Sky,
+    cosine: mi.Float,
+    direction: mi.Vector3f,
+    distance: mi.Float,
+    glass_cosine: mi.Float,  # of the window that was met, 0 for none
+) -> mi.Float:
+    """Density [1/sr] of the directions that `_leave` gives in the room.
+
+    A path that aims at a window and meets something before it is given up, so only directions
+    that meet a window have that part of the density.
+    """
+    window = dr.select(
+        glass_cosine > 1e-4,
+        distance * distance / (room.inside.window_area * dr.maximum(glass_cosine, 1e-4)),
+        0.0,
+    )
+    cone = dr.select(
+        dr.dot(direction, sky.sun) > CONE_COSINE, 1 / (2 * np.pi * (1 - CONE_COSINE)), 0.0
+    )
+    rest = 1 - TO_WINDOW - TO_SUN
+    return rest * cosine * dr.inv_pi + TO_WINDOW * window + TO_SUN * cone
+
+
+def _at_window(
+    room: Room,
+    group: mi.Int32,
+    direction: mi.Vector3f,
+    towards: mi.Vector3f,
+    generator: mi.PCG32,
+    glazed: mi.Bool,
+) -> tuple[mi.Float, mi.Float, mi.Vector3f, mi.Float]:
+    """What a window does to a ray along `direction` that meets it, from either side.
+
+    Returns: light scattered from the sun `towards` [1/sr, cosine included]; the straight beam's
+    transmittance; the direction in which the path goes on, and its weight.
+    """
+    u = mi.Point2f(generator.next_float32(), generator.next_float32())
+    choice, decision = generator.next_float32(), generator.next_float32()
+    scattered, beam, weight_on = mi.Float(0), mi.Float(0), mi.Float(0)
+    direction_on = mi.Vector3f(direction)
+    for g, system in enumerate(room.systems):
+        mine = glazed & (group == g)
+        local = room.inside.to_group(g, direction)
+        straight, mirrored = system.straight(local), system.mirrored(local)
+        beam = dr.select(mine, straight, beam)
+        rest = mi.Float(0)
+        away = mi.Vector3f(direction)
+        if system.bsdf is not None:
+            si, context = _interaction(room, g, direction), mi.BSDFContext()
+            value = system.bsdf.eval(context, si, si.to_local(towards), mine)
+            sunny = mine & (room.inside.to_group(g, towards).z > 0)
+            scattered = dr.select(sunny, value[0], scattered)
+            sample, weight = system.bsdf.sample(context, si, choice, u, mine)
+            rest, away = weight[0], si.to_world(sample.wo)
+        # one of the three, in proportion to what it carries
+        whole = straight + mirrored + rest
+        mark = decision * whole
+        mirror = room.inside.to_world(g, local * mi.Vector3f(1, 1, -1))
+        away = dr.select(mark < straight + mirrored, mirror, away)
+        away = dr.select(mark < straight, direction, away)
+        direction_on = dr.select(mine, away, direction_on)
+        weight_on = dr.select(mine, whole, weight_on)
+    return scattered, beam, direction_on, weight_on
+
+
+@dr.syntax
+def _paths(
+    room: Room,
+    sky: Sky,
+    result: mi.Float64,  # [rows], accumulated in place
+    row: mi.UInt32,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    cosine: mi.Float,  # at the vertex that the path starts on; 0 where it starts at an eye
+    aimed: mi.Bool,  # whether the first direction aims at a window
+    beta: mi.Float,
+    generator: mi.PCG32,
+    max_depth: mi.UInt32,
+    active: mi.Bool,
+) -> None:
+    """Follow each path and add what it carries from sun, sky and ground to its row."""
+    outdoors = mi.Bool(False)
+    diffuse = cosine > 0  # the ray left a diffuse vertex in the room: its density is to be applied
+    camera = cosine <= 0  # the ray comes straight from the eye
+    depth = mi.UInt32(0)
+    while active:
+        # ----- What the ray meets: the sky, a surface, a window -----
+        ray = mi.Ray3f(origin, direction)
+        within = active & ~outdoors
+        hit_in = room.inside.scene.ray_intersect_preliminary(ray, coherent=False, active=within)
+        beyond = active & outdoors
+        hit_out = room.outside.scene.ray_intersect_preliminary(ray, coherent=False, active=beyond)
+        to_sky = beyond & ~hit_out.is_valid()
+        light = dr.gather(mi.Float, sky.radiance, sky.bins.index(direction), to_sky)
+        dr.scatter_add(result, mi.Float64(beta * light), row, to_sky)
+        active &= dr.select(outdoors, hit_out.is_valid(), hit_in.is_valid())
+        t = dr.select(outdoors, hit_out.t, hit_in.t)
+
+        group_in = dr.gather(mi.Int32, room.inside.group, hit_in.prim_index, active & ~outdoors)
+        group_out = dr.gather(mi.Int32, room.outside.group, hit_out.prim_index, active & outdoors)
+        group = dr.select(outdoors, group_out, group_in)
+        glazed = active & (group != OPAQUE)
+        active &= glazed | ~(aimed & diffuse)
+        local = room.inside.to_local(group, direction, glazed)
+        facing = dr.select(outdoors, -local.z, local.z) > 1e-4  # a window has no other side
+        active &= ~glazed | facing
+        glazed &= facing
+        glass_cosine = dr.select(glazed & ~outdoors, local.z, 0.0)
+        density = _density(room, sky, cosine, direction, t, glass_cosine)
+        beta *= dr.select(diffuse & ~outdoors, cosine / dr.maximum(density, 1e-12), 1.0)
+        point = mi.Point3f(origin + direction * t)
+
+        # ----- Windows: the sun scattered in them, and where the path goes on -----
+        u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
+        towards = _on_disc(sky, u_sun)
+        scattered, straight, next_direction, next_beta = _at_window(
+            room, group, direction, towards, generator, glazed
+        )
+        sun_in_view = dr.dot(direction, sky.sun) > float(np.cos(SUN_RADIUS))
+        seen_sun = dr.select(glazed & camera & sun_in_view, straight, 0.0)
+        sunlit = glazed & ((scattered > 0) | (seen_sun > 0)) & (sky.sun_radiance > 0)
+        before = mi.Point3f(point + room.inside.outward(group, glazed))
+        sun_ray = mi.Ray3f(before, dr.select(seen_sun > 0, direction, towards))
+        sunlit &= ~room.outside.scene.ray_test(sun_ray, coherent=False, active=sunlit)
+        from_sun = scattered * float(SUN_SOLID_ANGLE) + seen_sun
+        dr.scatter_add(result, mi.Float64(beta * from_sun * sky.sun_radiance), row, sunlit)
+
+        # ----- Surfaces: the sun on them, and a new direction -----
+        opaque = active & ~glazed
+        prim = dr.select(outdoors, hit_out.prim_index, hit_in.prim_index)
+        normal_in = dr.gather(mi.Vector3f, room.inside.normal, prim, opaque & ~outdoors)
+        normal_out = dr.gather(mi.Vector3f, room.outside.normal, prim, opaque & outdoors)
+        face = dr.select(outdoors, normal_out, normal_in)
+        face = dr.mulsign(face, -dr.dot(face, direction))
+        rho_in = dr.gather(mi.Float, room.inside.reflectance, prim, opaque & ~outdoors)
+        rho_out = dr.gather(mi.Float, room.outside.reflectance, prim, opaque & outdoors)
+        beta_face = beta * dr.select(outdoors, rho_out, rho_in) * dr.inv_pi
+        vertex = mi.Point3f(point + face * room.inside.epsilon)
+        sun = _sun_at(room, sky, vertex, face, outdoors, u_sun, opaque)
+        dr.scatter_add(result, mi.Float64(beta_face * sun), row, opaque)
+        away, aimed = _leave(room, sky, vertex, face, outdoors, generator, opaque)
+        cosine = dr.select(opaque, dr.dot(away, face), 0.0)
+        beta_face *= dr.select(outdoors, dr.pi, 1.0)  # outdoors the cosine cancels at once
+
+        # ----- Next ray -----
+        crossing = room.inside.to_local(group, next_direction, glazed).z
+        outward = glazed & (crossing > 0)
+        offset = room.inside.outward(group, glazed)
+        leaving = mi.Point3f(point + dr.select(outward, offset, -offset))
+        origin = dr.select(opaque, vertex, leaving)
+        direction = dr.select(opaque, away, next_direction)
+        beta = dr.select(opaque, beta_face, beta * next_beta)
+        diffuse = opaque & ~outdoors
+        active &= ~opaque | (cosine > 0)
+        outdoors = dr.select(glazed, outward, outdoors)
+        camera = mi.Bool(False)
+        depth += 1
+        survival = dr.select(depth > 4, dr.clip(beta * 3.0, 0.05, 0.95), 1.0)
+        active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
+        beta /= survival
+
+
+def point_in_time(
+    room: Room,
+    sky: Sky,
+    points: ArrayLike,
+    directions: ArrayLike,
+    *,
+    samples: int = 4096,
+    max_depth: int = 24,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Estimate:
+    """Illuminance (irradiance) at sensors [S] under one sky.
+
+    Paths from the sensors meet windows, whose BSDF sends them outdoors or back; the sun's disc is
+    looked for at every vertex and at every window, the sky is met.
+
+    Args:
+        points, directions: [S, 3] sensor positions [m] and normals.
+        samples: paths for each sensor in each batch.
+    """
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    S, n = len(points), int(samples)
+    place = mi.Point3f((points - room.inside.centre).T.astype(np.float32))
+    normals = mi.Vector3f(directions.T.astype(np.float32))
+
+    def batch(number: int) -> NDArray[np.float64]:
+        result = dr.zeros(mi.Float64, S)
+        count = dr.opaque(mi.UInt32, n)
+        path = dr.arange(mi.UInt32, S * n)
+        sensor = path // count
+        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        generator = path_generator(path, key)
+        origin = mi.Point3f(dr.gather(mi.Point3f, place, sensor))
+        normal = dr.gather(mi.Vector3f, normals, sensor)
+        indoors = mi.Bool(False)
+        u = mi.Point2f(generator.next_float32(), generator.next_float32())
+        sun = _sun_at(room, sky, origin, normal, indoors, u, mi.Bool(True))
+        dr.scatter_add(result, mi.Float64(sun), sensor)
+        away, aimed = _leave(room, sky, origin, normal, indoors, generator, mi.Bool(True))
+        cosine = dr.dot(away, normal)
+        depth = dr.opaque(mi.UInt32, max_depth)
+        _paths(
+            room, sky, result, sensor, origin, away, cosine, aimed, mi.Float(1), generator, depth,
+            cosine > 0,
+        )  # fmt: skip
+        return result.numpy() / n
+
+    return accumulate(batch, stopping=stopping, label="point in time", progress=progress)
+
+
+def point_in_time_picture(
+    room: Room,
+    sky: Sky,
+    view: View,
+    *,
+    samples: int = 64,
+    max_depth: int = 24,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> NDArray[np.float32]:
+    """Luminance (radiance) picture [ny, nx] under one sky; see `point_in_time`.
+
+    Args: samples: paths for each pixel, spread over it.
+    """
+    _, counts = pixel_directions(view)
+    shown = np.flatnonzero(counts.reshape(-1))
+    picture = np.zeros(view.height * view.width, dtype=np.float32)
+    eye = mi.Point3f(*map(float, np.asarray(view.position) - room.inside.centre))
+    rows = max(1, PIXEL_BLOCK // samples)
+    offsets = np.random.default_rng(seed).permuted(pixel_places(samples), axis=0)
+    for start in range(0, len(shown), rows):
+        pixels = np.repeat(shown[start : start + rows], samples)
+        dx, dy = np.tile(offsets, (len(pixels) // samples, 1)).T
+        x = (pixels % view.width + dx) / view.width
+        y = 1.0 - (pixels // view.width + dy) / view.height
+        directions, exists = rays(view, x, y)
+        count = len(pixels) // samples
+        result = dr.zeros(mi.Float64, count)
+        path = dr.arange(mi.UInt32, len(pixels))
+        sample = path % samples
+        number = mi.UInt32(pixels.astype(np.uint32)) * samples + sample
+        generator = path_generator(number, dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
+        ray = mi.Vector3f(directions.T.astype(np.float32))
+        depth, aimed = dr.opaque(mi.UInt32, max_depth), mi.Bool(False)
+        _paths(
+            room, sky, result, path // samples, eye, ray, mi.Float(0), aimed, mi.Float(1),
+            generator, depth, mi.Bool(exists),
+        )  # fmt: skip
+        picture[shown[start : start + rows]] = result.numpy() / samples
+        progress("picture", min(1.0, (start + count) / len(shown)))
+    return picture.reshape(view.height, view.width)

@@ -1,0 +1,175 @@
+"""Triangles, reflectances and windows as one Mitsuba mesh with tables that kernels gather from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
+
+OPAQUE = -1  # window index of a triangle that is not glazed
+
+
+class TracedScene:
+    """A Mitsuba scene of opaque triangles and window apertures, in coordinates about its centre.
+
+    To a view path windows are black: what arrives there is counted and the path ends.  One mesh
+    holds all: the triangle number of a hit gathers the normal, the reflectance and the window.
+    """
+
+    def __init__(
+        self,
+        surfaces: Surfaces,
+        groups: Sequence[WindowGroup] = (),
+        *,
+        windows_block: bool = True,
+        window_reflectance: ArrayLike | None = None,
+        centre: ArrayLike | None = None,
+    ) -> None:
+        """Build the scene.
+
+        Args:
+            windows_block: if false, a ray passes through the windows.
+            window_reflectance: [G] diffuse, of the windows from the room; 0 by default.
+            centre: [3] origin of the scene's coordinates; the middle of the windows by default.
+        """
+        windows = [(g, window) for g, group in enumerate(groups) for window in group.windows]
+        if not windows and centre is None:
+            raise ValueError("a scene needs a window group or a centre")
+        glazed = np.concatenate([np.empty((0, 3, 3)), *(w.triangles for _, w in windows)])
+        glazed_group = np.concatenate([np.full(len(w.triangles), g) for g, w in windows] or [[]])
+        keep = triangle_areas(surfaces.triangles) > 1e-10  # [m2] slivers have no normal
+
+        self.groups = tuple(groups)
+        self.centre = glazed.mean(axis=(0, 1)) if centre is None else np.asarray(centre, float)
+        self.surface_count = int(surfaces.surface.max()) + 1 if len(surfaces.surface) else 0
+        if window_reflectance is None:
+            window_reflectance = np.zeros(len(groups))
+        glazed_reflectance = np.asarray(window_reflectance, float)[glazed_group.astype(int)]
+        blocking = slice(None) if windows_block else slice(0)
+        self._load_mesh(
+            surfaces, keep, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
+        )
+        if windows:
+            self._load_windows(glazed, glazed_group)
+
+    def _load_mesh(
+        self,
+        surfaces: Surfaces,
+        keep: NDArray[np.bool_],
+        glazed: NDArray[np.float64],
+        glazed_group: NDArray[np.int64],
+        glazed_reflectance: NDArray[np.float64],
+    ) -> None:
+        """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
+        opaque = Surfaces(
+            surfaces.triangles[keep], surfaces.reflectance[keep], surfaces.surface[keep]
+        )
+        if not len(opaque.triangles) + len(glazed):
+            opaque = _speck(self.centre)
+        triangles = np.concatenate([opaque.triangles, glazed]) - self.centre
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        reflectance = np.concatenate([opaque.reflectance, glazed_reflectance])
+        surface = np.concatenate([opaque.surface, np.zeros(len(glazed))])
+        no_group = np.full(len(opaque.triangles), OPAQUE)
+        group = np.concatenate([no_group, glazed_group])
+
+        self.normal = mi.Vector3f(normals.T.astype(np.float32))
+        self.reflectance = mi.Float(reflectance.astype(np.float32))
+        self.surface = mi.UInt32(surface.astype(np.uint32))
+        self.group = mi.Int32(group.astype(np.int32))
+        self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(triangles)})
+        # Offset along the normal that keeps a ray clear of the face it starts on [m]
+        self.epsilon = 2e-5 * max(1.0, 0.05 * float(np.abs(triangles).max()))
+
+    def _load_windows(self, glazed: NDArray[np.float64], glazed_group: NDArray[np.int64]) -> None:
+        """Tables by glazed triangle and by group, to sample points on the windows."""
+        groups, window_group = self.groups, glazed_group
+        areas = triangle_areas(glazed)
+        self.window_area = float(areas.sum())
+        self.window_triangles = len(glazed)
+        self._glazed_vertices = [
+            mi.Point3f((glazed[:, i] - self.centre).T.astype(np.float32)) for i in range(3)
+        ]
+        self._glazed_group = mi.Int32(window_group.astype(np.int32))
+        self._glazed = mi.DiscreteDistribution(mi.Float(areas.astype(np.float32)))
+        frames = np.stack([g.frame for g in groups])  # [G, 3, 3]
+        self._frame_rows = [mi.Vector3f(frames[:, i].T.astype(np.float32)) for i in range(3)]
+        self._group_first = np.searchsorted(window_group, np.arange(len(groups)))
+        self._group_choice = [
+            mi.DiscreteDistribution(mi.Float(areas[window_group == g].astype(np.float32)))
+            for g in range(len(groups))
+        ]
+
+    def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
+        """A point uniform over the area of all windows, and the group it lies in."""
+        triangle, reused = self._glazed.sample_reuse(u.x, active)
+        return self._point(triangle, mi.Point2f(reused, u.y), active), dr.gather(
+            mi.Int32, self._glazed_group, triangle, active
+        )
+
+    def sample_group(self, group: int, u: mi.Point2f) -> mi.Point3f:
+        """A point uniform over the area of one group's windows."""
+        triangle, reused = self._group_choice[group].sample_reuse(u.x)
+        return self._point(
+            triangle + int(self._group_first[group]), mi.Point2f(reused, u.y), mi.Bool(True)
+        )
+
+    def window_triangle(
+        self, triangle: mi.UInt32, origin: mi.Point3f
+    ) -> tuple[mi.Int32, tuple[mi.Vector3f, ...]]:
+        """The group of a window's triangle, and its corners from `origin` in the group's frame."""
+        group = dr.gather(mi.Int32, self._glazed_group, triangle)
+        corners = (dr.gather(mi.Point3f, v, triangle) - origin for v in self._glazed_vertices)
+        return group, tuple(self.to_local(group, corner, mi.Bool(True)) for corner in corners)
+
+    def _point(self, triangle: mi.UInt32, u: mi.Point2f, active: mi.Bool) -> mi.Point3f:
+        a, b, c = (dr.gather(mi.Point3f, v, triangle, active) for v in self._glazed_vertices)
+        root = dr.sqrt(dr.maximum(1 - u.x, 0))
+        return a * (1 - root) + b * (root * (1 - u.y)) + c * (root * u.y)
+
+    def to_local(self, group: mi.Int32, v: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
+        """World vector in the frame of a window group (z is the exterior normal)."""
+        x, y, z = (dr.gather(mi.Vector3f, row, group, active) for row in self._frame_rows)
+        return mi.Vector3f(dr.dot(x, v), dr.dot(y, v), dr.dot(z, v))
+
+    def to_group(self, group: int, v: mi.Vector3f) -> mi.Vector3f:
+        """World vector in the frame of one window group."""
+        x, y, z = (mi.Vector3f(*map(float, row)) for row in self.groups[group].frame)
+        return mi.Vector3f(dr.dot(x, v), dr.dot(y, v), dr.dot(z, v))
+
+    def outward(self, group: mi.Int32, active: mi.Bool) -> mi.Vector3f:
+        """A step off a window towards outdoors that keeps a ray clear of its pane."""
+        return dr.gather(mi.Vector3f, self._frame_rows[2], group, active) * self.epsilon
+
+    def to_world_any(self, group: mi.Int32, v: mi.Vector3f) -> mi.Vector3f:
+        """Vector in the frame of each lane's window group to world axes."""
+        x, y, z = (dr.gather(mi.Vector3f, row, group) for row in self._frame_rows)
+        return x * v.x + y * v.y + z * v.z
+
+    def to_world(self, group: int, v: mi.Vector3f) -> mi.Vector3f:
+        """Vector in the frame of one window group to world axes."""
+        x, y, z = (mi.Vector3f(*map(float, row)) for row in self.groups[group].frame)
+        return x * v.x + y * v.y + z * v.z
+
+
+def _mesh(triangles: NDArray[np.float64]) -> mi.Mesh:
+    """One Mitsuba mesh of triangles [N, 3, 3] without shared vertices."""
+    n = len(triangles)
+    mesh = mi.Mesh("surfaces", vertex_count=3 * n, face_count=n)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = mi.Float(triangles.reshape(-1).astype(np.float32))
+    parameters["faces"] = mi.UInt32(np.arange(3 * n, dtype=np.uint32))
+    parameters.update()
+    return mesh
+
+
+def _speck(centre: NDArray[np.float64]) -> Surfaces:
+    """A black triangle of a square millimetre far below: tables and scenes must not be empty."""
+    corners = 1e-3 * np.eye(3) + centre - [0, 0, 1e3]
+    return Surfaces(corners[None], np.zeros(1), np.zeros(1, dtype=np.int64))

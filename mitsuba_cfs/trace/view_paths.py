@@ -1,0 +1,104 @@
+"""Random walks of view rays through a room, counted where they meet the windows' patches."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+
+ROULETTE = 1.0  # a path survives a bounce with so many times the share of light it carries
+
+
+@dr.syntax
+def add_view_paths(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    matrix: mi.Float64,  # [paths rows * G * K], accumulated in place
+    row: mi.UInt32,  # row of the matrix that each path adds to
+    position: mi.Point3f,  # where the path starts
+    normal: mi.Vector3f,  # direction that the irradiance is measured about
+    beta: mi.Float,  # weight of the irradiance at the start
+    sample: mi.UInt32,  # number of the path in its stream
+    stream: mi.UInt32,  # key of the stratified stream
+    generator: mi.PCG32,
+    max_depth: mi.UInt32,
+    active: mi.Bool,
+    carried: mi.Float | None = None,
+) -> None:
+    """Add beta * d(irradiance at the start) / d(radiance of each patch) to the matrix.
+
+    E(x) = integral of the windows' cosine + sum over the first hits of rho E(hit).  The windows
+    are sampled by area and by cosine, joined with the balance heuristic.
+
+    Args:
+        carried: share of light that Russian roulette starts with; without it roulette starts late.
+    """
+    K = mi.UInt32(bins.size)
+    width = mi.UInt32(bins.size * len(tracer.groups))
+    depth = mi.UInt32(0)  # bounces so far
+    early = carried is not None
+    carried = mi.Float(1.0 if carried is None else carried)  # product of reflectances so far
+    while active:
+        u_window = mi.Point2f(generator.next_float32(), generator.next_float32())
+        u_bounce = mi.Point2f(generator.next_float32(), generator.next_float32())
+        if depth == 0:
+            u_window = lattice_2d(sample, stream, 0)
+            u_bounce = lattice_2d(sample, stream, 2)
+        elif depth == 1:
+            u_window = lattice_2d(sample, stream, 4)
+
+        # ----- Next event: a point on the windows -----
+        target, group = tracer.sample_window(u_window, active)
+        to_window = target - position
+        distance2 = dr.squared_norm(to_window)
+        distance = dr.sqrt(distance2)
+        omega = to_window / distance
+        local = tracer.to_local(group, omega, active)
+        cos_start = dr.dot(normal, omega)
+        visible = active & (cos_start > 0) & (local.z > 1e-4)
+        shadow = mi.Ray3f(position, omega, distance * (1 - 1e-4), 0.0, [])
+        visible &= ~tracer.scene.ray_test(shadow, coherent=False, active=visible)
+        density_area = distance2 / (tracer.window_area * local.z)
+        value = cos_start / (density_area + cos_start * dr.inv_pi)
+        slot = row * width + mi.UInt32(group) * K + bins.index(local)
+        dr.scatter_add(matrix, mi.Float64(beta * value), slot, visible)
+
+        # ----- Next direction: cosine about the normal -----
+        frame = mi.Frame3f(normal)
+        local_out = mi.warp.square_to_cosine_hemisphere(u_bounce)
+        direction = frame.to_world(local_out)
+        ray = mi.Ray3f(position, direction)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        active &= hit.is_valid()
+        group_hit = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
+
+        # ----- The cosine sample found a window: the other half of the heuristic -----
+        glazed = active & (group_hit != OPAQUE)
+        local = tracer.to_local(group_hit, direction, glazed)
+        glazed &= local.z > 1e-4
+        cos_start = local_out.z
+        density_area = hit.t * hit.t / (tracer.window_area * local.z)
+        value = cos_start / (density_area + cos_start * dr.inv_pi)
+        slot = row * width + mi.UInt32(group_hit) * K + bins.index(local)
+        dr.scatter_add(matrix, mi.Float64(beta * value), slot, glazed)
+
+        # ----- Bounce: E(x) gains rho E(hit); Russian roulette -----
+        active &= group_hit == OPAQUE
+        face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
+        face = dr.mulsign(face, -dr.dot(face, direction))
+        position = mi.Point3f(position + direction * hit.t + face * tracer.epsilon)
+        normal = face
+        rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)
+        beta *= rho
+        carried *= rho
+        depth += 1
+        if dr.hint(early, mode="scalar"):
+            survival = dr.minimum(carried * ROULETTE, 1.0)
+        else:
+            survival = dr.select(depth > 3, dr.minimum(beta * 2.0, 0.95), 1.0)
+        active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
+        beta /= dr.maximum(survival, 1e-6)
+        carried /= dr.maximum(survival, 1e-6)

@@ -1,0 +1,161 @@
+"""Choose and activate the Mitsuba variant: CUDA where there is a GPU, else LLVM, else scalar.
+
+Mitsuba and Dr.Jit are imported inside the functions, after the LLVM library has been chosen.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from mitsuba_cfs import llvm
+from mitsuba_cfs.errors import VariantError
+
+CUDA, LLVM, SCALAR = "cuda_ad_mono", "llvm_ad_mono", "scalar_rgb"
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A Mitsuba variant and why it was chosen."""
+
+    variant: str
+    reason: str
+
+
+def activate(preferred: str | None = None, *, vectorised: bool = True) -> str:
+    """The name of the Mitsuba variant, now active; quick, and harmless when called again.
+
+    Without a preference the variant that is active already stays; else CUDA where a GPU is
+    usable, else LLVM.
+
+    Args:
+        preferred: a Mitsuba variant that must be used, such as `llvm_ad_rgb`.
+        vectorised: whether Dr.Jit arrays are needed (every matrix is). If not, the scalar
+            variant is taken, with a warning, where there is neither a GPU nor an LLVM library.
+
+    Raises:
+        VariantError: no usable variant; the message says what to install.
+    """
+    mi = _tracer("mitsuba")
+    current = mi.variant()
+    if current and preferred in (None, current) and not (vectorised and _is_scalar(current)):
+        return current
+    variant = _checked(preferred) if preferred else choose(vectorised=vectorised).variant
+    if _is_scalar(variant):
+        log.warning("tracing without LLVM or CUDA (%s) is slow: %s", variant, llvm.INSTALL_HINT)
+    try:
+        mi.set_variant(variant)
+    except ImportError as error:
+        raise VariantError(f"{variant}: {error}; {llvm.INSTALL_HINT}") from error
+    return variant
+
+
+def choose(*, vectorised: bool = True) -> Choice:
+    """The variant that suits this machine, with the reason; activates nothing."""
+    gpu_fault = cuda_fault()
+    if gpu_fault is None:
+        return Choice(CUDA, "a GPU is usable")
+    library_fault = llvm_fault()
+    if library_fault is None:
+        return Choice(LLVM, f"{gpu_fault}; LLVM at {llvm.select_library()}")
+    if vectorised:
+        raise VariantError(f"{gpu_fault} and {library_fault}: {llvm.INSTALL_HINT}")
+    return Choice(SCALAR, f"{gpu_fault} and {library_fault}")
+
+
+def register(callback: Callable[[str], None]) -> None:
+    """Call `callback(variant)` now if a variant is active, and again whenever it changes.
+
+    Mitsuba keeps plugins per variant: a module that defines one registers it in such a callback.
+    """
+    mi = _tracer("mitsuba")
+
+    def changed(old: str | None, new: str) -> None:
+        callback(new)
+
+    mi.detail.add_variant_callback(changed)
+    if mi.variant():
+        callback(mi.variant())
+
+
+def cuda_fault() -> str | None:
+    """What keeps this machine from tracing on a GPU; None if nothing does."""
+    windows = sys.platform == "win32"
+    driver = os.environ.get("DRJIT_LIBCUDA_PATH", "nvcuda.dll" if windows else "libcuda.so.1")
+    if not _loads(driver):  # asked first: Dr.Jit starts LLVM too, and complains if it cannot
+        return "no NVIDIA GPU"
+    dr = _tracer("drjit")
+    if not dr.has_backend(dr.JitBackend.CUDA):
+        return "no usable NVIDIA GPU"
+    optix = os.environ.get("DRJIT_LIBOPTIX_PATH", "nvoptix.dll" if windows else "libnvoptix.so.1")
+    return None if _loads(optix) else f"the GPU's driver has no OptiX ({optix})"
+
+
+def llvm_fault() -> str | None:
+    """What keeps this machine from tracing with LLVM; None if nothing does."""
+    dr = _tracer("drjit")  # raises where Dr.Jit itself cannot be loaded
+    library = llvm.select_library()
+    if library is None:
+        rejected = [f"{found.path}: {found.reason}" for found in llvm.candidates()]
+        return "; ".join(["no usable LLVM library", *rejected[:2]])
+    if not _exists(library):
+        return f"{llvm.VARIABLE}={library} is no such file"
+    if not dr.has_backend(dr.JitBackend.LLVM):
+        return f"Dr.Jit cannot load the LLVM library {library}"
+    return None
+
+
+def _tracer(name: str) -> ModuleType:
+    """The module `mitsuba` or `drjit`, imported after the LLVM library has been chosen.
+
+    Even asking Dr.Jit about CUDA makes it load LLVM.
+    """
+    llvm.select_library()
+    try:
+        return import_module(name)
+    except (ImportError, NameError) as error:  # drjit 1.5 hides the first behind the second
+        cause = error.__context__ or error
+        hint = "apt-get install libatomic1" if "libatomic" in str(cause) else "install it again"
+        raise VariantError(f"{name} cannot be loaded: {cause}: {hint}") from error
+
+
+def _loads(library: str) -> bool:
+    """Whether the system's linker finds and loads a library of the GPU's driver."""
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def _exists(library: Path) -> bool:
+    """A bare file name is left to the system's linker."""
+    return library.name == str(library) or library.is_file()
+
+
+def _checked(variant: str) -> str:
+    mi = _tracer("mitsuba")
+    if variant not in mi.variants():
+        raise VariantError(f"no variant {variant!r} in this Mitsuba: {', '.join(mi.variants())}")
+    fault = None
+    if variant.startswith("cuda"):
+        fault = cuda_fault()
+    elif variant.startswith("llvm"):
+        fault = llvm_fault()
+    if fault is None:
+        return variant
+    hint = llvm.INSTALL_HINT if variant.startswith("llvm") else "use the LLVM variant instead"
+    raise VariantError(f"{variant}: {fault}; {hint}")
+
+
+def _is_scalar(variant: str) -> bool:
+    return variant.startswith("scalar")

@@ -1,0 +1,1 @@
+"""The command line, studies and reports built on mitsuba_cfs, bim and thermal."""

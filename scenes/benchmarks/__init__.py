@@ -1,0 +1,1 @@
+"""Speed against peers: time to the same result on the same machine, as ratios."""

@@ -1,0 +1,134 @@
+"""What `cfs bsdf generate` makes of its options: a traced layer as a BSDF file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import numpy as np
+
+from mitsuba_cfs.bsdf import klems
+from mitsuba_cfs.bsdf.blinds import venetian_blind, vertical_louvre
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, plastic
+from mitsuba_cfs.bsdf.radiance_geometry import read_radiance_layer
+from mitsuba_cfs.bsdf.screens import (
+    perforated_screen,
+    pleated_shade,
+    prism_panel,
+    woven_screen,
+)
+from mitsuba_cfs.progress import Progress, silent
+
+BASES = {"full": klems.KLEMS_FULL, "half": klems.KLEMS_HALF, "quarter": klems.KLEMS_QUARTER}
+
+
+def generated_file(
+    *,
+    basis: str,
+    tensor_tree: int | None,
+    isotropic: bool,
+    cull: float,
+    paths: int,
+    seed: int,
+    name: str,
+    progress: Progress = silent,
+    **options,
+) -> tuple[BsdfFile, str]:
+    """The layer's BSDF file (Visible and Solar), and how exact it is in words."""
+    from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
+
+    layer = described_layer(**options)
+    if tensor_tree is None:
+        result = generate_klems(layer, BASES[basis], samples=paths, seed=seed, progress=progress)
+        systems, area = result.bsdf, BASES[basis].projected_solid_angles()[:, None]
+        worst = max(
+            float(np.sqrt(((area * block) ** 2).sum(axis=0)).max())
+            for error in result.error
+            for block in error.blocks().values()
+        )
+        exact = f"hemispherical values within {worst:.1e} (one standard error, worst)"
+    else:
+        systems, bound = generate_tensor_tree(
+            layer,
+            tensor_tree,
+            rank=3 if isotropic else 4,
+            samples=paths,
+            cull=cull,
+            seed=seed,
+            progress=progress,
+        )
+        leaves = sum(len(tree.values) for tree in systems[0].blocks().values())
+        exact = f"{leaves} leaves, merged within {100 * bound:.0f} % and three standard errors"
+    bands = dict(zip(("Visible", "Solar"), systems, strict=True))
+    return BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness), exact
+
+
+def described_layer(
+    *,
+    shape: str,
+    geometry: Path | None,
+    period_mm: tuple[float, float] | None,
+    depth_mm: float | None,
+    spacing_mm: float | None,
+    openness: float | None,
+    tilt_deg: float,
+    radius_mm: float | None,
+    thickness_mm: float,
+    index: float | None,
+    visible: float | None,
+    solar: float | None,
+    specular: float,
+    roughness: float,
+) -> PeriodicLayer:
+    """The layer that the options of the command line describe, in two channels."""
+    if shape == "radiance":
+        _needed(shape, geometry=geometry, period_mm=period_mm)
+        layer = read_radiance_layer(geometry, (period_mm[0] / 1000, period_mm[1] / 1000))
+        return replace(layer, materials=tuple(_grey_twice(sheet) for sheet in layer.materials))
+    if shape == "prism":
+        _needed(shape, spacing_mm=spacing_mm, index=index)
+        return prism_panel(
+            index,
+            pitch=spacing_mm / 1000,
+            angle=np.radians(tilt_deg),
+            thickness=max(thickness_mm, 0.1) / 1000,
+            channels=2,
+        )
+    _needed(shape, spacing_mm=spacing_mm, visible=visible)
+    colour = (visible, visible if solar is None else solar)
+    sheet = plastic("sheet", *colour, specular=specular, roughness=roughness)
+    spacing, thickness = spacing_mm / 1000, thickness_mm / 1000
+    if shape in ("perforated", "woven"):
+        _needed(shape, openness=openness)
+        make = perforated_screen if shape == "perforated" else woven_screen
+        return make(sheet, spacing=spacing, openness=openness, thickness=thickness)
+    _needed(shape, depth_mm=depth_mm)
+    if shape == "pleated":
+        return pleated_shade(sheet, depth=depth_mm / 1000, spacing=spacing)
+    make = venetian_blind if shape == "venetian" else vertical_louvre
+    return make(
+        sheet,
+        depth=depth_mm / 1000,
+        spacing=spacing,
+        tilt=np.radians(tilt_deg),
+        radius=np.inf if radius_mm is None else radius_mm / 1000,
+        thickness=thickness,
+    )
+
+
+def _needed(shape: str, **values: object) -> None:
+    for name, value in values.items():
+        if value is None:
+            raise click.UsageError(f"--shape {shape} needs --{name.replace('_', '-')}")
+
+
+def _grey_twice(sheet: SlatMaterial) -> SlatMaterial:
+    """Visible and solar of a Radiance colour: both its luminance."""
+    weights = (0.265, 0.670, 0.065)  # of Radiance's red, green and blue
+    front, back = (
+        (float(np.dot(weights, colour)),) * 2
+        for colour in (sheet.reflectance_front, sheet.reflectance_back)
+    )
+    return replace(sheet, reflectance_front=front, reflectance_back=back)

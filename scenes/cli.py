@@ -1,0 +1,146 @@
+"""The console command `cfs`: its subcommands, loaded when called, and its errors, one line each."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module, metadata
+from importlib.util import find_spec
+
+import click
+
+# name: help in one line. The module scenes.commands.<name> defines `command`.
+COMMANDS = {
+    "run": "IFC, weather and fenestration to daylight, glare, heat and comfort.",
+    "demo": "The whole job on the office that comes with the program.",
+    "doctor": "Versions, the variant that traces the rays, and a self-test.",
+    "ifc": "What an IFC file holds, and what is wrong with it.",
+    "bsdf": "Read, check, plot and make BSDF files.",
+    "sky": "Sun positions and sky matrices of a weather file.",
+    "glare": "Glare indices of a fisheye luminance image.",
+    "thermal": "Gains, temperatures and comfort of a room, hour by hour.",
+    "study": "Many variants from one study file.",
+    "calibrate": "What each method costs on this machine.",
+    "bench": "Accuracy and speed against other programs, on this machine.",
+}
+USAGE, FAILED, INTERRUPTED = 2, 1, 130
+
+
+class LazyGroup(click.Group):
+    """A group that imports a subcommand's module only when that subcommand is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The subcommands whose module is there, in the order of the table."""
+        return [name for name in COMMANDS if find_spec(f"scenes.commands.{name}")]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The subcommand, imported now; None if there is no such one."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        return import_module(f"scenes.commands.{cmd_name}").command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the subcommands by the table, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name]) for name in self.list_commands(ctx)])
+
+
+class _StderrHandler(logging.Handler):
+    """Writes to the stderr of the moment, which a progress bar may have redirected."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        click.echo(f"{record.levelname.lower()}: {self.format(record)}", err=True)
+
+
+def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
+    if wanted and not ctx.resilient_parsing:
+        click.echo(f"cfs {metadata.version('mitsuba-cfs')}")
+        ctx.exit()
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.option("-v", "--verbose", count=True, help="Say more: -v what is done, -vv everything.")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
+    help="Print the version.",
+)  # fmt: skip
+def cfs(verbose: int) -> None:
+    """Daylight, glare, temperatures and comfort behind complex fenestration systems."""
+    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
+    logging.basicConfig(level=level, format="%(message)s", handlers=[_StderrHandler()], force=True)
+    for noisy in ("matplotlib", "numba", "h5py", "PIL"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run `cfs` and exit: 0 done, 1 a problem with the input, 2 wrong usage, 130 interrupted.
+
+    A problem gives one line on stderr; with CFS_DEBUG=1 also its traceback.
+    """
+    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """The exit code of `cfs` with these arguments."""
+    try:
+        result = cfs.main(list(arguments), prog_name="cfs", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return USAGE
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.EPIPE:
+            sys.stdout = open(os.devnull, "w")  # `cfs ... | head`: nobody reads on
+            return FAILED
+        line = _user_line(error)
+        if line is None or os.environ.get("CFS_DEBUG") == "1":
+            raise
+        click.echo(line, err=True)
+        return USAGE if isinstance(error, click.UsageError) else FAILED
+
+
+def _user_line(error: Exception) -> str | None:
+    """The one line that tells the user what is wrong; None for a fault of the program's own."""
+    from mitsuba_cfs.errors import CfsError
+    from thermal.errors import ThermalInputError
+
+    if isinstance(error, click.UsageError):
+        path = error.ctx.command_path if error.ctx else "cfs"
+        return _one_line(f"{path}: {error.format_message()} (see {path} --help)")
+    if isinstance(error, click.ClickException):
+        return _one_line(f"error: {error.format_message()}")
+    if isinstance(error, (CfsError, ThermalInputError)):
+        return _one_line(f"error: {error}")
+    if isinstance(error, OSError) and error.filename is not None:
+        return _one_line(f"error: {error.filename}: {error.strerror or error}")
+    if isinstance(error, MemoryError):
+        return "error: out of memory"
+    if type(error).__module__.startswith("pydantic"):
+        return _validation_line(error)
+    return None
+
+
+def _validation_line(error: Exception) -> str | None:
+    """The first fault that pydantic found, with its field, and how many more there are."""
+    from pydantic import ValidationError
+
+    if not isinstance(error, ValidationError):
+        return None
+    first, *others = error.errors(include_url=False)
+    field = ".".join(str(part) for part in first["loc"])
+    more = f" (and {len(others)} more)" if others else ""
+    return _one_line(f"error: {error.title}: {field}: {first['msg']}{more}")
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,1 @@
+"""Subcommands of the `cfs` command line, one module each."""

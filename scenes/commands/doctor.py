@@ -1,0 +1,117 @@
+"""`cfs doctor`: what is installed, what traces the rays, and whether that works."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from importlib import metadata
+
+import click
+
+from mitsuba_cfs import llvm
+
+REQUIRED = (
+    "mitsuba-cfs", "mitsuba", "drjit", "numpy", "scipy", "pandas", "pvlib", "ifcopenshell",
+    "trimesh", "manifold3d", "shapely", "colour-science", "pythermalcomfort", "numba",
+    "matplotlib", "plotly",
+)  # fmt: skip
+PEERS = {
+    "pyradiance": "Radiance",
+    "pyenergyplus-lbnl": "EnergyPlus",
+    "pywincalc": "WINDOW",
+    "frads": "frads",
+}
+TIME_LIMIT = 120  # seconds for the self-test; it takes two
+
+
+@click.command()
+def command() -> None:
+    """Print versions, the variant chosen and why, LLVM libraries, peers, and run a self-test."""
+    _print_versions()
+    _print_llvm()
+    _print_gpus()
+    _print_peers()
+    fault = self_test()
+    if fault:
+        raise click.ClickException(fault)
+
+
+def self_test() -> str | None:
+    """Run the self-test in a process of its own; print its result, or return what went wrong."""
+    command_line = [sys.executable, "-m", "scenes.commands.self_test"]
+    try:
+        done = subprocess.run(
+            command_line, capture_output=True, text=True, timeout=TIME_LIMIT, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return f"self-test: no result after {TIME_LIMIT} s"
+    if done.returncode != 0:
+        return f"self-test: {_cause(done.returncode, done.stderr)}; {llvm.INSTALL_HINT}"
+    found = json.loads(done.stdout.splitlines()[-1])
+    click.echo(f"{'variant':<16} {found['variant']} ({found['reason']})")
+    if found["variant"].startswith("scalar"):
+        click.echo(f"{'warning':<16} only slow single images work: {llvm.INSTALL_HINT}")
+    traced = f"{found['rays']} rays: view factor {found['traced']:.5f}"
+    click.echo(
+        f"{'self-test':<16} {'passed' if found['agrees'] else 'FAILED'}: {traced}, "
+        f"closed form {found['expected']:.5f}, {found['seconds']:.1f} s"
+    )
+    return None if found["agrees"] else "self-test: the traced rays miss the closed form"
+
+
+def _cause(code: int, stderr: str) -> str:
+    """One line on why the self-test's process ended."""
+    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
+    telling = [line for line in lines if "LLVM ERROR" in line or "Cannot select" in line]
+    last = (telling or lines or ["no message"])[-1 if not telling else 0]
+    last = last.removeprefix("mitsuba_cfs.errors.VariantError: ")
+    return f"aborted by signal {-code}: {last}" if code < 0 else last
+
+
+def _print_versions() -> None:
+    click.echo(f"{'python':<16} {platform.python_version()} on {platform.platform()}")
+    for name in REQUIRED:
+        click.echo(f"{name:<16} {_version(name) or 'MISSING'}")
+
+
+def _print_llvm() -> None:
+    own = os.environ.get(llvm.VARIABLE)
+    if own:
+        click.echo(f"{'LLVM':<16} {own} (set by you in {llvm.VARIABLE})")
+    chosen = own
+    for found in llvm.candidates():
+        mark = found.reason if found.usable else f"rejected: {found.reason}"
+        if found.usable and not chosen:
+            mark, chosen = "chosen", str(found.path)
+        click.echo(f"LLVM {found.version_text:<11} {found.path} ({mark})")
+    if not chosen:
+        click.echo(f"{'LLVM':<16} none usable: {llvm.INSTALL_HINT}")
+
+
+def _print_gpus() -> None:
+    tool = shutil.which("nvidia-smi")
+    query = ["--query-gpu=name,driver_version,memory.total", "--format=csv,noheader"]
+    lines: list[str] = []
+    if tool:
+        done = subprocess.run([tool, *query], capture_output=True, text=True, check=False)
+        lines = done.stdout.splitlines() if done.returncode == 0 else []
+    for line in lines or ["none"]:
+        click.echo(f"{'GPU':<16} {line}")
+
+
+def _print_peers() -> None:
+    for package, program in PEERS.items():
+        version = _version(package)
+        hint = "not installed (pip install 'mitsuba-cfs[peers]')"
+        click.echo(f"{'peer':<16} {program}: {f'{package} {version}' if version else hint}")
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None

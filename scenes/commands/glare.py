@@ -1,0 +1,265 @@
+"""`cfs glare`: glare of luminance pictures, with evalglare's flags and its printed lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import numpy as np
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare import areas, report
+from mitsuba_cfs.glare.classes import glare_class
+from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
+from mitsuba_cfs.glare.field_of_view import seen
+from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
+from mitsuba_cfs.images.hdr import Picture, read_hdr, write_hdr
+from mitsuba_cfs.images.view import View
+from scenes.commands import glare_flags
+from scenes.commands.glare_flags import Request
+
+SUFFIXES = {".hdr", ".pic"}
+CUTS = {1: "total", 2: "both eyes"}
+VERSION = "cfs glare, after evalglare 3.06"
+
+
+class FlagCommand(click.Command):
+    """A command whose own words are evalglare's, which click cannot take apart."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The table of flags."""
+        formatter.write("\nFlags (as evalglare's where it has them):\n" + glare_flags.help_text())
+        formatter.write("\n")
+
+
+@click.command(
+    cls=FlagCommand,
+    context_settings={"ignore_unknown_options": True, "help_option_names": ["--help"]},
+)
+@click.argument(
+    "words", nargs=-1, type=click.UNPROCESSED, metavar="[FLAGS] PICTURE.hdr... FOLDER..."
+)
+def command(words: tuple[str, ...]) -> None:
+    """Daylight glare probability and other indices of fisheye luminance pictures.
+
+    Prints what evalglare prints for the same flags.  A folder stands for all its .hdr and .pic
+    files; with several pictures each one's lines follow its name and class.
+    """
+    request = glare_flags.parse(words)
+    if "-v" in request.given:
+        click.echo(VERSION)
+        return
+    options = glare_flags.options(request)
+    paths = pictures(request.paths or [Path("/dev/stdin")])
+    rows, geometry = [], None
+    for path in paths:
+        picture = read_hdr(path)
+        view = _view(picture, request, path)
+        if geometry is None or geometry.view != view:
+            geometry = GlareView(view)
+        row = _one(path, picture, geometry, options, request, several=len(paths) > 1)
+        if row is not None:
+            rows.append(row)
+    if (table := request.value("--csv")) is not None and rows:
+        _write_table(table, rows)
+
+
+def pictures(paths: list[Path]) -> list[Path]:
+    """The picture files that the paths stand for, folders as what is in them."""
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES)
+            if not inside:
+                raise DataError("no .hdr or .pic file in this folder", file=path)
+            found += inside
+        else:
+            found.append(path)
+    return found
+
+
+def _one(
+    path: Path,
+    picture: Picture,
+    geometry: GlareView,
+    options: GlareOptions,
+    request: Request,
+    *,
+    several: bool,
+) -> dict | None:
+    """Rate one picture and print it; its row of the table."""
+    luminance = picture.luminance
+    if "-I" in request.given:
+        luminance = filled(luminance, *request.given["-I"][1:])
+    try:
+        if (cut := request.value("-g")) is not None:
+            _write_cut(luminance, geometry, cut, request)
+            return None
+        result = evaluate(luminance, geometry, options=options)
+        lines = _lines(result, request)
+    except ValueError as error:
+        raise DataError(str(error), file=path) from None
+    if several:
+        click.echo(f"{path}: {glare_class(result.dgp)}")
+    for line in lines:
+        click.echo(line)
+    for notice in notices(result):
+        click.echo(f"Notice: {notice}", err=True)
+    _write_pictures(path, picture, result, request, several)
+    name = {"picture": str(path), "class": glare_class(result.dgp), "sources": result.count}
+    return name | report.detailed_figures(result) if "--csv" in request.given else None
+
+
+def _view(picture: Picture, request: Request, path: Path) -> View:
+    """The view of a picture: the command line's or its own; with what evalglare refuses."""
+    height, width = picture.pixels.shape[:2]
+    if picture.misplaced_exposure:
+        raise DataError(
+            "an EXPOSURE entry behind a tab: the pixels' exposure is unknown (after pcomb?)",
+            file=path,
+            field="EXPOSURE",
+        )
+    view = glare_flags.given_view(request, width, height) or picture.view
+    if view is None:
+        raise DataError(
+            "no valid view in its header: give one, for example -vta -vh 180 -vv 180",
+            file=path,
+            field="VIEW",
+        )
+    if view.kind == "parallel":
+        raise DataError("a parallel view has no glare: expected a fisheye", file=path, field="VIEW")
+    if view.kind == "perspective":
+        click.echo(f"warning: {path}: a perspective view in its header", err=True)
+        if black_corners(picture.luminance) > 0.7 and "-f" not in request.given:
+            raise DataError(
+                "black corners, but a perspective view: is it a fisheye? (-f goes on)",
+                file=path,
+                field="VIEW",
+            )
+    _warn_of_crop(view, request, path)
+    return view
+
+
+def _warn_of_crop(view: View, request: Request, path: Path) -> None:
+    """Say where a picture does not show the hemisphere, or shows it out of shape."""
+    across, along = view.horizontal_deg / view.width, view.vertical_deg / view.height
+    if view.kind in ("angular", "hemispherical") and abs(across / along - 1) > 0.02:
+        click.echo(
+            f"warning: {path}: {view.width} x {view.height} pixels for {view.horizontal_deg:g} x "
+            f"{view.vertical_deg:g} degrees: cropped without a change of its VIEW?",
+            err=True,
+        )
+    narrow = min(view.horizontal_deg, view.vertical_deg) < 180
+    if narrow and not {"-i", "-I"} & request.given.keys():
+        click.echo(
+            f"warning: {path}: it shows less than 180 degrees, so its illuminance is too low "
+            "(-i gives it)",
+            err=True,
+        )
+
+
+def black_corners(luminance: np.ndarray) -> float:
+    """Share of the pixels outside the inscribed circle that are below 7 cd/m2."""
+    ny, nx = luminance.shape
+    x, y = np.arange(nx) - nx // 2, np.arange(ny) - ny // 2
+    outside = np.hypot(x[None, :], y[:, None]) > (nx // 2 + ny // 2) / 2
+    return float(np.mean(luminance[outside] < 7.0)) if outside.any() else 0.0
+
+
+def filled(luminance: np.ndarray, highest: int, lowest: int) -> np.ndarray:
+    """A picture [ny, nx] cut above row `highest` and below `lowest` (from the bottom), filled up.
+
+    The last known row is repeated; the bottom row itself stays, as in evalglare.
+    """
+    upwards = luminance[::-1].copy()
+    if not 0 <= lowest < highest <= len(upwards):
+        raise click.UsageError(f"-I: rows {highest} and {lowest} of {len(upwards)}")
+    upwards[1 : lowest + 1] = upwards[lowest + 1]
+    upwards[highest:] = upwards[highest - 1]
+    return upwards[::-1]
+
+
+def _lines(result: GlareResult, request: Request) -> list[str]:
+    """What is printed of one picture."""
+    given, lines = request.given, []
+    if "-V" in given:
+        return [f"{result.Ev:f}"]
+    geometry, luminance = result.geometry, result.luminance
+    if "-B" in given:
+        area = areas.band(given["-B"][0], geometry)
+        lines.append(report.band_line(areas.statistics(luminance, area, geometry)))
+    if "-A" in given:
+        area = areas.mask_area(read_hdr(given["-A"][0]).luminance, geometry)
+        lines.append(report.mask_line(areas.statistics(luminance, area, geometry), result))
+    if result.options.zones is not None and ("-d" in given or "-A" in given):
+        zone = areas.zone_map(result.options.zones, geometry)
+        for number in (1, 2) if result.options.zones.outer is not None else (1,):
+            area = areas.statistics(luminance, zone == number, geometry)
+            lines.append(report.area_line(f"z{number}", area))
+    if "-d" in given or "-A" in given:
+        return lines + report.detailed_lines(result)
+    line = report.brief_line(result) if "-D" in given else report.short_line(result)
+    return [*lines, line]
+
+
+def notices(result: GlareResult) -> list[str]:
+    """Where an index is outside the range that it was made for."""
+    found = []
+    if result.Ev < 100:
+        found.append("the vertical illuminance is below 100 lx")
+    if result.dgp <= 0.2:
+        found.append("a dark scene: DGP is at most 0.2 and might underestimate glare sources")
+    if result.Ev < 380:
+        found.append("a dark scene: below 380 lx DGP might underestimate glare sources")
+    return found
+
+
+def _write_cut(luminance, geometry: GlareView, cut: int, request: Request) -> None:
+    """The picture with its field of view cut, for -g."""
+    if cut not in CUTS or "-c" not in request.given:
+        raise click.UsageError("-g needs 1 or 2, and -c FILE for the picture")
+    inside = in_picture_order(seen(geometry, CUTS[cut]))
+    write_hdr(request.value("-c"), np.where(inside, luminance, 0.0), geometry.view)
+
+
+def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, several) -> None:
+    """The check picture of -c, and what --png asks for."""
+    if (check := request.value("-c")) is not None:
+        from scenes.pictures import check_radiance
+
+        target = check / f"{path.stem}_check.hdr" if several or check.is_dir() else check
+        if several:
+            check.mkdir(parents=True, exist_ok=True)
+        uniform, blue = request.given.get("-u"), "-T" in request.given
+        pixels = check_radiance(result, uniform, show_task=blue)
+        write_hdr(target, pixels, result.geometry.view, comments=(VERSION,))
+    if (folder := request.value("--png")) is not None:
+        _write_png(folder, path.stem, picture, result, request.given.get("--scale"))
+
+
+def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, limits) -> None:
+    from scenes import pictures as drawn
+
+    folder.mkdir(parents=True, exist_ok=True)
+    title = f"{name}   DGP {result.dgp:.3f} ({glare_class(result.dgp)}), E_v {result.Ev:,.0f} lx"
+    valid = in_picture_order(result.geometry.valid)
+    colour = picture.pixels if picture.colours == "rgb" else picture.luminance
+    drawn.write_falsecolour(
+        folder / f"{name}_falsecolour.png",
+        picture.luminance,
+        title=title,
+        seen=valid,
+        limits=limits,
+    )
+    drawn.write_tone_mapped(folder / f"{name}.png", np.where(valid[..., None], colour, 0.0)
+                            if colour.ndim == 3 else np.where(valid, colour, 0.0))  # fmt: skip
+    drawn.write_check_picture(folder / f"{name}_sources.png", result, title=title)
+
+
+def _write_table(path: Path, rows: list[dict]) -> None:
+    import pandas as pd
+
+    try:
+        pd.DataFrame(rows).to_csv(path, index=False, float_format="%.6g")
+    except OSError as error:
+        raise DataError(f"cannot be written ({error.strerror})", file=path) from None

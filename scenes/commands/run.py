@@ -1,0 +1,119 @@
+"""`cfs run`: a building, a weather and a fenestration system to a folder of results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from scenes.job.options import JobOptions
+
+FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+_DEFAULT = JobOptions(Path(), Path(), Path())
+
+
+@click.command()
+@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
+@click.option("--cfs", "system", required=True, type=FILE, help="BSDF XML file, Klems full.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+@click.option("--space", "spaces", multiple=True, help="Name or GUID; default: all with a window.")
+@click.option("--u", "u_value", type=float, help="U-value of the system [W/(m2 K)].")
+@click.option("--g", "g_value", type=float, help="g-value of the system at normal incidence.")
+@click.option(
+    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
+    help="Hour to show and rate for glare; default: nine hours and the brightest.",
+)  # fmt: skip
+@click.option(
+    "--picture-size", type=click.IntRange(64, 4096), default=_DEFAULT.picture_size,
+    show_default=True, help="Pixels of a side.",
+)  # fmt: skip
+@click.option(
+    "--spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.sensor_spacing,
+    show_default=True, help="Sensor spacing [m].",
+)  # fmt: skip
+@click.option(
+    "--height", type=click.FloatRange(0, 5), default=_DEFAULT.sensor_height,
+    show_default=True, help="Work plane above the floor [m].",
+)  # fmt: skip
+@click.option(
+    "--ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
+    show_default=True, help="Outdoor air changes [1/h].",
+)  # fmt: skip
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
+@click.option("--quick", is_flag=True, help="A tenth of the rays, for a first look.")
+def command(
+    building: Path,
+    weather: Path,
+    system: Path,
+    out: Path,
+    spaces: tuple[str, ...],
+    u_value: float | None,
+    g_value: float | None,
+    picture_hours: tuple[str, ...],
+    picture_size: int,
+    spacing: float,
+    height: float,
+    ach: float,
+    seed: int,
+    quick: bool,
+) -> None:
+    """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
+    share = 10 if quick else 1
+    run_to_folder(
+        JobOptions(
+            building,
+            weather,
+            system,
+            spaces=spaces,
+            u_value=u_value,
+            g_value=g_value,
+            picture_hours=picture_hours,
+            picture_size=picture_size,
+            picture_samples=max(_DEFAULT.picture_samples // share, 4),
+            sensor_spacing=spacing,
+            sensor_height=height,
+            sensor_samples=_DEFAULT.sensor_samples // share,
+            patch_samples=_DEFAULT.patch_samples // share,
+            infiltration_ach=ach,
+            seed=seed,
+        ),
+        out,
+    )
+
+
+def run_to_folder(options: JobOptions, out: Path) -> None:
+    """Run the job with a progress bar, write its files and say what came out."""
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.job.outputs import check_folder, write_results
+    from scenes.job.run import run_job
+    from scenes.report import write_report
+
+    check_folder(out)
+    with ProgressBar() as progress:
+        result = run_job(options, progress)
+        progress("results", 0.0)
+        write_results(result, out, write_report)
+        progress("results", 1.0)
+    for room in result.spaces:
+        click.echo(summary_line(room))
+    for note in result.notes:
+        click.echo(f"note: {note}")
+    if result.problems:
+        click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
+    click.echo(f"report: {out / 'report.html'}")
+
+
+def summary_line(room) -> str:
+    """One line of headline figures of a room."""
+    worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
+    daylight, heat = room.daylight.room_metrics, room.thermal
+    return (
+        f"{room.space.name or room.space.guid}: "
+        f"sDA {daylight['sda300_50']:.0f} %, "
+        f"mean DA {daylight['da300']:.0f} %, "
+        f"worst DGP {worst:.2f}, "
+        f"operative {heat.temperatures['operative_c'].min():.1f} "
+        f"to {heat.temperatures['operative_c'].max():.1f} C, "
+        f"comfortable {heat.comfort_summary['within_80']:.0f} % of occupied hours"
+    )

@@ -1,0 +1,266 @@
+"""`cfs sky`: sun positions, sky matrices for Radiance's programs, and WEA files."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+
+import click
+import numpy as np
+import pandas as pd
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
+from mitsuba_cfs.sky import sun as sun_positions
+from mitsuba_cfs.sky.cie import KINDS, cie_patches
+from mitsuba_cfs.sky.matrix import PARTS, SUN_PATCHES, sky_matrix, sun_matrix, sun_up
+from mitsuba_cfs.sky.measured import LABELS, read_measured
+from mitsuba_cfs.sky.patches import SUBDIVISIONS, ReinhartSky
+from mitsuba_cfs.sky.wea import read_wea, write_wea
+from mitsuba_cfs.sky.weather import Weather, read_epw
+from scenes.commands.progress_bar import ProgressBar
+
+EFFICACY = 179.0  # [lm/W] luminance over the radiance that Radiance's visible files hold
+
+OUTPUTS = {"0": "visible", "1": "solar"}
+weather_argument = click.argument("weather", type=click.Path(path_type=Path))
+out_argument = click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
+subdivision_option = click.option(
+    "-m", "--subdivision", type=click.Choice([str(mf) for mf in SUBDIVISIONS]), default="1",
+    show_default=True, help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
+)  # fmt: skip
+sun_option = click.option(
+    "--sun-model", type=click.Choice(sun_positions.SUN_MODELS), default="spa", show_default=True,
+    help="Sun position: NREL's SPA, or Radiance's formula as gendaymtx has it.",
+)  # fmt: skip
+format_option = click.option(
+    "-f", "--format", "kind", type=click.Choice(list(FORMATS)), default="float",
+    show_default=True, help="How the numbers are written.",
+)  # fmt: skip
+ground_option = click.option(
+    "-g", "--ground", type=click.FloatRange(0, 1), default=None,
+    help="Ground reflectance [default: the weather's albedo, 0.2]",
+)  # fmt: skip
+
+
+@click.group()
+def command() -> None:
+    """Sun positions and sky matrices of a weather file (EPW or WEA)."""
+
+
+@command.command()
+@weather_argument
+@out_argument
+@subdivision_option
+@click.option(
+    "-O", "--output", type=click.Choice(list(OUTPUTS)), default="0", show_default=True,
+    help="0: visible (radiance times 179 is luminance), 1: solar, both [W/m2/sr].",
+)  # fmt: skip
+@click.option("-d", "--sun-only", "part", flag_value="sun", help="The direct sun alone.")
+@click.option("-s", "--sky-only", "part", flag_value="sky", help="The sky without the sun.")
+@click.option(
+    "--part", "part", type=click.Choice(PARTS), default="all", show_default=True,
+    help="The same as -d and -s.",
+)  # fmt: skip
+@click.option(
+    "-r", "--rotate", type=float, default=0.0, show_default=True,
+    help="Turn sun and sky by degrees, counter-clockwise from above.",
+)  # fmt: skip
+@click.option(
+    "-u",
+    "--sun-up",
+    "only_up",
+    is_flag=True,
+    help="Only time steps with the sun above the horizon.",
+)
+@click.option(
+    "-5", "--five-phase", is_flag=True,
+    help="The sun of each time step as one 0.533 degree disc at the nearest patch (with -m 6).",
+)  # fmt: skip
+@click.option(
+    "-c", "--color", type=float, nargs=3, default=(1.0, 1.0, 1.0), show_default=True,
+    help="Red, green and blue of the sky; gendaymtx has .96 1.004 1.118.",
+)  # fmt: skip
+@click.option(
+    "--sun-patches", type=click.IntRange(1, 8), default=SUN_PATCHES, show_default=True,
+    help="How many nearest patches share the sun.",
+)  # fmt: skip
+@click.option("--measured", is_flag=True, help="Use the file's illuminances, not Perez's efficacy.")
+@ground_option
+@sun_option
+@format_option
+def matrix(
+    weather: Path, out: Path, subdivision: str, output: str, part: str, rotate: float,
+    only_up: bool, five_phase: bool, color: tuple[float, float, float], sun_patches: int,
+    measured: bool, ground: float | None, sun_model: str, kind: str,
+) -> None:  # fmt: skip
+    """Write the Perez sky of WEATHER as a Radiance matrix OUT (.smx): patches x time steps.
+
+    Patch 0 is the ground; the others are in the order of gendaymtx, whose options these are.
+    """
+    hours = read_weather(weather)
+    band = OUTPUTS[output]
+    if measured and (band == "solar" or hours.direct_normal_illuminance is None):
+        raise DataError("has no illuminance for a visible sky (--measured)", file=weather)
+    mf = int(subdivision)
+    common = {"sun_model": sun_model, "rotation_deg": rotate, "measured_illuminance": measured}
+    if five_phase:
+        discs = sun_matrix(hours, mf, band, **common)
+        coloured = (discs[:, sun_steps(hours, sun_model)] if only_up else discs).toarray()
+    else:
+        options = {
+            **common,
+            "sun_patches": sun_patches,
+            "ground_reflectance": ground,
+            "sun_up_only": only_up,
+            "dtype": np.float32 if kind == "float" else np.float64,
+        }
+        with ProgressBar() as progress:
+            coloured = _coloured_sky(hours, mf, band, part, color, options, progress)
+    coloured = coloured / EFFICACY if band == "visible" else coloured
+    place = f"LATLONG= {hours.latitude_deg:.8f} {hours.longitude_deg:.8f}"
+    write_matrix(out, coloured, format=kind, components=3, lines=[_command_line(), place])
+    click.echo(f"{out}: {coloured.shape[0]} patches x {coloured.shape[1]} time steps, {band}")
+
+
+def _coloured_sky(hours, subdivision, band, part, color, options, progress):
+    """Values [P, H], or [P, H, 3] where sky and sun have different colours."""
+    if tuple(color) == (1.0, 1.0, 1.0) or part == "sun":
+        return sky_matrix(hours, subdivision, band, part, **options, progress=progress)
+    sky = sky_matrix(hours, subdivision, band, "sky", **options, progress=progress)
+    result = sky[..., None] * np.array(color, dtype=sky.dtype)
+    result[0] = sky[0, :, None]  # the ground stays grey, as in gendaymtx
+    if part == "all":
+        result += sky_matrix(hours, subdivision, band, "sun", **options)[..., None]
+    return result
+
+
+@command.command()
+@weather_argument
+@out_argument
+@sun_option
+def positions(weather: Path, out: Path, sun_model: str) -> None:
+    """Write the sun of every time step of WEATHER to the CSV file OUT.
+
+    Middle of the interval, altitude and azimuth (clockwise from north) in degrees, unit vector
+    (x east, y north, z up), and the irradiances.
+    """
+    hours = read_weather(weather)
+    towards = sun_positions.sun_directions(hours, model=sun_model)
+    table = pd.DataFrame(
+        {
+            "middle": hours.midpoints.strftime("%Y-%m-%d %H:%M:%S"),
+            "altitude_deg": np.degrees(sun_positions.altitude(towards)),
+            "azimuth_deg": np.degrees(sun_positions.azimuth(towards)),
+            "x": towards[:, 0],
+            "y": towards[:, 1],
+            "z": towards[:, 2],
+            "direct_normal": hours.direct_normal,
+            "diffuse_horizontal": hours.diffuse_horizontal,
+        }
+    )
+    try:
+        table.to_csv(out, index=False, float_format="%.6f")
+    except OSError as error:
+        raise DataError(f"cannot be written: {error.strerror}", file=out) from error
+    click.echo(f"{out}: {len(table)} time steps, {int((towards[:, 2] > 0).sum())} with the sun up")
+
+
+@command.command()
+@weather_argument
+@out_argument
+def wea(weather: Path, out: Path) -> None:
+    """Write the irradiances of WEATHER (EPW) as a Radiance WEA file OUT."""
+    hours = read_weather(weather)
+    write_wea(hours, out)
+    click.echo(f"{out}: {hours.site}, {len(hours.times)} time steps of {hours.step_h:g} h")
+
+
+@command.command()
+@click.argument("table", type=click.Path(path_type=Path))
+@out_argument
+@click.option("--latitude", type=click.FloatRange(-90, 90), required=True, help="North positive.")
+@click.option("--longitude", type=click.FloatRange(-180, 180), required=True, help="East positive.")
+@click.option("--timezone", type=click.FloatRange(-14, 14), required=True, help="Hours from UTC.")
+@click.option("--elevation", type=float, default=0.0, show_default=True, help="Metres.")
+@click.option(
+    "--label", type=click.Choice(list(LABELS)), default="middle", show_default=True,
+    help="Which moment of its interval a time is.",
+)  # fmt: skip
+@click.option(
+    "--least-altitude", type=click.FloatRange(0, 20),
+    default=sun_positions.LEAST_ALTITUDE_DEG, show_default=True,
+    help="No direct sun below this altitude [degrees].",
+)  # fmt: skip
+def measured(
+    table: Path, out: Path, latitude: float, longitude: float, timezone: float,
+    elevation: float, label: str, least_altitude: float,
+) -> None:  # fmt: skip
+    """Write measured global and diffuse irradiance as a WEA file OUT.
+
+    TABLE is a CSV file with the columns time, global_horizontal and diffuse_horizontal [W/m2];
+    direct normal is (global - diffuse)/sin(altitude).
+    """
+    hours = read_measured(
+        table,
+        latitude_deg=latitude,
+        longitude_deg=longitude,
+        timezone_h=timezone,
+        elevation_m=elevation,
+        label=label,
+        least_altitude_deg=least_altitude,
+    )
+    write_wea(hours, out)
+    click.echo(f"{out}: {len(hours.times)} time steps of {hours.step_h:g} h")
+
+
+@command.command()
+@click.argument("kind_of_sky", metavar="KIND")
+@out_argument
+@subdivision_option
+@click.option("--horizontal", type=click.FloatRange(min=0), default=10_000.0, show_default=True,
+              help="Diffuse horizontal illuminance [lx].")  # fmt: skip
+@click.option("--altitude", type=click.FloatRange(0, 90), default=45.0, show_default=True,
+              help="Of the sun [degrees].")  # fmt: skip
+@click.option("--azimuth", type=float, default=180.0, show_default=True,
+              help="Of the sun, clockwise from north [degrees].")  # fmt: skip
+@click.option("-g", "--ground", type=click.FloatRange(0, 1), default=0.2, show_default=True,
+              help="Ground reflectance.")  # fmt: skip
+@format_option
+def cie(
+    kind_of_sky: str, out: Path, subdivision: str, horizontal: float, altitude: float,
+    azimuth: float, ground: float, kind: str,
+) -> None:  # fmt: skip
+    """Write a CIE sky as a Radiance sky vector OUT (patches x 1), without its sun.
+
+    KIND: overcast, clear, intermediate, uniform, or 1 to 15 of ISO 15469.
+    """
+    number = int(kind_of_sky) if kind_of_sky.isdecimal() else kind_of_sky
+    if number not in (*KINDS, *range(1, 16)):
+        raise click.BadParameter(f"expected {', '.join(KINDS)} or 1 to 15", param_hint="KIND")
+    sun = sun_positions.direction(np.radians(altitude), np.radians(azimuth))
+    sky = ReinhartSky(int(subdivision))
+    values = cie_patches(number, sky, horizontal, sun=sun, ground_reflectance=ground) / EFFICACY
+    write_matrix(out, values[:, None], format=kind, components=3, lines=[_command_line()])
+    click.echo(f"{out}: {kind_of_sky} sky, {sky.size} patches, {horizontal:g} lx")
+
+
+def sun_steps(weather: Weather, sun_model: str) -> np.ndarray:
+    """Indices of the time steps with any of the sun above the horizon."""
+    return np.flatnonzero(sun_up(weather, sun_model=sun_model))
+
+
+def read_weather(path: Path) -> Weather:
+    """An EPW or a WEA file, by its first word."""
+    try:
+        with open(path, "rb") as file:
+            start = file.read(6).lower()
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror}", file=path) from error
+    return read_wea(path, whole_year=False) if start.startswith(b"place") else read_epw(path)
+
+
+def _command_line() -> str:
+    """The command as typed, which Radiance's programs keep in the header."""
+    return shlex.join(["cfs", *sys.argv[1:]])

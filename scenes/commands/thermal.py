@@ -1,0 +1,73 @@
+"""`cfs thermal`: gains, temperatures, loads and comfort of the rooms of a study file."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from pathlib import Path
+
+import click
+
+FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+
+
+@click.command()
+@click.argument("study", type=FILE, metavar="STUDY.toml")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+def command(study: Path, out: Path) -> None:
+    """Gains, temperatures, loads and comfort of rooms, hour by hour.
+
+    The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
+    files) and their control, gains, outdoor air and set points; docs/thermal.md lists every field.
+    """
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.heat.study import run_study
+    from scenes.heat.study_file import read_study
+    from scenes.job.outputs import check_folder
+
+    parsed = read_study(study)
+    check_folder(out)
+    with ProgressBar() as progress:
+        rooms, notes = run_study(parsed, progress)
+    _write(rooms, notes, parsed, out)
+    for room in rooms:
+        summary = room.summary
+        click.echo(
+            f"{room.name}: operative {summary['operative_min_c']:.1f} to "
+            f"{summary['operative_max_c']:.1f} C, heating {summary['heating_kwh']:.0f} kWh, "
+            f"cooling {summary['cooling_kwh']:.0f} kWh, comfortable "
+            f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of the occupied hours"
+        )
+    for note in notes:
+        click.echo(f"note: {note}")
+    click.echo(f"results: {out}")
+
+
+def _write(rooms, notes: tuple[str, ...], study, out: Path) -> None:
+    """All files, to a temporary folder that takes its name when all is there."""
+    import pandas as pd
+
+    from scenes.job.outputs import MARK
+
+    target = out.absolute()
+    temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    try:
+        temporary.chmod(0o755)
+        for number, room in enumerate(rooms, 1):
+            name = "hours.csv" if len(rooms) == 1 else f"hours_{number}.csv"
+            room.hours.round(4).to_csv(temporary / name)
+        table = pd.DataFrame(
+            [{"room": r.name, "floor_m2": r.floor_area} | r.summary for r in rooms]
+        )
+        table.round(4).to_csv(temporary / "summary.csv", index=False)
+        months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
+        months.to_csv(temporary / "discomfort_by_month.csv")
+        record = {"study": study.model_dump(mode="json"), "notes": list(notes)}
+        (temporary / MARK).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        if target.exists():
+            shutil.rmtree(target)
+        temporary.replace(target)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise

@@ -1,0 +1,1 @@
+"""Figures of a report as plain data: positions in percent, SVG paths, small pictures, colours."""

@@ -1,0 +1,192 @@
+"""The study file of `cfs thermal`: rooms, weather, shading states, control, gains, set points."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from mitsuba_cfs.errors import DataError
+
+Positive = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Hours = Annotated[tuple[int, int], Field(description="clock times from and to")]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class LayerTable(_Table):
+    """A layer of a construction."""
+
+    name: str = "layer"
+    thickness: Positive  # [m]
+    conductivity: Positive  # [W/(m K)]
+    density: Positive  # [kg/m3]
+    heat_capacity: Positive  # [J/(kg K)]
+
+
+class WindowTable(_Table):
+    """A rectangular opening of the box."""
+
+    x: float
+    sill: float
+    width: Positive
+    height: Positive
+    side: Literal["front", "right", "back", "left", "ceiling"] = "front"
+    frame: Annotated[float, Field(ge=0)] = 0.0
+
+
+class BoxTable(_Table):
+    """A box-shaped room in place of a building file."""
+
+    width: Positive
+    depth: Positive
+    height: Positive
+    facing_deg: float = 180.0
+    recess: Annotated[float, Field(ge=0)] = 0.0
+    window: tuple[WindowTable, ...]
+    reflectance: dict[str, Share] = {}
+    adjacency: dict[str, Literal["outside", "ground", "space", "adiabatic"]] = {}
+    construction: dict[str, tuple[LayerTable, ...]] = {}  # by side or kind, outermost first
+
+
+class SystemTable(_Table):
+    """One shading state: a BSDF file and what else was measured."""
+
+    bsdf: Path
+    u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None
+    g_value: Share | None = None
+    u_model: Literal["constant", "linear"] = "constant"
+    realised_inner_resistance: Positive | None = None  # [m2 K/W], see thermal.blackbox
+    realised_outer_resistance: Positive | None = None
+
+
+class ControlTable(_Table):
+    """Which state holds: states are numbered from 0 in the order of the file."""
+
+    rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
+    state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
+    schedule: tuple[int, ...] = ()  # "schedule": 24 states
+    close_above: Positive = 200.0  # "irradiance" on the windows [W/m2]
+    open_below: Annotated[float, Field(ge=0)] | None = None
+    limit_lx: Positive = 3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
+    slat_tilts_deg: tuple[float, ...] = ()  # "cut-off": of each state
+    slat_width: Positive = 0.08  # [m]
+    slat_spacing: Positive = 0.072  # [m]
+
+
+class GainsTable(_Table):
+    """Heat in the room during the occupied hours."""
+
+    equipment_w_m2: Annotated[float, Field(ge=0)] = 8.0
+    persons: Annotated[float, Field(ge=0)] = 1.0
+    person_w: Annotated[float, Field(ge=0)] = 75.0
+    lighting_w_m2: Annotated[float, Field(ge=0)] = 0.0
+    lighting_target_lx: Positive = 500.0  # of the mean on the work plane; daylight dims
+    radiant_share: Share = 0.5
+    occupied: Hours = (8, 18)
+
+
+class AirTable(_Table):
+    """Outdoor air."""
+
+    infiltration_ach: Annotated[float, Field(ge=0)] = 0.5
+    night_ach: Annotated[float, Field(ge=0)] = 0.0  # more of it in these hours
+    night: Hours = (0, 7)
+
+
+class LoadsTable(_Table):
+    """Ideal heating and cooling; without set points the room floats."""
+
+    heating_c: float | None = None
+    cooling_c: float | None = None
+    heating_limit_w: Positive | None = None
+    cooling_limit_w: Positive | None = None
+
+
+class ComfortTable(_Table):
+    """The person, for PMV and SET."""
+
+    metabolic_rate: Annotated[float, Field(ge=0.7, le=4)] = 1.2  # [met]
+    clothing: Annotated[float, Field(ge=0, le=2)] = 0.7  # [clo]
+    air_speed: Annotated[float, Field(ge=0, le=2)] = 0.1  # [m/s]
+    humidity: Annotated[float, Field(ge=0, le=100)] = 50.0  # relative, indoors [%]
+
+
+class TraceTable(_Table):
+    """Rays."""
+
+    patch_samples: Annotated[int, Field(ge=64)] = 8192
+    sensor_samples: Annotated[int, Field(ge=64)] = 16384
+    sky_subdivision: Literal[1, 2, 4, 6] = 1
+    seed: int = 0
+
+
+class StudyFile(_Table):
+    """A whole study; paths are relative to the file."""
+
+    weather: Path
+    building: Path | None = None
+    spaces: tuple[str, ...] = ()
+    box: BoxTable | None = None
+    system: Annotated[tuple[SystemTable, ...], Field(min_length=1)]
+    control: ControlTable = ControlTable()
+    gains: GainsTable = GainsTable()
+    air: AirTable = AirTable()
+    loads: LoadsTable = LoadsTable()
+    comfort: ComfortTable = ComfortTable()
+    trace: TraceTable = TraceTable()
+    step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10
+
+    @model_validator(mode="after")
+    def _fits(self) -> StudyFile:
+        if (self.building is None) == (self.box is None):
+            raise ValueError("give either `building` or `[box]`")
+        states, rule = len(self.system), self.control.rule
+        wanted = self.control.schedule if rule == "schedule" else (self.control.state,)
+        if rule == "schedule" and len(wanted) != 24:
+            raise ValueError(f"control.schedule: expected 24 states, got {len(wanted)}")
+        if any(not 0 <= s < states for s in wanted):
+            raise ValueError(f"control: a state outside 0 to {states - 1} ([[system]] tables)")
+        warm, cool = self.loads.heating_c, self.loads.cooling_c
+        if warm is not None and cool is not None and warm > cool:
+            raise ValueError("loads: the set points heating_c lies above cooling_c")
+        if rule == "cut-off" and len(self.control.slat_tilts_deg) != states:
+            raise ValueError("control.slat_tilts_deg: expected one for each [[system]]")
+        return self
+
+
+def read_study(path: Path) -> StudyFile:
+    """The study of a TOML file, its paths made absolute.
+
+    Raises: `DataError` naming the file and the field.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"is not TOML: {error}", file=path) from error
+    try:
+        study = StudyFile.model_validate(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise DataError(
+            first["msg"].removeprefix("Value error, "), file=path, field=field or None
+        ) from error
+    here = path.parent
+    systems = tuple(s.model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system)
+    found = {"weather": _there(here, study.weather, path), "system": systems}
+    if study.building is not None:
+        found["building"] = _there(here, study.building, path)
+    return study.model_copy(update=found)
+
+
+def _there(folder: Path, name: Path, study: Path) -> Path:
+    place = folder / name
+    if not place.is_file():
+        raise DataError(f"no such file: {name}", file=study)
+    return place

@@ -1,0 +1,116 @@
+"""Fisheye pictures of a room at chosen hours, and their glare."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mitsuba_cfs.errors import CfsError
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.progress import Progress, part
+from mitsuba_cfs.trace.image import luminance_pictures
+from scenes.job.daylight import RoomScene, Skies
+from scenes.job.options import JobOptions
+from scenes.results import GlareResults, LuminancePicture
+
+DEFAULT_DAYS = ("03-21", "06-21", "12-21")
+DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
+
+
+class PictureHourError(CfsError, ValueError):
+    """An hour asked for that the year does not have, or when the sun is down."""
+
+
+def wanted_hours(
+    wanted: tuple[str, ...], times: pd.DatetimeIndex, lit: NDArray[np.int64]
+) -> list[int]:
+    """Hours of the year [indices] that were asked for.
+
+    Args:
+        wanted: "MM-DD HH": the hour that begins then.
+        times: [H] middles of the hours; lit: [L] hours with the sun up.
+    """
+    return [_hour(text, times, set(lit.tolist())) for text in wanted]
+
+
+def default_hours(
+    times: pd.DatetimeIndex, lit: NDArray[np.int64], eye_illuminance: NDArray[np.float32]
+) -> list[int]:
+    """The equinox and the solstices at 9, 12 and 15 o'clock, as far as the sun is up, and the
+    hour of the year that is brightest at the eye.
+
+    Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
+    """
+    labels = [f"{day} {clock:02d}" for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
+    lit_set = set(lit.tolist())
+    found = [hour for label in labels if (hour := _find(label, times)) in lit_set]
+    brightest = int(lit[np.argmax(eye_illuminance)])
+    return found + [brightest] * (brightest not in found)
+
+
+def _hour(text: str, times: pd.DatetimeIndex, lit: set[int]) -> int:
+    if not re.fullmatch(r"\d\d-\d\d \d\d", text):
+        raise PictureHourError(f"--picture {text!r}: expected month, day and hour as in '06-21 12'")
+    hour = _find(text, times)
+    if hour is None:
+        raise PictureHourError(f"--picture {text!r}: the weather has no such hour")
+    if hour not in lit:
+        raise PictureHourError(f"--picture {text!r}: the sun is below the horizon then")
+    return hour
+
+
+def _find(text: str, times: pd.DatetimeIndex) -> int | None:
+    found = np.flatnonzero(times.strftime("%m-%d %H") == text)
+    return int(found[0]) if len(found) else None
+
+
+def room_glare(
+    scene: RoomScene,
+    window_luminance: NDArray[np.float32],
+    skies: Skies,
+    hours: list[int],
+    options: JobOptions,
+    progress: Progress,
+) -> GlareResults:
+    """Pictures of the chosen hours and their glare.
+
+    Args: window_luminance: [G, K, L] of the lit hours, from `room_daylight`.
+    """
+    columns = np.searchsorted(skies.lit, hours)
+    pictures = luminance_pictures(
+        scene.interior,
+        scene.groups,
+        scene.view,
+        window_luminance[:, :, columns],
+        samples=options.picture_samples,
+        seed=options.seed,
+        progress=part(progress, 0.0, 0.9, "pictures"),
+    )
+    geometry = GlareView(scene.view)
+    rated = []
+    for hour, luminance in zip(hours, pictures, strict=True):
+        result = evaluate(luminance, geometry)
+        glare = {
+            "ev": result.Ev,
+            "dgp": result.dgp,
+            "dgp_simplified": result.sdgp,
+            "dgi": result.dgi,
+            "ugr": result.ugr,
+            "vcp": result.vcp,
+            "cgi": result.cgi,
+            "sources": float(result.count),
+            "background_luminance": result.background_luminance,
+        }
+        rated.append(LuminancePicture(hour, luminance, glare, result.labels > 0))
+    progress("pictures", 1.0)
+    return GlareResults(scene.view, tuple(rated))
+
+
+def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:
+    """One row for each picture: its time and glare."""
+    rows = [{"time": times[p.hour], **p.glare} for p in result.pictures]
+    return pd.DataFrame(rows).set_index("time")

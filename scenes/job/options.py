@@ -1,0 +1,33 @@
+"""What the user may choose about a run; every default is stated here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class JobOptions:
+    """Inputs and choices of a run."""
+
+    building: Path
+    weather: Path
+    system: Path
+    spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
+    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
+    g_value: float | None = None  # at normal incidence
+    picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.job.glare.default_hours`
+    picture_size: int = 600  # pixels of a side of the fisheye picture
+    picture_samples: int = 32  # paths for each pixel
+    sky_subdivision: int = 4  # Reinhart's MF
+    sensor_spacing: float = 0.5  # [m]
+    sensor_height: float = 0.8  # above the floor [m]
+    sensor_margin: float = 0.5  # from the walls [m]
+    sensor_samples: int = 32_768  # paths for each sensor
+    patch_samples: int = 16_384  # paths for each window patch
+    infiltration_ach: float = 0.5  # [1/h]
+    equipment_w_m2: float = 8.0  # while occupied, half of it radiant
+    person_w: float = 75.0  # sensible heat of a person
+    floor_per_person: float = 15.0  # [m2]
+    occupied: tuple[int, int] = (8, 18)  # clock hours, every day
+    seed: int = 0

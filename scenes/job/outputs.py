@@ -1,0 +1,115 @@
+"""The files of a run: written to a temporary folder, which takes its name when all is there."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tempfile
+from pathlib import Path
+
+import pandas as pd
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.hdr import write_hdr
+from scenes.job.daylight import illuminance_table
+from scenes.job.glare import glare_table
+from scenes.pictures import write_falsecolour
+from scenes.results import RunResult, SpaceResult
+
+MARK = "run.json"  # a folder that holds it is an earlier result and may be replaced
+
+
+def check_folder(folder: Path) -> None:
+    """Raise `DataError` where results could not be put at the end of a run."""
+    if folder.exists() and not folder.is_dir():
+        raise DataError("is a file; results need a folder", file=folder, field="--out")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
+        raise DataError(
+            f"holds other files (and no {MARK} of an earlier run)", file=folder, field="--out"
+        )
+    try:
+        folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+        Path(tempfile.mkdtemp(prefix=".cfs-", dir=folder.absolute().parent)).rmdir()
+    except OSError as error:
+        message = f"cannot be written: {error.strerror or error}"
+        raise DataError(message, file=folder, field="--out") from error
+
+
+def write_results(result: RunResult, folder: Path, write_report=None) -> None:
+    """Write all files of a run; an earlier result of that name is replaced at the end.
+
+    Args: write_report: `scenes.report.write_report`, or None for no report.
+    """
+    check_folder(folder)
+    target = folder.absolute()
+    temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    try:
+        temporary.chmod(0o755)
+        several = len(result.spaces) > 1
+        for room, name in zip(result.spaces, room_names(result), strict=True):
+            place = temporary / name if several else temporary
+            place.mkdir(exist_ok=True)
+            _write_room(result, room, place)
+        _problems(result).to_csv(temporary / "problems.csv", index=False)
+        if write_report is not None:
+            write_report(result, temporary / "report.html")
+        text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
+        (temporary / MARK).write_text(text + "\n", encoding="utf-8")
+        _take_place(temporary, target)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+
+
+def _take_place(temporary: Path, target: Path) -> None:
+    """Rename the finished folder, keeping the earlier one until that is done."""
+    old = None
+    if target.exists():
+        old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.parent))
+        target.replace(old)
+    try:
+        temporary.replace(target)
+    except OSError:
+        if old is not None:
+            old.replace(target)
+        raise
+    if old is not None:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def room_names(result: RunResult) -> list[str]:
+    """A folder name for each room: its name, or its GUID where names are shared or empty."""
+    names = [re.sub(r"[^\w.-]+", "_", room.space.name).strip("._") for room in result.spaces]
+    folded = [name.casefold() for name in names]
+    return [
+        name if name and folded.count(name.casefold()) == 1 else f"{name}_{room.space.guid}"
+        for name, room in zip(names, result.spaces, strict=True)
+    ]
+
+
+def _write_room(result: RunResult, room: SpaceResult, place: Path) -> None:
+    illuminance_table(room.daylight, result.times).to_parquet(place / "illuminance.parquet")
+    metrics = room.daylight.sensor_metrics.copy()
+    metrics["relative_standard_error"] = room.daylight.relative_error
+    _csv(metrics, place / "daylight_metrics.csv")
+    _csv(pd.DataFrame([room.daylight.room_metrics]), place / "room_metrics.csv", index=False)
+    _csv(glare_table(room.glare, result.times), place / "dgp.csv")
+    heat = room.thermal
+    _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
+    _csv(pd.DataFrame([heat.comfort_summary]), place / "comfort.csv", index=False)
+    for picture in room.glare.pictures:
+        name = f"view_{result.times[picture.hour]:%m-%d_%Hh}"
+        write_hdr(place / f"{name}.hdr", picture.luminance, room.glare.view)
+        title = f"{result.times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
+        write_falsecolour(place / f"{name}.png", picture.luminance, title=title)
+
+
+def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:
+    """A table with six significant digits, the same in every run."""
+    table.to_csv(path, index=index, float_format="%.6g")
+
+
+def _problems(result: RunResult) -> pd.DataFrame:
+    rows = [(p.where, p.what, p.consequence) for p in result.problems]
+    return pd.DataFrame(rows, columns=["where", "what", "consequence"])

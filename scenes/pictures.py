@@ -1,0 +1,193 @@
+"""Luminance pictures to look at: falsecolour with its scale, tone-mapped, glare sources marked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm, Normalize, hsv_to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import imsave
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.areas import angles_to
+from mitsuba_cfs.glare.evaluation import GlareResult
+from mitsuba_cfs.glare.glare_view import in_picture_order
+from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
+
+COLOURS = "turbo"
+DARKEST, KEY = 1.0, 0.18  # [cd/m2] lower end of the falsecolour scale; middle grey of a print
+DPI = 150
+
+
+def scale_limits(luminance: NDArray) -> tuple[float, float]:
+    """Round ends [cd/m2] of a logarithmic scale that holds a picture: two to five decades."""
+    lit = luminance[np.isfinite(luminance) & (luminance > 0)]
+    if not lit.size:
+        return DARKEST, 100 * DARKEST
+    high = 10.0 ** np.ceil(np.log10(max(np.percentile(lit, 99.9), 10 * DARKEST)))
+    low = 10.0 ** np.floor(np.log10(max(np.percentile(lit, 2), high / 1e5)))
+    return min(low, high / 100), high
+
+
+def write_falsecolour(
+    path: Path,
+    luminance: NDArray,
+    *,
+    title: str = "",
+    limits: tuple[float, float] | None = None,
+    logarithmic: bool = True,
+    seen: NDArray[np.bool_] | None = None,
+) -> None:
+    """Write luminance [ny, nx] [cd/m2] as falsecolour with its scale (PNG).
+
+    Args:
+        limits: ends of the scale [cd/m2]; without them round numbers that hold the picture.
+        seen: [ny, nx] pixels to show; the others stay white.
+    """
+    low, high = limits or scale_limits(luminance if seen is None else luminance[seen])
+    shown = np.maximum(luminance, low) if logarithmic else luminance
+    shown = np.ma.masked_array(shown, None if seen is None else ~seen)
+    norm = LogNorm(low, high, clip=True) if logarithmic else Normalize(low, high, clip=True)
+    figure = _figure(luminance.shape)
+    axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
+    image = axes.imshow(shown, cmap=COLOURS, norm=norm, interpolation="nearest")
+    axes.set_axis_off()
+    axes.set_title(title, fontsize=9, loc="left")
+    bar = figure.colorbar(image, cax=figure.add_axes((0.83, 0.08, 0.035, 0.78)))
+    bar.ax.set_title("cd/m²", fontsize=9, loc="left")
+    bar.ax.tick_params(labelsize=8)
+    if logarithmic:
+        bar.ax.yaxis.set_major_locator(LogLocator(10, subs=(1.0, 3.0), numticks=20))
+        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+    _save(figure, path)
+
+
+def tone_mapped(pixels: NDArray, *, white: float | None = None) -> NDArray[np.uint8]:
+    """sRGB bytes [ny, nx, 3] of radiance [ny, nx, 3] or luminance [ny, nx].
+
+    The log-average becomes middle grey; what is `white` times brighter (default: the 99.5th
+    percentile) and more becomes white.
+
+    Source: Reinhard et al. (2002), Photographic tone reproduction, global operator (4).
+    """
+    grey = pixels.ndim == 2
+    luminance = pixels if grey else EFFICACY * (pixels @ np.asarray(LUMINANCE_WEIGHTS))
+    lit = luminance[luminance > 0]
+    if not lit.size:
+        return np.zeros((*luminance.shape, 3), dtype=np.uint8)
+    middle = np.exp(np.mean(np.log(np.maximum(lit, lit.max() * 1e-9))))
+    scaled = KEY / middle * luminance
+    white = max(float(np.percentile(scaled, 99.5)), 1.0) if white is None else white
+    mapped = scaled * (1 + scaled / white**2) / (1 + scaled)
+    if grey:
+        linear = np.repeat(mapped[..., None], 3, axis=-1)
+    else:
+        ratio = np.divide(mapped, luminance, where=luminance > 0, out=np.zeros_like(mapped))
+        linear = EFFICACY * pixels * ratio[..., None]
+    return _srgb(linear)
+
+
+def _srgb(linear: NDArray) -> NDArray[np.uint8]:
+    """Bytes of linear light 0..1 in sRGB's transfer curve (IEC 61966-2-1)."""
+    linear = np.clip(linear, 0.0, 1.0)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return (255 * curve + 0.5).astype(np.uint8)
+
+
+def write_tone_mapped(path: Path, pixels: NDArray) -> None:
+    """Write radiance [ny, nx, 3] or luminance [ny, nx] as a picture for the eye (PNG)."""
+    _try(lambda: imsave(path, tone_mapped(pixels)), path)
+
+
+def source_colours(count: int) -> NDArray[np.float64]:
+    """Colours [count, 3] of glare sources: neighbours in number are far apart in hue."""
+    number = np.arange(count)
+    hue = (0.33 + 0.61803399 * number) % 1.0
+    paleness = 0.9 - 0.35 * ((number // 5) % 2)
+    return hsv_to_rgb(np.stack([hue, paleness, np.ones(count)], axis=-1))
+
+
+def check_radiance(
+    result: GlareResult,
+    uniform: tuple[float, float, float] | None = None,
+    *,
+    show_task: bool = False,
+) -> NDArray[np.float64]:
+    """Radiance [ny, nx, 3] of a check picture: grey, sources coloured, every luminance kept.
+
+    Args:
+        uniform: one colour for all sources; without it each has its own.
+        show_task: the task area in blue.
+    """
+    luminance, labels = in_picture_order(result.luminance), result.labels
+    colours = source_colours(result.count) if uniform is None else [uniform] * result.count
+    palette = np.vstack([np.ones(3), np.asarray(colours, float).reshape(-1, 3), (0, 0, 1)])
+    palette /= (palette @ np.asarray(LUMINANCE_WEIGHTS))[:, None]
+    if show_task and (task := result.options.task) is not None:
+        within = 2 * angles_to(task.x, task.y, result.geometry) <= task.angle
+        labels = np.where(in_picture_order(within), len(palette) - 1, labels)
+    return luminance[..., None] / EFFICACY * palette[labels]
+
+
+def write_check_picture(path: Path, result: GlareResult, *, title: str = "") -> None:
+    """Write a picture with the glare sources coloured and numbered, and what they amount to."""
+    luminance, labels = in_picture_order(result.luminance), result.labels
+    grey = tone_mapped(luminance).astype(float) / 255
+    palette = np.vstack([np.ones(3), source_colours(result.count)])
+    shade = np.where(labels[..., None] > 0, 0.35 + 0.65 * grey, grey)
+    shown = shade * palette[labels]
+    shown[~in_picture_order(result.geometry.valid)] = 1.0
+    figure = _figure(luminance.shape)
+    axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
+    axes.imshow(shown, interpolation="nearest")
+    axes.set_axis_off()
+    axes.set_title(title or f"DGP {result.dgp:.3f}", fontsize=9, loc="left")
+    outline = [withStroke(linewidth=2.5, foreground="white")]
+    found, height = result.sources, result.geometry.view.height
+    largest = np.argsort(-(found.luminance**2) * found.solid_angle / result.position**2)[:12]
+    for i in largest:
+        x, y = found.x[i], height - 1 - found.y[i]
+        axes.text(x, y, str(i + 1), ha="center", va="center", fontsize=8, path_effects=outline)
+    _list_sources(figure, result, largest)
+    _save(figure, path)
+
+
+def _list_sources(figure: Figure, result: GlareResult, largest: NDArray) -> None:
+    """The sources beside the picture, the most glaring first."""
+    found, colours = result.sources, source_colours(result.count)
+    figure.text(
+        0.81, 0.92, f"E_v {result.Ev:,.0f} lx\n{result.count} glare sources", fontsize=8, va="top"
+    )
+    for line, i in enumerate(largest):
+        y = 0.83 - 0.062 * line
+        figure.text(0.81, y, "■", color=colours[i], fontsize=9)
+        text = f"{i + 1}  {found.luminance[i]:,.0f} cd/m²\n    {found.solid_angle[i]:.3g} sr"
+        figure.text(0.835, y, text, fontsize=6.5, va="center")
+    if result.count > len(largest):
+        figure.text(0.81, 0.05, f"and {result.count - len(largest)} smaller", fontsize=7)
+
+
+def _figure(shape: tuple[int, ...]) -> Figure:
+    """A figure in the picture's proportions, with room for a title and a scale."""
+    height, width = shape[:2]
+    size = 6.4 * np.sqrt(np.clip(width / height, 0.25, 4.0))
+    figure = Figure(figsize=(size, size * height / width * 0.78 / 0.90), dpi=DPI)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _save(figure: Figure, path: Path) -> None:
+    _try(lambda: figure.savefig(path), path)
+
+
+def _try(write, path: Path) -> None:
+    try:
+        write()
+    except OSError as error:
+        raise DataError(f"cannot be written ({error.strerror})", file=path) from None

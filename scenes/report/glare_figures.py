@@ -1,0 +1,122 @@
+"""Luminance pictures of a room: false colour, as the eye sees it, and the glare sources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_closing, binary_dilation, binary_erosion
+
+from mitsuba_cfs.images.view import View
+from scenes.figures.picture import photo_uri, png_uri, reduced
+from scenes.figures.scale import ColourScale
+from scenes.pictures import tone_mapped
+from scenes.report.numbers import rounded, significant
+from scenes.report.tables import glare_class, spoken
+from scenes.results import LuminancePicture, RunResult, SpaceResult
+
+MOST_PICTURES = 4  # the worst ones; the table has them all
+MOST_OF_A_RUN = 24  # shared by its rooms, so that the file stays small
+LARGEST_SIDE = 620  # [px] of a picture in the page
+BRIDGE = 4  # slits up to twice as many pixels wide do not split an outline
+COMPASS = (
+    "north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"
+)  # fmt: skip
+OUTLINE = (255, 0, 144)  # of glare sources; occurs in no colour map used here
+
+
+@dataclass(frozen=True, slots=True)
+class GlarePicture:
+    """One hour as two pictures and a few words."""
+
+    title: str
+    words: str
+    dgp: str
+    dgp_class: str
+    numbers: str
+    falsecolour: str  # data URI
+    seen: str  # data URI, tone-mapped, glare sources outlined
+    round: bool  # a fisheye: only the disc is a picture
+
+
+@dataclass(frozen=True, slots=True)
+class GlareGallery:
+    """The worst pictures of a room and the scale they share."""
+
+    pictures: tuple[GlarePicture, ...]
+    scale: ColourScale
+    left_out: int
+
+
+def gallery(result: RunResult, room: SpaceResult) -> GlareGallery | None:
+    """The pictures with most glare, worst first; None without any."""
+    pictures = sorted(room.glare.pictures, key=lambda picture: -picture.glare["dgp"])
+    if not pictures:
+        return None
+    chosen = pictures[: max(1, min(MOST_PICTURES, MOST_OF_A_RUN // len(result.spaces)))]
+    scale = luminance_scale(chosen)
+    shown = tuple(glare_picture(result, room.glare.view, p, scale) for p in chosen)
+    return GlareGallery(shown, scale, len(pictures) - len(chosen))
+
+
+def luminance_scale(pictures: list[LuminancePicture]) -> ColourScale:
+    """Three and a half decades, up to what 99.9 % of each picture's pixels stay below."""
+    lit = [p.luminance[p.luminance > 0] for p in pictures]
+    top = max((float(np.quantile(values, 0.999)) for values in lit if values.size), default=0.0)
+    high = _half_decade(top)
+    return ColourScale(max(high / 3000, 1.0), high, "Luminance", "cd/m²", True, "viridis")
+
+
+def _half_decade(value: float) -> float:
+    """The next of 1, 3, 10, 30, ... at or above the value, at least 1000."""
+    power = 10.0 ** np.floor(np.log10(max(value, 1000.0)))
+    return float(next(f * power for f in (1, 3, 10) if f * power >= value * 0.999))
+
+
+def glare_picture(
+    result: RunResult, view: View, picture: LuminancePicture, scale: ColourScale
+) -> GlarePicture:
+    """One picture reduced to the page's size."""
+    factor = int(np.ceil(max(picture.luminance.shape) / LARGEST_SIDE))
+    luminance = reduced(picture.luminance.astype(float), factor)
+    glare = picture.glare
+    seen = tone_mapped(luminance)
+    sources = "no glare source"
+    if picture.source_mask is not None and picture.source_mask.any():
+        mask = reduced(picture.source_mask.astype(float), factor) > 0.5
+        seen[outline(mask)] = OUTLINE
+        count = int(glare.get("sources", 0))
+        sources = f"{count} glare source{'s' if count != 1 else ''} (outlined)" if count else ""
+    numbers = f"Ev {significant(glare['ev'], 3)} lx" if "ev" in glare else ""
+    brightest = f"up to {significant(float(picture.luminance.max()), 2)} cd/m²"
+    return GlarePicture(
+        title=spoken(result.times[picture.hour]),
+        words=sun_words(result, picture.hour),
+        dgp=rounded(glare["dgp"], 2),
+        dgp_class=glare_class(glare["dgp"]),
+        numbers=", ".join(part for part in (numbers, sources, brightest) if part),
+        falsecolour=png_uri(scale.rgba(luminance)[..., :3]),
+        seen=photo_uri(seen),
+        round=view.kind in ("angular", "hemispherical") and view.horizontal_deg == 180,
+    )
+
+
+def sun_words(result: RunResult, hour: int) -> str:
+    """Where the sun stands."""
+    sun = result.sun[hour]
+    altitude = np.degrees(np.arcsin(np.clip(sun[2], -1, 1)))
+    if altitude <= 0:
+        return "sun below the horizon"
+    return f"sun {altitude:.0f}° high in the {compass(sun)}"
+
+
+def compass(direction: NDArray[np.float64]) -> str:
+    """The nearest of eight points of the compass, of a vector [3] or [2]."""
+    return COMPASS[round(np.degrees(np.arctan2(direction[0], direction[1])) / 45) % 8]
+
+
+def outline(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The rim of each area, two pixels wide; slits as between slats are bridged first."""
+    whole = binary_closing(np.pad(mask, BRIDGE), iterations=BRIDGE)[BRIDGE:-BRIDGE, BRIDGE:-BRIDGE]
+    return binary_dilation(whole) & ~binary_erosion(whole, border_value=1)

@@ -1,0 +1,226 @@
+"""The headline figures of a room: what a client reads first, each with its meaning in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from scenes.report.names import quantity
+from scenes.report.numbers import percent, rounded, significant
+from scenes.report.tables import glare_class, spoken, step_hours
+from scenes.results import RunResult, SpaceResult
+
+WARM_C = 26.0  # operative temperature above which hours are counted
+LEVELS = ("none", "minimum", "medium", "high")  # of EN 17037
+GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One headline figure."""
+
+    label: str
+    value: str
+    unit: str
+    words: str
+    verdict: str = ""  # a word or two, beside a mark of the grade
+    grade: str = PLAIN  # good, fair, poor, plain
+    meaning: str = ""
+    meter: float | None = None  # 0..100, drawn as a bar
+
+
+def cards(result: RunResult, room: SpaceResult) -> tuple[Card, ...]:
+    """All headline figures that this room's results hold."""
+    found = [
+        _spatial_autonomy(room),
+        _sunlight(room),
+        _autonomy(room),
+        _provision(room),
+        _glare(result, room),
+        _warm_hours(room),
+        _comfort(room),
+        _peak(room),
+    ]
+    return tuple(card for card in found if card is not None)
+
+
+def room_metric(room: SpaceResult, *names: str) -> float | None:
+    """The first room metric of these names."""
+    key = named_like(room.daylight.room_metrics, *names)
+    value = None if key is None else room.daylight.room_metrics[key]
+    return None if value is None else float(value)
+
+
+def sensor_column(room: SpaceResult, *names: str) -> str | None:
+    """The first column of the sensor metrics of these names."""
+    return named_like(room.daylight.sensor_metrics, *names)
+
+
+def named_like(keys: Iterable[str], *names: str) -> str | None:
+    """The first key that is one of the names, or that goes on after it with no letter."""
+    for name in names:
+        for pattern in (rf"{name}$", rf"{name}(?![a-z])"):
+            for key in keys:
+                if re.match(pattern, key, re.IGNORECASE):
+                    return key
+    return None
+
+
+def occupied(room: SpaceResult) -> pd.Series:
+    """Which hours count for comfort [H]; all of them where the results do not say."""
+    comfort = room.thermal.comfort
+    if "occupied" in comfort:
+        return comfort["occupied"].astype(bool)
+    return pd.Series(True, index=comfort.index)
+
+
+def applicable(comfort: pd.DataFrame) -> pd.Series:
+    """Hours [H] whose weather the comfort model covers."""
+    if "applicable" in comfort:
+        return comfort["applicable"].astype(bool)
+    if "comfort_c" in comfort:
+        return comfort["comfort_c"].notna()
+    return pd.Series(True, index=comfort.index)
+
+
+def _spatial_autonomy(room: SpaceResult) -> Card | None:
+    value = room_metric(room, "sda")
+    if value is None:
+        return None
+    grade, verdict = (
+        (GOOD, "preferred (75 % or more)")
+        if value >= 75
+        else (FAIR, "acceptable (55 % or more)")
+        if value >= 55
+        else (POOR, "below the 55 % of LM-83")
+    )
+    words = "of the work plane has 300 lx of daylight for at least half of the occupied hours"
+    meaning = quantity("sda300_50").meaning
+    return Card("Spatial daylight autonomy", percent(value), "%", words, verdict, grade, meaning,
+                value)  # fmt: skip
+
+
+def _sunlight(room: SpaceResult) -> Card | None:
+    value = room_metric(room, "ase")
+    if value is None:
+        return None
+    grade, verdict = (
+        (GOOD, "within the 10 % of LM-83") if value <= 10 else (POOR, "above the 10 % of LM-83")
+    )
+    words = "of the work plane gets direct sun over 1000 lx in more than 250 hours a year"
+    meaning = quantity("ase1000_250").meaning
+    return Card("Annual sunlight exposure", percent(value), "%", words, verdict, grade, meaning,
+                value)  # fmt: skip
+
+
+def _autonomy(room: SpaceResult) -> Card | None:
+    column = sensor_column(room, "da300", "da_300", "da")
+    if column is None:
+        return None
+    values = room.daylight.sensor_metrics[column].to_numpy(dtype=float)
+    words = (
+        f"of the occupied hours have 300 lx of daylight, as a mean over the work plane "
+        f"({percent(values.min())} to {percent(values.max())} % by place)"
+    )
+    meaning = quantity("da300").meaning
+    mean = float(values.mean())
+    return Card("Daylight autonomy", percent(mean), "%", words, meaning=meaning, meter=mean)
+
+
+def _provision(room: SpaceResult) -> Card | None:
+    """The level of EN 17037, with the two illuminances that decide it."""
+    metrics = room.daylight.room_metrics
+    q = quantity("en17037_level")
+    level = metrics.get("en17037_level")
+    if level is None:
+        return None
+    index = LEVELS.index(level) if isinstance(level, str) else int(level)
+    target, least = metrics.get("en17037_target_lx"), metrics.get("en17037_minimum_lx")
+    words = "level of daylight provision by EN 17037"
+    if target is not None and least is not None:
+        words += (
+            f": in half of the daylight hours half of the room has {significant(target)} lx or "
+            f"more and nearly all of it {significant(least)} lx"
+        )
+    verdict = ("below 300 and 100 lx", "300 and 100 lx", "500 and 300 lx", "750 and 500 lx")[index]
+    grade = (POOR, FAIR, GOOD, GOOD)[index]
+    return Card(
+        "Daylight provision", q.values[index].capitalize(), "", words, verdict, grade, q.meaning
+    )
+
+
+def _glare(result: RunResult, room: SpaceResult) -> Card | None:
+    pictures = room.glare.pictures
+    if not pictures:
+        return None
+    worst = max(pictures, key=lambda picture: picture.glare["dgp"])
+    dgp = worst.glare["dgp"]
+    word = glare_class(dgp)
+    grade = {"imperceptible": GOOD, "perceptible": FAIR}.get(word, POOR)
+    many = f"the worst of {len(pictures)} pictures" if len(pictures) > 1 else "the picture"
+    words = f"daylight glare probability in {many}, {spoken(result.times[worst.hour])}"
+    return Card("Glare at its worst", rounded(dgp, 2), "DGP", words, f"{word} glare", grade,
+                quantity("dgp").meaning, min(100 * dgp, 100))  # fmt: skip
+
+
+def _warm_hours(room: SpaceResult) -> Card | None:
+    temperatures = room.thermal.temperatures
+    if "operative_c" not in temperatures:
+        return None
+    used = occupied(room).to_numpy()
+    step = step_hours(temperatures.index)
+    warm = (temperatures["operative_c"].to_numpy() > WARM_C) & used
+    hours, total = float(warm.sum()) * step, float(used.sum()) * step
+    share = 100 * hours / total if total else float("nan")
+    words = (
+        f"with an operative temperature above {WARM_C:.0f} °C, {percent(share)} % of the "
+        f"{rounded(total, 0)} occupied hours, without cooling"
+    )
+    meaning = quantity("operative_c").meaning
+    return Card("Warm hours", rounded(hours, 0), "h", words, meaning=meaning, meter=share)
+
+
+def _comfort(room: SpaceResult) -> Card | None:
+    comfort = room.thermal.comfort
+    columns = comfort_columns(comfort)
+    used = occupied(room)
+    if not columns or not used.any():
+        return None
+    widest = columns[-1]
+    value = 100 * float(comfort.loc[used, widest].mean())
+    words = f"of the occupied hours are {_lower_first(quantity(widest).label)} of adaptive comfort"
+    outside = 100 * float((~applicable(comfort))[used].mean())
+    if outside > 0.5:
+        words += (
+            f"; {percent(outside)} % have weather that the model does not cover (counted as no)"
+        )
+    meaning = quantity(widest).meaning
+    return Card("Adaptive comfort", percent(value), "%", words, meaning=meaning, meter=value)
+
+
+def comfort_columns(comfort: pd.DataFrame) -> list[str]:
+    """The boolean columns of comfort, from the strictest limits to the widest."""
+    names = [name for name in comfort if name.startswith("within_")]
+    return sorted(names, key=lambda name: float(comfort[name].mean()))
+
+
+def _peak(room: SpaceResult) -> Card | None:
+    temperatures = room.thermal.temperatures
+    if not {"air_c", "operative_c"} <= set(temperatures):
+        return None
+    air, operative = temperatures["air_c"], temperatures["operative_c"]
+    words = (
+        f"highest operative temperature ({spoken(operative.idxmax())}); highest air temperature "
+        f"{rounded(float(air.max()), 1)} °C, lowest {rounded(float(air.min()), 1)} °C, "
+        "without heating and cooling"
+    )
+    return Card("Peak temperature", rounded(float(np.max(operative)), 1), "°C", words,
+                meaning=quantity("operative_c").meaning)  # fmt: skip
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,173 @@
+"""The building as a small mesh for the page: rooms, windows, what shades them, sensors."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Building, Space
+from scenes.figures.plan import sensor_cells
+from scenes.figures.scale import ColourScale
+from scenes.report.daylight_figures import top_of_scale, useful_column
+from scenes.report.headline import sensor_column
+from scenes.report.names import quantity
+from scenes.results import RunResult
+
+MOST_TRIANGLES = 24_000  # of what stands outdoors; the smallest are left out beyond
+KINDS = ("floor", "ceiling", "wall", "door", "frame", "glass", "outdoors")
+KIND_OF_FACE = {
+    "floor": "floor", "ceiling": "ceiling", "roof": "ceiling", "wall": "wall", "door": "door",
+    "window frame": "frame", "reveal": "wall",
+}  # fmt: skip
+STEPS = 32000  # of the 16-bit coordinates over the model's half size
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """A colouring of the sensors."""
+
+    key: str
+    scale: ColourScale
+    colours: str  # base64 of RGB bytes [S, 3], the sensors of all rooms in order
+    digits: int
+
+
+@dataclass(frozen=True, slots=True)
+class Model3D:
+    """What the page's viewer needs; positions are 16-bit integers, base64."""
+
+    centre: tuple[float, float, float]  # [m]
+    unit: float  # metres per integer step
+    batches: tuple[dict, ...]  # room index (-1 outdoors), kind, triangles, edges
+    sensors: dict  # room of each, corners, values by layer
+    layers: tuple[Layer, ...]
+    rooms: tuple[str, ...]
+    left_out: int
+
+    def json(self) -> dict:
+        """The parts that go into the page as JSON."""
+        return {
+            "unit": self.unit,
+            "batches": self.batches,
+            "sensors": self.sensors,
+            "rooms": self.rooms,
+            "layers": [{"key": layer.key, "colours": layer.colours} for layer in self.layers],
+        }
+
+
+def model3d(result: RunResult) -> Model3D:
+    """The mesh of the run's rooms, all elements outdoors, and the sensors in their colours."""
+    spaces = tuple(room.space for room in result.spaces)
+    outdoors, left_out = largest_triangles(result.building)
+    shells = [space.shell.reshape(-1, 3) for space in spaces]
+    corners = np.concatenate(shells)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    centre = (low + high) / 2
+    reach = np.abs(np.concatenate([corners, outdoors.reshape(-1, 3)]) - centre).max()
+    unit = float(reach) / STEPS
+
+    def packed(points: NDArray[np.float64]) -> str:
+        return _base64(np.round((points - centre) / unit).astype("<i2"))
+
+    batches = []
+    for index, space in enumerate(spaces):
+        for kind, triangles, edges in room_batches(space):
+            batches.append(
+                {"room": index, "kind": kind, "t": packed(triangles), "e": packed(edges)}
+            )
+    if len(outdoors):
+        edges = outline_edges(outdoors)
+        batches.append({"room": -1, "kind": "outdoors", "t": packed(outdoors), "e": packed(edges)})
+    cells, owners = [], []
+    for index, room in enumerate(result.spaces):
+        flat = sensor_cells(room.daylight.points)
+        middle = flat.mean(axis=1, keepdims=True)
+        flat = middle + 0.9 * (flat - middle)
+        z = np.broadcast_to(room.daylight.points[:, None, 2:3], (*flat.shape[:2], 1))
+        cells.append(np.concatenate([flat, z], axis=-1))
+        owners += [index] * len(flat)
+    sensors = {"room": owners, "corners": packed(np.concatenate(cells))}
+    names = tuple(room_name(space) for space in spaces)
+    return Model3D(tuple(centre), unit, tuple(batches), sensors, layers(result), names, left_out)
+
+
+def room_name(space: Space) -> str:
+    """Number and name of a room, each once."""
+    if not space.long_name or space.long_name == space.name:
+        return space.name
+    return f"{space.name} {space.long_name}"
+
+
+def room_batches(space: Space):
+    """Kind, triangles and outlines of a room's surfaces, grouped by kind."""
+    groups: dict[str, list] = {}
+    for face in space.faces:
+        groups.setdefault(KIND_OF_FACE[face.kind], []).append(face.triangles)
+    for window in space.windows:
+        groups.setdefault("glass", []).append(window.triangles)
+    for kind, parts in groups.items():
+        edges = np.concatenate([outline_edges(part) for part in parts])
+        yield kind, np.concatenate(parts), edges
+
+
+def largest_triangles(building: Building) -> tuple[NDArray[np.float64], int]:
+    """Triangles [T, 3, 3] of the elements, the smallest left out beyond the limit; how many."""
+    parts = [element.triangles for element in building.elements]
+    if not parts:
+        return np.empty((0, 3, 3)), 0
+    triangles = np.concatenate(parts)
+    if len(triangles) <= MOST_TRIANGLES:
+        return triangles, 0
+    sides = triangles[:, 1:] - triangles[:, :1]
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    keep = np.sort(np.argpartition(-area, MOST_TRIANGLES)[:MOST_TRIANGLES])
+    return triangles[keep], len(triangles) - MOST_TRIANGLES
+
+
+def outline_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Edges [E, 2, 3] where the surface ends or bends by more than 20 degrees."""
+    points, index = np.unique(np.round(triangles.reshape(-1, 3), 4), axis=0, return_inverse=True)
+    corners = index.reshape(-1, 3)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    owner = np.tile(np.arange(len(corners)), 3)
+    keys, inverse, count = np.unique(
+        np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    first, last = np.full(len(keys), -1), np.full(len(keys), -1)
+    last[inverse.ravel()] = owner
+    first[inverse.ravel()[::-1]] = owner[::-1]
+    smooth = np.einsum("ij,ij->i", normals[first], normals[last]) > np.cos(np.radians(20))
+    return points[keys[(count == 1) | ~smooth]]
+
+
+def layers(result: RunResult) -> tuple[Layer, ...]:
+    """The colourings that every room has: daylight autonomy, useful illuminance and so on."""
+    wanted = [
+        sensor_column(result.spaces[0], "da300", "da_300", "da"),
+        useful_column(result.spaces[0], ("udi_100_3000", "udi_100_2000", "udi_useful")),
+        sensor_column(result.spaces[0], "daylight_factor", "df"),
+    ]
+    found = []
+    for column in wanted:
+        if column and all(column in room.daylight.sensor_metrics for room in result.spaces):
+            values = [room.daylight.sensor_metrics[column].to_numpy() for room in result.spaces]
+            found.append(_layer(column, np.concatenate(values)))
+    mean = [room.daylight.illuminance.mean(axis=0) for room in result.spaces]
+    return (*found, _layer("annual_mean", np.concatenate(mean)))
+
+
+def _layer(key: str, values: NDArray) -> Layer:
+    q = quantity(key)
+    whole = q.unit == "%" and q.digits == 0
+    high = 100.0 if whole else top_of_scale(values)
+    scale = ColourScale(0.0, high, q.label, q.unit)
+    return Layer(key, scale, _base64(scale.rgba(values)[:, :3]), q.digits)
+
+
+def _base64(array: NDArray) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

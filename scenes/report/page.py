@@ -1,0 +1,187 @@
+"""The page: templates filled with the figures and tables of a run."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup
+
+from scenes.report import tables
+from scenes.report.model3d import model3d, room_name
+from scenes.report.names import glossary, option_words
+from scenes.report.numbers import rounded, share
+from scenes.report.room import room_page
+from scenes.results import RunResult
+
+TEMPLATES = files(__package__) / "templates"
+UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
+SCRIPTS = ("tables.js", "pointer.js", "viewer.js")
+
+
+def write_report(result: RunResult, path: Path) -> None:
+    """Write the report of a run as one self-contained HTML file."""
+    Path(path).write_text(report_html(result), encoding="utf-8")
+
+
+def report_html(result: RunResult) -> str:
+    """The report as text: no script, font or picture is fetched from anywhere."""
+    if not result.spaces:
+        raise ValueError("a report needs at least one room")
+    rooms = tuple(room_page(result, room, i) for i, room in enumerate(result.spaces, start=1))
+    manifest = result.manifest
+    model = model3d(result)
+    return environment().get_template("report.html.j2").render(
+        result=result,
+        rooms=rooms,
+        model=model,
+        comparison=comparison(result, rooms),
+        summary=summary(result),
+        problems=tables.problems_table(result),
+        inputs=inputs_table(manifest.get("inputs", {})),
+        options=options_table(manifest),
+        versions=tables.nested_table("Versions", manifest.get("versions", {})),
+        rest=tables.nested_table("Run", remaining(manifest)),
+        timings=timings_table(result),
+        worst_error=share(max(float(r.daylight.relative_error.max()) for r in result.spaces)),
+        mean_error=share(
+            sum(float(r.daylight.relative_error.mean()) for r in result.spaces)
+            / len(result.spaces)
+        ),
+        glossary=glossary(),
+        style=Markup(TEMPLATES.joinpath("style.css").read_text("utf-8")),
+        scripts=Markup("\n".join(TEMPLATES.joinpath(s).read_text("utf-8") for s in SCRIPTS)),
+    )  # fmt: skip
+
+
+def environment() -> jinja2.Environment:
+    """Templates of this package; everything inserted is escaped unless marked as markup."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(__package__),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["script_json"] = script_json
+    environment.filters["tied"] = lambda text: UNIT_AFTER_NUMBER.sub("\\1\u00a0\\2", text)
+    return environment
+
+
+def script_json(value: object) -> Markup:
+    """JSON that is safe inside a script element: no `<` can end it."""
+    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
+
+
+def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
+    """The run in a few facts."""
+    building = result.building
+    rows = [("Building", building.name or "without a name")]
+    if building.latitude_deg is not None and building.longitude_deg is not None:
+        north, east = building.latitude_deg, building.longitude_deg
+        place = f"{abs(north):.2f}° {'N' if north >= 0 else 'S'}, "
+        rows.append(("Place", place + f"{abs(east):.2f}° {'E' if east >= 0 else 'W'}"))
+    manifest = result.manifest
+    inputs = manifest.get("inputs", {})
+    main = ("building", "weather", "system")
+    rows += [(_title(name), _named(manifest, name)) for name in main if name in inputs]
+    first, last = result.times[0], result.times[-1]
+    rows.append(("Period", f"{first:%d %b} to {last:%d %b}, {rounded(len(result.times), 0)} hours"))
+    others = len(building.spaces) - len(result.spaces)
+    rooms = f"{len(result.spaces)} computed"
+    rows.append(("Rooms", rooms + (f", {others} more in the file" if others > 0 else "")))
+    return tuple(rows)
+
+
+def comparison(result: RunResult, rooms) -> tables.Table | None:
+    """The headline figures of all rooms side by side; None for a single room."""
+    if len(rooms) < 2:
+        return None
+    labels = list(dict.fromkeys(card.label for room in rooms for card in room.cards))
+    meaning = {card.label: card for room in rooms for card in room.cards}
+    columns = (
+        tables.Column("Room", numeric=False),
+        *(tables.Column(text, meaning[text].unit, meaning[text].meaning) for text in labels),
+    )
+    rows = []
+    for room in rooms:
+        values = {card.label: card.value for card in room.cards}
+        rows.append((room.name, *(values.get(label, "–") for label in labels)))
+    return tables.Table("All rooms", columns, tuple(rows))
+
+
+def options_table(manifest: Mapping) -> tables.Table:
+    """What was chosen for the run; the input files have a table of their own."""
+    columns = tuple(tables.Column(c, numeric=False) for c in ("Option", "Value", "Meaning"))
+    files = {"building", "weather", "system", *manifest.get("inputs", {})}
+    rows = []
+    for key, value in manifest.get("options", {}).items():
+        if key in files:
+            continue
+        label, meaning = option_words(key)
+        rows.append((label, tables.plain_value(value), meaning))
+    return tables.Table("Options", columns, tuple(rows))
+
+
+def inputs_table(inputs: Mapping) -> tables.Table:
+    """Input files with their hashes."""
+    columns = tuple(tables.Column(c, numeric=False) for c in ("Input", "File", "SHA-256"))
+    rows = []
+    for name, entry in inputs.items():
+        digest = entry.get("sha256", "–") if isinstance(entry, Mapping) else "–"
+        rows.append((_title(name), file_name(entry), str(digest)))
+    return tables.Table("Input files", columns, tuple(rows))
+
+
+def file_name(entry: object) -> str:
+    """The file's own name from a manifest's entry (a mapping, a path or a text)."""
+    if isinstance(entry, Mapping):
+        named = next((entry[k] for k in ("name", "file", "path") if entry.get(k)), None)
+        if named is None:
+            return "–"
+        entry = named
+    return Path(str(entry)).name
+
+
+def timings_table(result: RunResult) -> tables.Table:
+    """Seconds by stage: of each room, then of the run."""
+    columns = (
+        tables.Column("Room", numeric=False),
+        tables.Column("Stage", numeric=False),
+        tables.Column("Time", "s"),
+    )
+    rows = [
+        (room_name(room.space), stage.replace("_", " "), f"{seconds:.1f}")
+        for room in result.spaces
+        for stage, seconds in room.seconds.items()
+    ]
+    total = result.manifest.get("seconds")
+    if isinstance(total, int | float):
+        rows.append(("whole run", "all", f"{total:.1f}"))
+    return tables.Table("Time taken", columns, tuple(rows))
+
+
+def remaining(manifest: Mapping) -> dict:
+    """What the manifest holds besides the parts shown in tables of their own."""
+    shown = ("inputs", "options", "versions", "seconds", "rooms", "building", "site", "system")
+    return {key: value for key, value in manifest.items() if key not in shown}
+
+
+def _named(manifest: Mapping, name: str) -> str:
+    """The file of an input, after the name that the file gives itself."""
+    own = manifest.get({"weather": "site", "system": "system"}.get(name, ""))
+    file = file_name(manifest["inputs"][name])
+    return f"{own} ({file})" if own else file
+
+
+def _title(name: str) -> str:
+    known = {
+        "system": "Fenestration system",
+        "system_thermal": "Its thermal values",
+        "building": "Model file",
+    }
+    return known.get(name, name.replace("_", " ").capitalize())

@@ -1,0 +1,104 @@
+"""Everything that the page shows of one room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Space
+from scenes.figures.chart import Chart
+from scenes.figures.plan import Plan
+from scenes.report import daylight_figures, glare_figures, tables, thermal_figures
+from scenes.report.glare_figures import compass
+from scenes.report.headline import Card, cards
+from scenes.report.model3d import room_name
+from scenes.report.numbers import rounded, share
+from scenes.results import RunResult, SpaceResult
+
+
+@dataclass(frozen=True, slots=True)
+class RoomPage:
+    """The section of one room."""
+
+    anchor: str
+    name: str
+    facts: tuple[tuple[str, str], ...]
+    cards: tuple[Card, ...]
+    plans: tuple[Plan, ...]
+    light: Chart
+    daylight_tables: tuple[tables.Table, ...]
+    error_words: str
+    glare: glare_figures.GlareGallery | None
+    glare_table: tables.Table | None
+    temperature: Chart
+    comfort: Chart | None
+    duration: Chart
+    weeks: tuple[Chart, ...]
+    gains: Chart | None
+    gains_table: tables.Table
+    comfort_table: tables.Table
+    fenestration: tables.Table
+
+
+def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
+    """Figures and tables of a room."""
+    monthly = tables.monthly_gains(room.thermal.gains)
+    return RoomPage(
+        anchor=f"room-{number}",
+        name=room_name(room.space),
+        facts=facts(room.space),
+        cards=cards(result, room),
+        plans=daylight_figures.plans(room),
+        light=daylight_figures.illuminance_carpet(result, room),
+        daylight_tables=(
+            tables.values_table("Daylight of the room", room.daylight.room_metrics),
+            tables.sensors_table(room),
+        ),
+        error_words=error_words(room),
+        glare=glare_figures.gallery(result, room),
+        glare_table=tables.glare_table(result.times, room.glare.pictures)
+        if room.glare.pictures
+        else None,
+        temperature=thermal_figures.temperature_carpet(result, room),
+        comfort=thermal_figures.comfort_carpet(result, room),
+        duration=thermal_figures.duration_curve(room),
+        weeks=thermal_figures.extreme_weeks(room),
+        gains=thermal_figures.gains_chart(monthly),
+        gains_table=tables.gains_table(monthly),
+        comfort_table=tables.values_table("Comfort", room.thermal.comfort_summary),
+        fenestration=tables.values_table("The window with its shade", room.thermal.fenestration),
+    )
+
+
+def facts(space: Space) -> tuple[tuple[str, str], ...]:
+    """Size and windows of the room in words."""
+    glass = sum(window.area for window in space.windows)
+    count = len(space.windows)
+    rows = [
+        ("Floor area", f"{rounded(space.floor_area, 1)} m²"),
+        ("Air volume", f"{rounded(space.volume, 0)} m³"),
+        ("Windows", f"{count} with {rounded(glass, 1)} m² of glass"),
+        ("Facing", ", ".join(dict.fromkeys(heading(w.normal) for w in space.windows)) or "–"),
+        ("Glass to floor", f"{rounded(100 * glass / space.floor_area, 0)} %"),
+    ]
+    if space.storey:
+        rows.append(("Storey", space.storey))
+    return tuple(rows)
+
+
+def heading(normal: NDArray[np.float64]) -> str:
+    """The compass direction that a window faces, or "up"."""
+    if normal[2] > 0.7:
+        return "up"
+    return compass(normal)
+
+
+def error_words(room: SpaceResult) -> str:
+    """The standard error of the room's illuminances in one sentence."""
+    error = room.daylight.relative_error
+    return (
+        f"Relative standard error of the annual mean illuminance: {share(float(error.mean()))} % "
+        f"as a mean over {len(error)} sensors, {share(float(error.max()))} % at the worst one."
+    )

@@ -1,0 +1,178 @@
+"""Tables of the report: rows of cells ready for plain HTML, sortable and easy to copy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import pandas as pd
+
+from scenes.report.names import Quantity, quantity
+from scenes.report.numbers import cell
+from scenes.results import LuminancePicture, RunResult, SpaceResult
+
+DGP_LIMITS = ((0.35, "imperceptible"), (0.40, "perceptible"), (0.45, "disturbing"))
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column: heading, unit, what it means, and whether it holds numbers."""
+
+    label: str
+    unit: str = ""
+    meaning: str = ""
+    numeric: bool = True
+    short: bool = False  # text that is not broken into lines
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Headed rows of text."""
+
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def glare_class(dgp: float) -> str:
+    """The word for a daylight glare probability (Wienold 2009; EN 14501)."""
+    return next((word for limit, word in DGP_LIMITS if dgp <= limit), "intolerable")
+
+
+def glare_table(times: pd.DatetimeIndex, pictures: Iterable[LuminancePicture]) -> Table:
+    """The glare of each picture's hour, in time's order."""
+    pictures = sorted(pictures, key=lambda picture: picture.hour)
+    others = dict.fromkeys(key for picture in pictures for key in picture.glare)
+    keys = ["dgp", *(key for key in others if key != "dgp")]
+    columns = [Column("Hour", numeric=False, short=True)]
+    columns += [_column(key) for key in keys]
+    columns.insert(2, Column("Class", "", "Class of DGP.", numeric=False, short=True))
+    columns.append(Column("Brightest pixel", "cd/m²", "Highest luminance in the picture."))
+    rows = []
+    for picture in pictures:
+        row = [moment(times[picture.hour])]
+        row += [cell(picture.glare.get(key), quantity(key).digits) for key in keys]
+        row.insert(2, glare_class(picture.glare["dgp"]))
+        row.append(cell(float(picture.luminance.max()), 0))
+        rows.append(tuple(row))
+    return Table("Glare by hour", tuple(columns), tuple(rows))
+
+
+def moment(time: pd.Timestamp) -> str:
+    """A time as a reader says it, sortable as text too."""
+    return f"{time:%Y-%m-%d %H:%M}"
+
+
+def spoken(time: pd.Timestamp) -> str:
+    """A time in a sentence; the year of a weather file means nothing."""
+    return f"{time.day} {time:%B} {time:%H:%M}"
+
+
+def monthly_gains(gains: pd.DataFrame) -> pd.DataFrame:
+    """Energy by month [kWh] of the columns in watts, indexed by the month's first day."""
+    watts = gains[[name for name in gains if name.endswith("_w")]]
+    hours = step_hours(watts.index)
+    return (watts * hours / 1000).groupby(watts.index.to_period("M")).sum()
+
+
+def step_hours(times: pd.DatetimeIndex) -> float:
+    """Length of an interval [h]: the shortest step."""
+    if len(times) < 2:
+        return 1.0
+    return float(times.to_series().diff().min() / pd.Timedelta(hours=1))
+
+
+def gains_table(monthly: pd.DataFrame) -> Table:
+    """Monthly energies with their sum."""
+    columns = [Column("Month", numeric=False, short=True)]
+    columns += [Column(quantity(n).label, "kWh", quantity(n).meaning) for n in monthly]
+    rows = [
+        (f"{month:%Y-%m}", *(cell(v, 0) for v in row))
+        for month, row in zip(monthly.index, monthly.to_numpy(), strict=True)
+    ]
+    rows.append(("Sum", *(cell(v, 0) for v in monthly.sum())))
+    return Table("Solar energy by month", tuple(columns), tuple(rows))
+
+
+def values_table(caption: str, values: Mapping[str, float]) -> Table:
+    """Named numbers, one a row."""
+    rows = []
+    for key, value in values.items():
+        q = quantity(key)
+        rows.append((q.label, named(q, value), q.unit, q.meaning))
+    columns = (
+        Column("Quantity", numeric=False),
+        Column("Value"),
+        Column("Unit", numeric=False, short=True),
+        Column("Meaning", numeric=False),
+    )
+    return Table(caption, columns, tuple(rows))
+
+
+def named(q: Quantity, value: float | str | None) -> str:
+    """The value as text; by its name where the quantity has names for its values."""
+    if isinstance(value, str):
+        return value
+    if value is not None and q.values and 0 <= int(value) < len(q.values):
+        return q.values[int(value)]
+    return cell(value, q.digits)
+
+
+def sensors_table(room: SpaceResult) -> Table:
+    """Every sensor with its metrics and its standard error."""
+    daylight = room.daylight
+    frame = daylight.sensor_metrics
+    columns = [Column("Sensor")] + [_column(key) for key in frame]
+    columns += [Column("Annual mean", "lx"), Column("Standard error", "%")]
+    digits = [2 if key in ("x", "y", "z") else max(quantity(key).digits, 1) for key in frame]
+    mean = daylight.illuminance.mean(axis=0)
+    rows = [
+        (
+            str(i),
+            *(cell(float(v), d) for v, d in zip(row, digits, strict=True)),
+            cell(float(mean[i]), 0),
+            cell(100 * float(daylight.relative_error[i]), 2),
+        )
+        for i, row in enumerate(frame.to_numpy())
+    ]
+    return Table(f"Sensors of {room.space.name}", tuple(columns), tuple(rows))
+
+
+def problems_table(result: RunResult) -> Table:
+    """What is wrong with the building's file and what was done about it."""
+    columns = tuple(
+        Column(label, numeric=False) for label in ("Where", "What", "Consequence and repair")
+    )
+    rows = tuple((p.where, p.what, p.consequence) for p in result.problems)
+    return Table("By element", columns, rows)
+
+
+def nested_table(caption: str, content: Mapping) -> Table:
+    """Any nested mapping of the manifest, one value a row."""
+    columns = (Column("Name", numeric=False), Column("Value", numeric=False))
+    return Table(caption, columns, tuple(_flat(content)))
+
+
+def _flat(content: Mapping, prefix: str = "") -> Iterable[tuple[str, str]]:
+    for key, value in content.items():
+        name = f"{prefix}{key}".replace("_", " ")
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{name} › ")
+        else:
+            yield name, plain_value(value)
+
+
+def plain_value(value: object) -> str:
+    """A value of the manifest as text."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, value)) or "–"
+    return "–" if value is None else str(value)
+
+
+def _column(key: str) -> Column:
+    q = quantity(key)
+    if key in ("x", "y", "z"):
+        return Column(key, "m")
+    return Column(q.label, q.unit, q.meaning)

@@ -1,0 +1,52 @@
+// Tables: sort by a click on a heading, copy as tab-separated text for a spreadsheet.
+(() => {
+  "use strict";
+  const text = (cell) => cell.textContent.trim();
+  const number = (s) => (s === "" || s === "–" ? NaN : Number(s.replace(/\u202f/g, "").replace("−", "-")));
+  function sort(table, column, th) {
+    const down = th.getAttribute("aria-sort") === "ascending";
+    const body = table.tBodies[0];
+    const rows = [...body.rows].filter((row) => !row.classList.contains("sum"));
+    const numeric = th.classList.contains("number");
+    const compare = (a, b) => {
+      const s = text(a.cells[column]), t = text(b.cells[column]);
+      if (!numeric) return s.localeCompare(t, undefined, { numeric: true });
+      const x = number(s), y = number(t);
+      return isNaN(x) ? (isNaN(y) ? 0 : 1) : isNaN(y) ? -1 : x - y;
+    };
+    rows.sort((a, b) => (down ? -compare(a, b) : compare(a, b)));
+    for (const other of table.querySelectorAll("th[aria-sort]")) other.removeAttribute("aria-sort");
+    th.setAttribute("aria-sort", down ? "descending" : "ascending");
+    const sum = body.querySelector(".sum");
+    for (const row of rows) body.insertBefore(row, sum);
+  }
+  for (const table of document.querySelectorAll("table.sortable")) {
+    [...table.tHead.rows[0].cells].forEach((th, column) => {
+      th.tabIndex = 0;
+      th.addEventListener("click", () => sort(table, column, th));
+      th.addEventListener("keydown", (event) => {
+        if (event.key === "Enter" || event.key === " ") { event.preventDefault(); sort(table, column, th); }
+      });
+    });
+  }
+  function copyText(string) {
+    const area = document.createElement("textarea");
+    area.value = string;
+    area.style.position = "fixed";
+    area.style.opacity = "0";
+    document.body.append(area);
+    area.select();
+    const done = document.execCommand("copy");
+    area.remove();
+    return done;
+  }
+  for (const button of document.querySelectorAll("button.copy")) {
+    button.addEventListener("click", () => {
+      const table = button.closest(".table-box").querySelector("table");
+      const lines = [...table.rows].map((row) => [...row.cells].map(text).join("\t"));
+      const done = copyText(lines.join("\n"));
+      button.textContent = done ? "Copied" : "Not copied";
+      setTimeout(() => { button.textContent = "Copy"; }, 1500);
+    });
+  }
+})();

@@ -1,0 +1,196 @@
+"""Figures of a room's heat: carpets of temperature and comfort, duration curve, weeks, gains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from scenes.figures.carpet import carpet, class_carpet
+from scenes.figures.chart import Chart, Mark, Readout, box, line
+from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
+from scenes.report.headline import WARM_C, applicable, comfort_columns, occupied
+from scenes.report.names import quantity
+from scenes.report.numbers import percent, rounded
+from scenes.report.tables import step_hours
+from scenes.results import RunResult, SpaceResult
+
+STACKED = ("transmitted_w", "absorbed_outer_w", "absorbed_inner_w")  # do not overlap
+CURVES = {"outdoor_c": "outdoor", "air_c": "air", "operative_c": "operative"}
+STRICT, COMFORT, WARM, COLD, UNKNOWN = "#3a9d5d", "#a9d8b4", "#d9622b", "#3b6fb6", "#a8a8a8"
+
+
+def temperature_carpet(result: RunResult, room: SpaceResult) -> Chart:
+    """Operative temperature of every hour."""
+    values = room.thermal.temperatures["operative_c"].to_numpy()
+    low, high = round_limits(values, 8)
+    scale = ColourScale(low, high, "Operative temperature", "°C", colours="cividis")
+    return carpet(
+        result.times, values, scale, title="Operative temperature", digits=1,
+        explanation=quantity("operative_c").meaning + " Without heating and cooling.",
+    )  # fmt: skip
+
+
+def comfort_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
+    """Adaptive comfort of every occupied hour in classes."""
+    comfort = room.thermal.comfort
+    columns = comfort_columns(comfort)
+    if not columns or "comfort_c" not in comfort:
+        return None
+    operative = room.thermal.temperatures["operative_c"].to_numpy()
+    neutral = comfort["comfort_c"].to_numpy()
+    covered = applicable(comfort).to_numpy()
+    within = comfort[columns[-1]].to_numpy(dtype=bool)
+    strict = comfort[columns[0]].to_numpy(dtype=bool)
+    classes = np.select(
+        [~occupied(room).to_numpy(), strict, within, ~covered, operative > neutral],
+        [-1, 0, 1, 4, 2],
+        default=3,
+    )
+    wide, narrow = quantity(columns[-1]).label, quantity(columns[0]).label
+    legend = ((STRICT, narrow), (COMFORT, f"{wide} only"), (WARM, "Too warm"), (COLD, "Too cold"),
+              (UNKNOWN, "Weather that the model does not cover"))  # fmt: skip
+    share = 100 * np.bincount(classes[classes >= 0], minlength=5) / max((classes >= 0).sum(), 1)
+    names = tuple(
+        (c, f"{n}: {percent(float(s))} %") for (c, n), s in zip(legend, share, strict=True)
+    )
+    used = [i for i in range(5) if share[i] > 0]
+    order = np.full(6, -1)
+    order[used] = np.arange(len(used))
+    return class_carpet(
+        result.times, order[classes], tuple(names[i] for i in used), title="Adaptive comfort",
+        explanation="Occupied hours, by how the operative temperature compares with what people "
+        "accept after the recent weather; other hours are left empty.",
+    )  # fmt: skip
+
+
+def duration_curve(room: SpaceResult) -> Chart:
+    """Hours of the year above each temperature."""
+    temperatures = room.thermal.temperatures
+    hours = len(temperatures) * step_hours(temperatures.index)
+    curves = {name: temperatures[name].to_numpy() for name in CURVES if name in temperatures}
+    y_range = round_limits(np.concatenate([*curves.values(), [WARM_C]]))
+    share = np.linspace(0, 1, 241)
+    sorted_curves = {name: np.quantile(v, 1 - share) for name, v in curves.items()}
+    x_range = (0.0, hours)
+    marks = [Mark(line(x_range, (WARM_C, WARM_C), x_range, y_range), "limit", f"{WARM_C:.0f} °C")]
+    marks += [
+        Mark(line(share * hours, v, x_range, y_range), CURVES[name], quantity(name).label)
+        for name, v in sorted_curves.items()
+    ]
+    above = float((curves["operative_c"] > WARM_C).mean()) * hours if "operative_c" in curves else 0
+    return Chart(
+        "Temperature duration",
+        "Each curve shows for how many hours a temperature is exceeded. The operative temperature "
+        f"is above {WARM_C:.0f} °C for {rounded(above, 0)} of {rounded(hours, 0)} hours, occupied "
+        "or not.",
+        "Hours above [h]",
+        "Temperature [°C]",
+        axis_ticks(*x_range, 6),
+        axis_ticks(*y_range),
+        tuple(marks),
+        readout=Readout(
+            tuple(f"{rounded(s * hours, 0)} h above" for s in share),
+            tuple(
+                (quantity(n).label, tuple(f"{rounded(float(t), 1)} °C" for t in v))
+                for n, v in sorted_curves.items()
+            ),
+        ),
+    )
+
+
+def extreme_weeks(room: SpaceResult) -> tuple[Chart, ...]:
+    """The warmest and the coldest seven days indoors."""
+    temperatures = room.thermal.temperatures
+    daily = temperatures["operative_c"].resample("D").mean()
+    if len(daily) < 8:
+        return (week(room, temperatures.index[0].normalize(), "The period"),)
+    weekly = daily.rolling(7).mean()
+    warm, cold = (day - pd.Timedelta(days=6) for day in (weekly.idxmax(), weekly.idxmin()))
+    return week(room, warm, "The warmest week"), week(room, cold, "The coldest week")
+
+
+def week(room: SpaceResult, start: pd.Timestamp, title: str) -> Chart:
+    """Seven days of temperatures, hour by hour."""
+    stop = start + pd.Timedelta(days=7)
+    inside = (room.thermal.temperatures.index >= start) & (room.thermal.temperatures.index < stop)
+    part = room.thermal.temperatures[inside]
+    curves = {name: part[name].to_numpy() for name in CURVES if name in part}
+    comfort = room.thermal.comfort
+    if "comfort_c" in comfort:
+        covered = applicable(comfort)[inside]
+        if covered.any():
+            curves["comfort_c"] = comfort.loc[inside, "comfort_c"].where(covered).to_numpy()
+    x = (part.index - start) / pd.Timedelta(days=1)
+    y_range = round_limits(np.concatenate(list(curves.values())))
+    marks = [
+        Mark(line(x, v, (0, 7), y_range), CURVES.get(name, "limit"), quantity(name).label)
+        for name, v in curves.items()
+    ]
+    days = [start + pd.Timedelta(days=i) for i in range(7)]
+    ticks = [Tick(100 * (i + 0.5) / 7, f"{d.day}", f" {d:%b}", False) for i, d in enumerate(days)]
+    last = stop - pd.Timedelta(days=1)
+    return Chart(
+        f"{title}: {start.day} {start:%B} to {last.day} {last:%B}",
+        "Temperatures outdoors and in the room, without heating and cooling.",
+        "Day",
+        "Temperature [°C]",
+        tuple(ticks),
+        axis_ticks(*y_range),
+        (Mark(_midnights(y_range), "grid"), *marks),
+        readout=_readout([f"{t:%d %b %H:%M}" for t in part.index], curves),
+    )
+
+
+def _midnights(y_range: tuple[float, float]) -> str:
+    return "".join(line((i, i), y_range, (0, 7), y_range) for i in range(1, 7))
+
+
+def _readout(names: Sequence[str], curves: dict[str, np.ndarray]) -> Readout:
+    rows = tuple(
+        (quantity(name).label, tuple(f"{rounded(float(t), 1)} °C" for t in v))
+        for name, v in curves.items()
+    )
+    return Readout(tuple(names), rows)
+
+
+def gains_chart(monthly: pd.DataFrame) -> Chart | None:
+    """Solar energy that enters or is absorbed, stacked by month, against what arrives."""
+    incident = next((name for name in monthly if name.startswith("incident")), None)
+    parts = [name for name in STACKED if name in monthly]
+    if not parts or not len(monthly):
+        return None
+    tops = [monthly[incident].max()] if incident else []
+    y_range = (0.0, max(round_limits([0, monthly[parts].sum(axis=1).max(), *tops])[1], 1.0))
+    x_range = (0.0, float(len(monthly)))
+    marks = []
+    if incident:
+        path = "".join(
+            box(i + 0.14, i + 0.86, 0, v, x_range, y_range) for i, v in enumerate(monthly[incident])
+        )
+        marks.append(Mark(path, "incident", quantity(incident).label, filled=True))
+    base = np.zeros(len(monthly))
+    for number, name in enumerate(parts):
+        top = base + monthly[name].to_numpy()
+        path = "".join(
+            box(i + 0.2, i + 0.8, a, b, x_range, y_range)
+            for i, (a, b) in enumerate(zip(base, top, strict=True))
+        )
+        marks.append(Mark(path, f"part{min(number, 3)}", quantity(name).label, filled=True))
+        base = top
+    ticks = tuple(
+        Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)
+        for i, m in enumerate(monthly.index)
+    )
+    return Chart(
+        "Solar energy by month",
+        "What reaches the glass from outside, and what of it passes into the room or is absorbed "
+        "in the window (part of which reaches the room as heat).",
+        "Month", "Energy [kWh]", ticks, axis_ticks(*y_range), tuple(marks),
+        readout=Readout(
+            tuple(f"{m:%B}" for m in monthly.index),
+            tuple((quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n]))
+                  for n in ([incident] if incident else []) + parts),
+        ),
+    )  # fmt: skip

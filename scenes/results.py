@@ -1,0 +1,77 @@
+"""What a run yields for each room: arrays and tables, before any file or figure is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bim.model import Building, Problem, Space
+from mitsuba_cfs.images.view import View
+
+
+@dataclass(frozen=True, slots=True)
+class LuminancePicture:
+    """A fisheye luminance picture of one hour, and its glare."""
+
+    hour: int  # index into the times of the result
+    luminance: NDArray[np.float32]  # [ny, nx] [cd/m2]
+    glare: dict[str, float]  # dgp, ev [lx], dgi, ugr, vcp, cgi, sources (a count)
+    # [n, ny, nx] boolean masks are big: the pixels of all glare sources together
+    source_mask: NDArray[np.bool_] | None = None  # [ny, nx]
+
+
+@dataclass(frozen=True, slots=True)
+class DaylightResult:
+    """Work-plane illuminance of a year and the metrics drawn from it."""
+
+    points: NDArray[np.float64]  # [S, 3] sensors [m]
+    illuminance: NDArray[np.float32]  # [H, S] [lx]
+    relative_error: NDArray[np.float64]  # [S] standard error of the annual mean, from the tracing
+    sensor_metrics: pd.DataFrame  # by sensor: x, y, z, da300, cda300, udi..., daylight_factor
+    room_metrics: dict[str, float]  # sda, ase, en17037..., by name; percentages as 0..100
+
+
+@dataclass(frozen=True, slots=True)
+class GlareResults:
+    """Pictures of the chosen hours from one view point."""
+
+    view: View
+    pictures: tuple[LuminancePicture, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ThermalResult:
+    """Free-floating temperatures of a year and adaptive comfort."""
+
+    temperatures: pd.DataFrame  # [H] index time: outdoor_c, air_c, mrt_c, operative_c, surfaces...
+    gains: pd.DataFrame  # [H] index time: incident_w, transmitted_w, absorbed_outer_w, ...
+    comfort: pd.DataFrame  # [H] index time: occupied, comfort_c, within_80, within_90, ... (bool)
+    comfort_summary: dict[str, float]  # by name; percentages as 0..100
+    fenestration: dict[str, float]  # u_value, g_value, transmittance, ... at normal incidence
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceResult:
+    """Everything computed for one room."""
+
+    space: Space
+    daylight: DaylightResult
+    glare: GlareResults
+    thermal: ThermalResult
+    seconds: dict[str, float]  # by stage
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """A run: the building, its rooms, and how it was made."""
+
+    building: Building
+    times: pd.DatetimeIndex  # [H] middle of each interval, local standard time
+    sun: NDArray[np.float64]  # [H, 3] direction to the sun
+    spaces: tuple[SpaceResult, ...]
+    problems: tuple[Problem, ...]
+    manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
+    notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know

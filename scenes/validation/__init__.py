@@ -1,0 +1,1 @@
+"""Remakes of published comparisons: scripts that anyone can run, and the figures they print."""

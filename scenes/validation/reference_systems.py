@@ -1,0 +1,162 @@
+"""The four fenestration systems of the reference set: their optics and their closures.
+
+A closure turns the same measurable data into the two-layer model:
+
+    kuhn      plain Kuhn: nominal films 0.04 and 0.13, R constant from U
+    linear    the same with U linear in temperature (Fener)
+    surface   R(T_m, dT) in place of a constant
+    films     R(T_m, dT), and the resistances that the system's faces really have
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.directions import incident_azimuth
+from thermal.blackbox import (
+    R_INNER,
+    R_OUTER,
+    Fenestration,
+    LayerAbsorptances,
+    LayerResistance,
+    layer_absorptances,
+    linear_u,
+    with_realised_films,
+)
+
+FloatArray = NDArray[np.float64]
+SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
+CLOSURES = ("kuhn", "linear", "surface", "films")
+REALISED_STATE = 0  # of the U list: 0/20 degC
+
+
+@dataclass(frozen=True, slots=True)
+class Optics:
+    """Solar properties per direction (rotationally symmetric: per angle), and for diffuse light."""
+
+    theta: FloatArray  # [K] [rad]
+    phi: FloatArray | None  # [K] [rad] incident azimuth, or None
+    tau: FloatArray  # [K]
+    rho: FloatArray  # [K]
+    g: FloatArray  # [K]
+    diffuse: FloatArray  # [2, 3] tau, rho, g for light from the sky and from the ground
+    scatter: FloatArray | None  # [K, K] flux transmitted into each outgoing direction, per incident
+    back: dict[str, float]  # room side: tau, rho, and the share of absorbed light per layer
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """A fenestration system with one closure: thermal data, layer absorptances, optics."""
+
+    fenestration: Fenestration
+    optics: Optics
+    direct: LayerAbsorptances  # [K]
+    diffuse: LayerAbsorptances  # [2] sky, ground
+    back_layers: tuple[float, float]  # room-side absorptances of the outer and inner layer
+
+
+def read_optics(folder: Path, name: str) -> Optics:
+    """Optics of a system of the reference set, as WINDOW's engine computed them."""
+    data = json.loads((folder / f"blackbox_{name}.json").read_text())
+    back = json.loads((folder / "blackbox_back.json").read_text())[name]
+    if name == "ext_blind":
+        return _klems_optics(folder, back)
+    rows = sorted(data["angular"], key=lambda row: row["theta"])
+    theta, tau, rho, g = (np.array([r[k] for r in rows]) for k in ("theta", "tau", "rho", "g"))
+    d = data["diffuse"]
+    both = np.array([[d["tau"], d["rho"], d["g"]]] * 2)
+    return Optics(np.radians(theta), None, tau, rho, g, both, None, back)
+
+
+def _klems_optics(folder: Path, back: dict[str, float]) -> Optics:
+    z = np.load(folder / "blackbox_ext_blind_klems.npz")
+    theta, phi, weight = np.radians(z["theta"]), np.radians(z["phi"]), z["lam"]
+    above = np.sin(phi) < -1e-9
+    below = np.sin(phi) > 1e-9
+    level = ~above & ~below
+    columns = np.stack([z["tau"], z["rho"], z["g"]])
+    halves = [
+        columns @ (weight * (half + 0.5 * level)) / np.sum(weight * (half + 0.5 * level))
+        for half in (above, below)
+    ]
+    scatter = z["T_front_bsdf"] * weight[:, None]
+    if (
+        np.abs(scatter.sum(axis=0) - z["tau"]).max()
+        > np.abs((z["T_front_bsdf"].T * weight[:, None]).sum(axis=0) - z["tau"]).max()
+    ):
+        scatter = z["T_front_bsdf"].T * weight[:, None]
+    return Optics(theta, phi, z["tau"], z["rho"], z["g"], np.array(halves), scatter, back)
+
+
+def at_directions(values: FloatArray, optics: Optics, local: FloatArray) -> FloatArray:
+    """A property [K] at directions [T, 3] to the light in the window frame, interpolated."""
+    theta = np.arccos(np.clip(local[:, 2], 0.0, 1.0))
+    if optics.phi is None:
+        return np.interp(theta, optics.theta, values)
+    phi = incident_azimuth(local)
+    rings = np.unique(optics.theta.round(6))
+    per_ring = []
+    for ring in rings:
+        mine = np.flatnonzero(np.abs(optics.theta - ring) < 1e-5)
+        order = mine[np.argsort(optics.phi[mine])]
+        per_ring.append(np.interp(phi, optics.phi[order], values[order], period=2 * np.pi))
+    stack = np.stack(per_ring)
+    at = np.clip(np.searchsorted(rings, theta) - 1, 0, len(rings) - 2)
+    f = np.clip((theta - rings[at]) / (rings[at + 1] - rings[at]), 0.0, 1.0)
+    step = np.arange(len(theta))
+    value = stack[at, step] * (1 - f) + stack[at + 1, step] * f
+    grazing = np.clip((np.pi / 2 - theta) / (np.pi / 2 - rings[-1]), 0.0, 1.0)
+    return value * np.where(theta > rings[-1], grazing, 1.0)
+
+
+def system(
+    folder: Path,
+    name: str,
+    closure: str,
+    optics: Optics | None = None,
+    *,
+    u_value: float | None = None,
+) -> System:
+    """A system of the reference set with one of the closures; other optics or U where given."""
+    if closure not in CLOSURES:
+        raise ValueError(f"closure {closure!r} is not of {', '.join(CLOSURES)}")
+    optics = read_optics(folder, name) if optics is None else optics
+    data = json.loads((folder / f"blackbox_{name}.json").read_text())
+    fit = json.loads((folder / "blackbox_R.json").read_text())[f"{name}_fit"]
+    state = data["U"][REALISED_STATE]
+    u = state["U"] if u_value is None else u_value
+    emissivity = 0.84 if name in ("dgu", "ext_blind", "ext_shade") else 0.9
+    outside = 0.9 if name.startswith("ext") else 0.84
+    resistance = {"kuhn": None, "linear": linear_u(u)}.get(
+        closure, LayerResistance("surface", tuple(fit))
+    )
+    plain = Fenestration(
+        name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
+    )
+    if closure == "films":
+        plain = with_realised_films(
+            plain,
+            r_inner_realised=state["R_i"] if name == "int_shade" else None,
+            r_outer_realised=state["R_e"] if name.startswith("ext") else None,
+        )
+    films = {"r_outer": plain.r_outer, "r_inner": plain.r_inner, "item": name}
+    direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, **films)
+    tau, rho, g = optics.diffuse.T
+    diffuse = layer_absorptances(tau, rho, g, u, **films)
+    return System(plain, optics, direct, diffuse, _back_layers(data, optics, plain))
+
+
+def _back_layers(data: dict, optics: Optics, f: Fenestration) -> tuple[float, float]:
+    """Room-side absorptances of the two layers, by the inward fractions of the real panes."""
+    alpha = np.array(optics.back["alpha_back_layers"])
+    if data["cfs"] == "dgu":
+        alpha = alpha[::-1]  # the engine lists a specular system's back side the other way round
+    inward = np.array(data["N_inward_fractions"])
+    r = 1.0 / f.u_value - f.r_outer - f.r_inner
+    inner = np.clip((inward / f.u_value - f.r_outer) / r, 0.0, 1.0)
+    return float(alpha @ (1 - inner)), float(alpha @ inner)

@@ -1,0 +1,91 @@
+"""Rooms found between building elements, with gaps; telling inside from outside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bim.enclosure import (
+    interior_parts,
+    main_wall_direction,
+    outer_part,
+    rooms_enclosed_by,
+    touching_parts,
+)
+from bim.read_ifc import read_ifc
+from bim.shell import enclosed_volume, open_edges
+from bim.solids import solid_of, triangles_of
+from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WALLS, WIDTH, box_room
+
+VOLUME = WIDTH * DEPTH * HEIGHT
+
+
+def box(low, size) -> np.ndarray:
+    """Triangles of a box, normals out."""
+    x0, y0, z0 = low
+    x1, y1, z1 = np.add(low, size)
+    outline = ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
+    corners = np.array([[x, y, z] for z in (z0, z1) for x, y in outline], dtype=float)
+    quads = [(3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+    index = [k for a, b, c, d in quads for k in ((a, b, c), (a, c, d))]
+    return corners[index].reshape(-1, 3, 3)
+
+
+def room(gap: float = 0.0) -> list[np.ndarray]:
+    """Walls, floor and roof as six boxes; the roof hovers `gap` above the walls."""
+    size = (WIDTH + 2 * WALL, DEPTH + 2 * WALL, 0.2)
+    slabs = [box((-WALL, -WALL, z), size) for z in (-0.2, HEIGHT + gap)]
+    return [*slabs, *(box(low, size) for low, size in WALLS.values())]
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.005, 0.015])
+def test_room_between_walls_with_a_gap(gap):
+    (found,) = rooms_enclosed_by(room(gap))
+    # the room reaches up to the roof, and half the closing distance into the gap: below 0.2 %
+    assert found.volume() == pytest.approx(VOLUME * (1 + gap / HEIGHT), rel=2e-3)
+
+
+def test_gap_of_30_mm_stays_open_unless_asked_for():
+    assert rooms_enclosed_by(room(0.03)) == []
+    assert len(rooms_enclosed_by(room(0.03), gap=0.05)) == 1
+
+
+def test_turned_walls_are_widened_along_themselves():
+    c, s = np.cos(0.5), np.sin(0.5)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    (found,) = rooms_enclosed_by([part @ turn.T for part in room(0.015)])
+    assert found.volume() == pytest.approx(VOLUME * (1 + 0.015 / HEIGHT), rel=2e-3)
+    angle = np.arctan2(*main_wall_direction(np.concatenate(room()) @ turn.T)[0, [1, 0]])
+    assert np.mod(angle - 0.5, np.pi / 2) == pytest.approx(0, abs=1e-9)
+
+
+def test_touching_parts_ray_from_outside_and_winding_agree():
+    outside, inside, other = (
+        box((0, 0, 0), (9, 9, 9)),
+        box((1, 1, 1), (2, 2, 2)),
+        box((5, 5, 5), (1, 1, 1)),
+    )
+    surface = np.concatenate([inside[:, ::-1], outside, other[:, ::-1]])
+    labels = touching_parts(surface)
+    assert len(np.unique(labels)) == 3
+    assert np.all((labels == outer_part(surface, labels)) == (np.arange(36) // 12 == 1))
+    volumes = sorted(-enclosed_volume(part) for part in interior_parts(surface))
+    np.testing.assert_allclose(volumes, [1, 8])
+
+
+def test_solid_without_void_has_no_interior():
+    triangles, _ = triangles_of(solid_of(box((0, 0, 0), (1, 1, 1))).manifold)
+    assert interior_parts(triangles) == []
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_file_without_spaces_gets_its_room_and_window(tmp_path, schema):
+    path = tmp_path / "model.ifc"
+    box_room(schema, space=False).write(str(path))
+    building = read_ifc(path)
+    (space,) = building.spaces
+    assert space.room_volume == pytest.approx(VOLUME, rel=1e-3)  # details below 1 mm are smoothed
+    assert space.windows[0].area == pytest.approx(GLASS_AREA, rel=1e-3)
+    assert open_edges(space.shell) == 0
+    assert any("has no spaces" in problem.what for problem in building.problems)
+    assert space.guid == read_ifc(path).spaces[0].guid  # the same in every run

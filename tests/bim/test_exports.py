@@ -1,0 +1,91 @@
+"""EnergyPlus runs the exported room; the glTF holds what the building holds."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from bim.read_ifc import read_ifc
+from bim.shoebox import WindowRectangle, shoebox
+from bim.to_energyplus import write_epjson
+from bim.to_gltf import write_gltf
+from tests.bim.small_ifc import box_room
+
+WINDOWS = (
+    WindowRectangle(0.5, 0.9, 1.4, 1.5, frame=0.06),
+    WindowRectangle(2.2, 0.9, 1.4, 1.5, frame=0.06),
+)
+
+
+def run_energyplus(path: Path, folder: Path) -> tuple[str, list[dict[str, str]]]:
+    """Error file and hourly table of a run with the weather that comes with EnergyPlus."""
+    api_module = pytest.importorskip("pyenergyplus.api")
+    home = Path(api_module.__file__).parent
+    weather = next((home / "data" / "weather").glob("*Chicago*.epw"), None)
+    if weather is None:
+        pytest.skip("EnergyPlus comes without a weather file here")
+    api = api_module.EnergyPlusAPI()
+    state = api.state_manager.new_state()
+    api.runtime.set_console_output_status(state, False)
+    code = api.runtime.run_energyplus(
+        state, ["-d", str(folder), "-r", "-w", str(weather), str(path)]
+    )
+    errors = (folder / "eplusout.err").read_text()
+    assert code == 0, errors[-2000:]
+    with (folder / "eplusout.csv").open(newline="") as stream:
+        return errors, list(csv.DictReader(stream))
+
+
+@pytest.mark.peer
+@pytest.mark.parametrize("source", ["shoebox", "IFC2X3", "IFC4"])
+def test_energyplus_runs_the_exported_room(tmp_path, source):
+    if source == "shoebox":
+        building = shoebox(windows=WINDOWS, recess=0.15)
+    else:
+        box_room(source).write(str(tmp_path / "room.ifc"))
+        building = read_ifc(tmp_path / "room.ifc")
+    path = tmp_path / "room.epJSON"
+    write_epjson(building, path)
+    errors, rows = run_energyplus(path, tmp_path)
+    assert "** Severe" not in errors and "Fatal" not in errors
+    column = next(name for name in rows[0] if "Zone Mean Air Temperature" in name)
+    air = np.array([float(row[column]) for row in rows])
+    assert len(air) == 8760
+    # a free-floating room behind glass: warmer than Chicago's mean of 10 degrees, no oven
+    assert 10 < air.mean() < 30 and air.min() > -25 and air.max() < 60
+
+
+def test_epjson_keeps_areas_and_volume(tmp_path):
+    building = shoebox(4, 6, 3, windows=WINDOWS, recess=0.15)
+    path = tmp_path / "room.epJSON"
+    write_epjson(building, path)
+    model = json.loads(path.read_text())
+    (zone,) = model["Zone"].values()
+    assert zone["volume"] == pytest.approx(72 + 0.15 * 2 * 1.4 * 1.5)
+    areas = {"Floor": 0.0, "Ceiling": 0.0, "Roof": 0.0, "Wall": 0.0}
+    for surface in model["BuildingSurface:Detailed"].values():
+        ring = np.array([list(vertex.values()) for vertex in surface["vertices"]])
+        area = 0.5 * np.linalg.norm(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0))
+        areas[surface["surface_type"]] += area
+    recess = 2 * 2 * (1.4 + 1.5) * 0.15
+    # parents of windows are a thousandth bigger than their openings: glass has to lie inside
+    assert areas["Wall"] == pytest.approx(2 * (4 + 6) * 3 + recess, rel=1e-4)
+    assert areas["Floor"] == pytest.approx(24) and areas["Ceiling"] == pytest.approx(24)
+    assert len(model["FenestrationSurface:Detailed"]) == 2
+
+
+def test_gltf_holds_rooms_glass_and_surroundings(tmp_path):
+    box_room().write(str(tmp_path / "room.ifc"))
+    building = read_ifc(tmp_path / "room.ifc")
+    write_gltf(building, tmp_path / "room.glb")
+    scene = trimesh.load(tmp_path / "room.glb")
+    names = set(scene.geometry)
+    assert {"R1 floor", "R1 wall", "R1 glass", "R1 window frame", "outdoors"} <= names
+    assert scene.geometry["R1 glass"].area == pytest.approx(building.windows[0].area, rel=1e-5)
+    low, high = scene.bounds
+    assert high[1] - low[1] == pytest.approx(3.4, abs=1e-5)  # y is up in glTF

@@ -1,0 +1,56 @@
+"""`cfs ifc check` and `export` as a user meets them."""
+
+from __future__ import annotations
+
+import pytest
+from click.testing import CliRunner
+
+from mitsuba_cfs.errors import DataError
+from scenes.commands.ifc import command
+from tests.bim.small_ifc import box_room
+
+
+@pytest.fixture
+def path(tmp_path):
+    path = tmp_path / "model.ifc"
+    box_room(doubled_wall=True).write(str(path))
+    return path
+
+
+def test_check_shows_rooms_and_problems(path, tmp_path):
+    table = tmp_path / "problems.csv"
+    result = CliRunner().invoke(
+        command, ["check", str(path), "--csv", str(table)], catch_exceptions=False
+    )
+    assert result.exit_code == 0
+    assert "R1 Room" in result.output and "24.00" in result.output and "72.00" in result.output
+    assert "drawn twice" in result.output
+    assert "1 rooms, 1 with windows, 1 windows, 3.6 m2 of glass" in result.output
+    lines = table.read_text().splitlines()
+    assert lines[0] == "where,what,consequence" and any("drawn twice" in line for line in lines)
+
+
+def test_export_writes_what_is_asked_for(path, tmp_path):
+    rad, zone, view = tmp_path / "rad", tmp_path / "room.epJSON", tmp_path / "room.glb"
+    result = CliRunner().invoke(
+        command,
+        ["export", str(path), "--radiance", str(rad), "--epjson", str(zone), "--gltf", str(view)],
+        catch_exceptions=False,
+    )
+    assert result.exit_code == 0
+    assert (rad / "R1" / "windows_S.rad").is_file() and zone.is_file() and view.is_file()
+
+
+def test_export_of_an_unknown_room_and_of_nothing(path, tmp_path):
+    arguments = ["export", str(path), "--space", "attic", "--gltf", str(tmp_path / "x.glb")]
+    result = CliRunner().invoke(command, arguments)
+    assert isinstance(result.exception, DataError) and "R1" in str(result.exception)
+    result = CliRunner().invoke(command, ["export", str(path)])
+    assert result.exit_code == 2 and "nothing to write" in result.output
+
+
+def test_not_an_ifc(tmp_path):
+    path = tmp_path / "text.ifc"
+    path.write_text("hello")
+    result = CliRunner().invoke(command, ["check", str(path)])
+    assert isinstance(result.exception, DataError) and "text.ifc" in str(result.exception)

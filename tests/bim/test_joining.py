@@ -1,0 +1,67 @@
+"""Rooms open to each other: reported, and one room where the corrections say so."""
+
+from __future__ import annotations
+
+import ifcopenshell.api.feature
+import pytest
+
+from bim.ifc.corrections import Corrections
+from bim.read_ifc import read_ifc
+from bim.shell import open_edges
+from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WALLS, WIDTH, empty_project
+
+THICK = 0.2  # of the partition [m]
+PASSAGE = (1.0, 2.1)  # width, height of the opening in it [m]
+
+
+def two_rooms(tmp_path, *, depth: float = THICK, cut: bool = True):
+    """Rooms South and North, 2.9 m deep each; the partition's opening goes `depth` into it."""
+    small = empty_project()
+    for name, (low, size) in WALLS.items():
+        small.box("IfcWall", name, low, size)
+    for name, z in (("floor", -0.2), ("roof", HEIGHT)):
+        small.box("IfcSlab", name, (-WALL, -WALL, z), (WIDTH + 2 * WALL, DEPTH + 2 * WALL, 0.2))
+    half = (DEPTH - THICK) / 2
+    wall = small.box("IfcWall", "partition", (0, half, 0), (WIDTH, THICK, HEIGHT))
+    if cut:
+        size = (PASSAGE[0], depth, PASSAGE[1])
+        opening = small.box("IfcOpeningElement", "passage", (1.5, half, 0), size)
+        ifcopenshell.api.feature.add_feature(small.model, feature=opening, element=wall)
+    for name, y in (("South", 0.0), ("North", half + THICK)):
+        small.box("IfcSpace", name, (0, y, 0), (WIDTH, half, HEIGHT))
+    path = tmp_path / "two.ifc"
+    small.model.write(str(path))
+    return path
+
+
+def reported(building, text: str) -> bool:
+    return any(text in problem.what for problem in building.problems)
+
+
+def test_open_rooms_are_reported_and_kept_apart(tmp_path):
+    building = read_ifc(two_rooms(tmp_path))
+    assert len(building.spaces) == 2
+    assert reported(building, "North and South are open to each other")
+
+
+def test_niche_is_no_passage(tmp_path):
+    assert not reported(read_ifc(two_rooms(tmp_path, depth=0.1)), "open to each other")
+
+
+def test_joined_rooms_are_one_closed_room(tmp_path):
+    path = two_rooms(tmp_path)
+    path.with_name("two.corrections.toml").write_text('join = [["South", "North"]]')
+    building = read_ifc(path)
+    (space,) = building.spaces
+    assert space.name == "South + North"
+    volume = WIDTH * (DEPTH - THICK) * HEIGHT + PASSAGE[0] * PASSAGE[1] * THICK
+    # 1e-5: outlines of openings are rounded to a micrometre
+    assert space.volume == pytest.approx(volume, rel=1e-5)
+    assert open_edges(space.shell) == 0
+    assert not reported(building, "open to each other")
+
+
+def test_rooms_without_a_passage_are_not_joined(tmp_path):
+    path = two_rooms(tmp_path, cut=False)
+    building = read_ifc(path, corrections=Corrections(join=(("South", "North"),)))
+    assert len(building.spaces) == 2 and reported(building, "nothing opens between them")

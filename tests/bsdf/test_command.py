@@ -1,0 +1,162 @@
+"""`cfs bsdf`: what it prints for good files, and its errors for bad ones."""
+
+from __future__ import annotations
+
+import bsdf_radiance as radiance
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from mitsuba_cfs.bsdf.blinds import venetian_blind
+from mitsuba_cfs.bsdf.generate import generate_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
+from mitsuba_cfs.bsdf.periodic import plastic, write_radiance
+from mitsuba_cfs.bsdf.radiance_geometry import read_radiance_layer
+from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
+from mitsuba_cfs.errors import DataError
+from scenes.commands.bsdf import command
+
+
+def run(*arguments: object, text: str | None = None):
+    """Result of `cfs bsdf ...`; errors come through."""
+    return CliRunner().invoke(
+        command, [str(a) for a in arguments], input=text, catch_exceptions=False
+    )
+
+
+@pytest.fixture
+def blind(real_data):
+    return real_data / "bsdf/klems_full/blinds_20deg_noGlazing_Klems.xml"
+
+
+@pytest.fixture
+def dummy_back(tmp_path):
+    flat = np.full((41, 41), 0.4 / np.pi)
+    system = KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, flat, 0 * flat, flat, 2 * flat)
+    path = tmp_path / "dummy.xml"
+    write_bsdf_xml(BsdfFile({"Visible": system}), path)
+    return path
+
+
+@pytest.mark.peer
+def test_eval_answers_in_the_frame_of_radiance(blind):
+    incident, outgoing = radiance.random_directions(200, seed=11)
+    angles = np.concatenate([radiance.angles_deg(incident), radiance.angles_deg(outgoing)], -1)
+    lines = [" ".join(f"{angle:.6f}" for angle in row) for row in angles]
+    answer = run("eval", blind, "-", text="\n".join(lines) + "\n").stdout.splitlines()
+    assert [line.rsplit(" ", 1)[0] for line in answer] == lines
+    ours = np.array([float(line.rsplit(" ", 1)[1]) for line in answer])
+    theirs = radiance.query(blind, incident, outgoing)
+    np.testing.assert_allclose(ours, theirs, rtol=radiance.COLOUR_NOISE)
+    options = ["--in", *angles[0, :2], "--out", *angles[0, 2:]]
+    assert float(run("eval", blind, *options).stdout) == pytest.approx(ours[0], rel=1e-6)
+
+
+def test_eval_of_nothing_and_of_nonsense(blind):
+    assert run("eval", blind, "-", text="").stdout.strip() == ""
+    with pytest.raises(DataError, match="line 2: expected four angles"):
+        run("eval", blind, "-", text="1 2 3 4\n1 2 x 4\n")
+    with pytest.raises(DataError, match="no Solar band"):
+        run("eval", blind, "--band", "Solar", "--in", 1, 2, "--out", 3, 4)
+    assert run("eval", blind).exit_code == 2
+
+
+def test_info_lists_bands_and_angles(blind):
+    text = run("info", blind).stdout
+    assert "LBNL/Klems Full, 145 x 145" in text and "thickness: 65.7 mm" in text
+    normal = next(line for line in text.splitlines() if "normal" in line).split()
+    assert normal[2:] == ["0.6477", "0.1225", "0.6623", "0.0980"]  # the file inventory's figures
+
+
+def test_check_finds_what_is_planted(dummy_back):
+    text = run("check", dummy_back)  # the back reflects 0.8 and, reversed, transmits 0.4
+    assert "transmission back: passes nothing" in text.stdout
+    assert "no Solar band" in text.stdout
+    assert "the sun's 0.533 degree disc" in text.stdout
+
+
+def test_check_forbids_a_file_that_gains_energy(real_data):
+    with pytest.raises(DataError, match="forbid"):
+        run("check", real_data / "bsdf/tensortree/radiance_testBSDF.xml")
+
+
+def test_check_sees_front_and_back_that_do_not_fit(real_data):
+    text = run("check", real_data / "bsdf/klems_full/SquareSlat_genBSDF.xml").stdout
+    assert "differs from transmission back reversed by 70 %" in text
+
+
+@pytest.mark.parametrize("name", ["klems_full/bcl_cl_Tn0.88_blinds", "tensortree/blinds_20deg_t45"])
+def test_plot_writes_a_picture(real_data, tmp_path, name):
+    out = tmp_path / "plot.png"
+    run("plot", real_data / f"bsdf/{name}.xml", "--in", 140, 90, "--out", out)
+    assert out.read_bytes().startswith(b"\x89PNG") and out.stat().st_size > 20_000
+
+
+def test_generate_writes_a_file_that_reads(variant, tmp_path):
+    out = tmp_path / "blind.xml"
+    options = "--depth-mm 80 --spacing-mm 72 --tilt-deg 30 --visible 0.6 --solar 0.5".split()
+    text = run("generate", *options, "--basis", "quarter", "--paths", 512, "--out", out).output
+    assert "standard error" in text
+    file = read_bsdf_xml(out)
+    visible, solar = (
+        file.band(band).direct_hemispherical(file.band(band).reflection_front)
+        for band in ("Visible", "Solar")
+    )
+    assert (visible > solar).all()
+    assert file.thickness == pytest.approx(0.08 * np.cos(np.radians(30)))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        "--shape louvre --depth-mm 80 --spacing-mm 72 --visible 0.5",
+        "--shape perforated --openness 0.1 --spacing-mm 5 --thickness-mm 1 --visible 0.5",
+        "--shape woven --openness 0.03 --spacing-mm 1 --thickness-mm 0.4 --visible 0.5",
+        "--shape prism --index 1.5 --spacing-mm 10 --tilt-deg 30 --thickness-mm 3",
+        "--shape pleated --depth-mm 20 --spacing-mm 25 --visible 0.5",
+        "--depth-mm 80 --spacing-mm 72 --visible 0.5 --tensor-tree 2",
+        "--depth-mm 80 --spacing-mm 72 --visible 0.5 --tensor-tree 2 --isotropic",
+    ],
+)
+def test_every_shape_can_be_generated(variant, tmp_path, options):
+    out = tmp_path / "layer.xml"
+    run("generate", *options.split(), "--basis", "quarter", "--paths", 256, "--out", out)
+    assert set(read_bsdf_xml(out).bands) == {"Visible", "Solar"}
+    assert run("check", out).exit_code == 0
+
+
+def test_a_radiance_scene_is_traced_as_the_same_slats(variant, tmp_path):
+    layer = venetian_blind(plastic("grey", 0.5, 0.5), depth=0.08, spacing=0.06, tilt=0.6)
+    write_radiance(layer, tmp_path / "cell.rad", 1, 1)
+    options = ["--shape", "radiance", "--geometry", tmp_path / "cell.rad", "--period-mm", 80, 60]
+    out = tmp_path / "layer.xml"
+    run("generate", *options, "--basis", "quarter", "--paths", 8192, "--out", out)
+    theirs = read_bsdf_xml(out).band("Visible")
+    ours = generate_klems(layer, KLEMS_QUARTER, samples=8192).bsdf[0]
+    for name, block in ours.blocks().items():
+        share = ours.direct_hemispherical(block)
+        found = theirs.direct_hemispherical(getattr(theirs, name))
+        np.testing.assert_allclose(found, share, atol=0.012)  # 3 sigma of either
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("void plastic a 0 0 5 .5 .5 .5 0 0", "no polygon"),
+        ("a polygon p 0 0 9 0 0 0 1 0 0 0 1 0", "unknown modifier"),
+        ("void glass a 0 0 3 .5 .5 .5", "got glass"),
+        ("void plastic a 0 0 5 .5 .5 .5 0", "expected 5 numbers"),
+        ("void plastic a 0 0 5 2 2 2 0 0", "more than it gets"),
+        ("!genbox a b 1 1 1", "command"),
+        ("void", "word 0"),
+    ],
+)
+def test_radiance_scenes_that_do_not_fit_give_one_line(tmp_path, text, message):
+    (tmp_path / "cell.rad").write_text(text + "\n")
+    with pytest.raises(DataError, match=message):
+        read_radiance_layer(tmp_path / "cell.rad", (1.0, 1.0))
+
+
+def test_generate_says_what_it_needs():
+    result = CliRunner().invoke(command, ["generate", "--shape", "woven", "--out", "x.xml"])
+    assert result.exit_code == 2 and "--spacing-mm" in result.output

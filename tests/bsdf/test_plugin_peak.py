@@ -1,0 +1,114 @@
+"""Peak extraction: what goes straight on passes undisturbed, the rest is scattered as before."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from plugin_setup import context, interaction, random_directions, sampled, to_mitsuba
+from test_plugin import asymmetric
+
+from mitsuba_cfs.bsdf.evaluate import direct_hemispherical
+from mitsuba_cfs.bsdf.tensor_peak import through_peak
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+
+KLEMS_GLASS = "klems_full/SingleClear_WINDOW.xml"
+TREE_GLASS = "tensortree/clear_t4_6.xml"
+TREE_BLIND = "tensortree/blinds_20deg_t45.xml"
+
+
+def load(path, peak):
+    import mitsuba as mi
+
+    from mitsuba_cfs.bsdf import plugin, tensor_plugin
+
+    kind = plugin.PLUGIN if "klems" in str(path) else tensor_plugin.PLUGIN
+    return mi.load_dict({"type": kind, "filename": str(path), "peak": peak, "up": [0.2, 0.1, 1.0]})
+
+
+def nulls(sample):
+    import mitsuba as mi
+
+    return (np.array(sample.sampled_type) & int(mi.BSDFFlags.Null)) > 0
+
+
+@pytest.mark.parametrize("mode", ["Radiance", "Importance"])
+@pytest.mark.parametrize("name", [KLEMS_GLASS, TREE_GLASS])
+def test_glass_lets_the_view_through_undisturbed(variant, real_data, name, mode):
+    path, wi = real_data / "bsdf" / name, np.array([0.36, 0.48, -0.8])
+    sample, weight, _, change = sampled(load(path, True), context(mode), wi, 20_000, seed=1)
+    straight = nulls(sample)
+    assert np.abs(np.array(sample.wo).T[straight] + wi).max() < 1e-6
+    file = read_bsdf_xml(path).band("Visible")
+    # from the camera the light comes from outside, from a light source it starts indoors: the
+    # glass is alike on both sides, and what is reflected is the share of the other samples
+    local = (wi @ change)[None]
+    transmitted = direct_hemispherical(file, "transmission_back", local)[0]
+    reflected = direct_hemispherical(file, "reflection_back", local)[0]
+    share = transmitted / (transmitted + reflected)
+    assert straight.mean() == pytest.approx(
+        share, abs=4 * np.sqrt(share * (1 - share) / 20_000) + 0.02
+    )
+    np.testing.assert_allclose(weight, transmitted + reflected, rtol=0.02)
+    transmits = np.array(sample.wo)[2] > 0
+    assert (transmits & ~straight).mean() < 0.02  # next to nothing of it is scattered
+
+
+def test_what_scatters_evenly_has_no_beam(variant):
+    import mitsuba as mi
+
+    from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
+    from mitsuba_cfs.bsdf.plugin import klems_plugin
+
+    flat = np.full((41, 41), 0.4 / np.pi)
+    bsdf = mi.load_dict(klems_plugin(KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, flat), peak=True))
+    sample, weight, _, _ = sampled(bsdf, context("Radiance"), [0.0, 0.6, -0.8], 1000, seed=2)
+    assert not nulls(sample).any()
+    np.testing.assert_allclose(weight, 0.4, rtol=1e-5)
+
+
+@pytest.mark.parametrize("mode", ["Radiance", "Importance"])
+def test_a_blind_keeps_all_it_lets_through(variant, real_data, mode):
+    """Beam and rest add up to what the plugin without extraction scatters, for any direction."""
+    path = real_data / "bsdf" / TREE_BLIND
+    wi = random_directions(4000, 3)
+    si, _ = interaction(wi)
+    u = np.random.default_rng(4).uniform(size=(3, len(wi))).astype(np.float32)
+    import mitsuba as mi
+
+    results = [
+        load(path, peak).sample(context(mode), si, mi.Float(u[0]), mi.Point2f(u[1:]))
+        for peak in (False, True)
+    ]
+    whole, parts = (np.array(weight).ravel() for _, weight in results)
+    np.testing.assert_allclose(parts, whole, rtol=1e-3, atol=1e-5)
+    straight = nulls(results[1][0])
+    assert 0.1 < straight.mean() < 0.6  # slats 20 degrees down let much of the light straight on
+    assert not nulls(results[0][0]).any()
+
+
+def test_eval_leaves_the_beam_out(variant, real_data):
+    path, wi = real_data / "bsdf" / KLEMS_GLASS, random_directions(2000, 5)
+    si, _ = interaction(wi)
+    values = [
+        np.array(load(path, peak).eval(context("Radiance"), si, to_mitsuba(-wi))).ravel()
+        for peak in (False, True)
+    ]
+    assert (values[1] < 0.02 * values[0]).all()
+
+
+def test_peaks_of_a_tree_are_its_straight_leaves(real_data):
+    tree = read_bsdf_xml(real_data / "bsdf" / TREE_BLIND).band("Visible").transmission_back
+    rest, beams = through_peak(tree)
+    lost = tree.hemispherical() - rest.hemispherical()
+    assert beams.max() == pytest.approx(lost.max(), rel=1e-6)
+    assert (rest.values >= 0).all() and (rest.values <= tree.values + 1e-12).all()
+
+
+def test_rank_3_and_matrices_without_peaks(variant, real_data):
+    with pytest.raises(ValueError, match="rank 4"):
+        through_peak(
+            read_bsdf_xml(real_data / "bsdf/tensortree/pyradiance_room_blindsT3.xml")
+            .band("Visible")
+            .transmission_front
+        )
+    assert asymmetric().transmission_front is not None

@@ -1,0 +1,39 @@
+"""Shared set-up of the tests: a good LLVM before Dr.Jit starts, and where the real files are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mitsuba_cfs import llvm
+
+llvm.select_library()
+
+REPOSITORY = Path(__file__).parent.parent
+REAL_DATA = REPOSITORY.parent / "shared" / "data"
+REFERENCE_DATA = REPOSITORY.parent / "shared" / "reference"
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """The folder of real IFC, EPW, BSDF and HDR files; the test is skipped without it."""
+    if not REAL_DATA.is_dir():
+        pytest.skip("the folder of real input files (../shared/data) is not here")
+    return REAL_DATA
+
+
+@pytest.fixture(scope="session")
+def reference_data() -> Path:
+    """The folder of EnergyPlus and ASHRAE 140 reference results; skipped without it."""
+    if not REFERENCE_DATA.is_dir():
+        pytest.skip("the folder of reference results (../shared/reference) is not here")
+    return REFERENCE_DATA
+
+
+@pytest.fixture(scope="session")
+def variant() -> str:
+    """The Mitsuba variant that the tests trace with: LLVM, mono."""
+    from mitsuba_cfs import variants
+
+    return variants.activate("llvm_ad_mono")

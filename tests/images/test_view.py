@@ -1,0 +1,112 @@
+"""Views: closed forms of the projections, and Radiance's own rays."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.images.view import (
+    View,
+    fisheye,
+    format_view,
+    parse_view,
+    pixel_directions,
+    pixel_solid_angles,
+    rays,
+)
+
+ASYMMETRIC = "-vp 1 2 3 -vd 1 -0.4 0.3 -vu 0.1 0 1 -vs 0 -vl 0"
+VIEWS = {
+    "angular": f"-vta {ASYMMETRIC} -vh 180 -vv 180",
+    "angular narrow": f"-vta {ASYMMETRIC} -vh 90 -vv 60",
+    "hemispherical": f"-vth {ASYMMETRIC} -vh 180 -vv 180",
+    "perspective": f"-vtv {ASYMMETRIC} -vh 60 -vv 40",
+    "shifted": "-vtv -vp 1 2 3 -vd 1 -0.4 0.3 -vu 0 0 1 -vs 0.3 -vl -0.2 -vh 60 -vv 40",
+    "cylindrical": f"-vtc {ASYMMETRIC} -vh 200 -vv 60",
+    "planispheric": f"-vts {ASYMMETRIC} -vh 180 -vv 180",
+}
+
+
+def radiance(program: str) -> str:
+    """The path of a Radiance program; the test is skipped without it."""
+    pyradiance = pytest.importorskip("pyradiance")
+    path = Path(pyradiance.__file__).parent / "bin" / program
+    return str(path) if path.exists() else shutil.which(program) or pytest.skip(f"no {program}")
+
+
+@pytest.mark.peer
+@pytest.mark.parametrize("name", VIEWS)
+def test_pixel_directions_are_those_of_vwrays(name, tmp_path):
+    view = parse_view(VIEWS[name], width=31, height=24)
+    vf = tmp_path / "view.vf"
+    vf.write_text(f"rvu {VIEWS[name]}\n")
+    command = [radiance("vwrays"), "-ff", "-pa", "0", "-x", "31", "-y", "24", "-vf", str(vf)]
+    out = subprocess.run(command, capture_output=True, check=True).stdout
+    theirs = np.frombuffer(out, "<f4").reshape(24, 31, 6)
+    x, y = (np.arange(31) + 0.5) / 31, 1 - (np.arange(24) + 0.5) / 24
+    ours, exists = rays(view, x[None, :], y[:, None])
+    there = np.abs(theirs[..., 3:]).sum(-1) > 0
+    assert np.array_equal(exists, there)
+    # 4-byte floats: 6e-8 relative
+    assert np.allclose(ours[exists], theirs[exists][:, 3:], atol=2e-7)
+    assert np.allclose(theirs[exists][:, :3], view.position, atol=1e-6)
+
+
+def test_top_left_pixel_looks_up_and_left():
+    directions, counts = pixel_directions(fisheye((0, 0, 0), (0, 1, 0), 40))
+    assert directions[10, 5, 0] < 0 < directions[10, 5, 2]
+    assert not counts[0, 0] and counts[20, 20]
+    assert np.allclose(np.linalg.norm(directions[counts], axis=-1), 1)
+
+
+@pytest.mark.parametrize("kind", ["angular", "hemispherical"])
+def test_fisheye_solid_angles_fill_the_hemisphere(kind):
+    view = fisheye((0, 0, 0), (0, 1, 0), 400, kind=kind)
+    omega = pixel_solid_angles(view)
+    directions, counts = pixel_directions(view)
+    cosine = directions @ np.asarray(view.direction)
+    lost = 2 * np.pi - omega[counts].sum()
+    # the rim cuts through pixels; a hemispherical picture has no solid angle for those, up to
+    # the radius 1 - sqrt(2)/200, where cos(theta) = 0.119
+    assert abs(lost) < 2e-4 * 2 * np.pi if kind == "angular" else 0 < lost < 0.119 * 2 * np.pi
+    # their share of the projected hemisphere is cos^2: at most 0.0141
+    assert (omega * cosine)[counts].sum() == pytest.approx(np.pi, rel=0.015)
+
+
+def test_solid_angles_of_a_perspective_are_those_of_a_rectangle():
+    view = View("perspective", horizontal_deg=70, vertical_deg=50, width=90, height=60)
+    a, b = np.tan(np.radians(35)), np.tan(np.radians(25))
+    closed = 4 * np.arcsin(a * b / np.sqrt((1 + a * a) * (1 + b * b)))
+    assert pixel_solid_angles(view).sum() == pytest.approx(closed, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_format_and_parse_are_inverse(name):
+    view = parse_view(VIEWS[name], 31, 24)
+    again = parse_view("VIEW= " + format_view(view), 31, 24)
+    assert again.kind == view.kind and again.shift == view.shift
+    assert np.allclose(again.direction, view.direction, atol=1e-8)  # nine digits are written
+    assert (again.horizontal_deg, again.vertical_deg) == (view.horizontal_deg, view.vertical_deg)
+
+
+def test_what_is_not_said_is_radiances_default():
+    view = parse_view("-vta -vh 180 -vv 180")
+    assert view.direction == (0, 1, 0) and view.up == (0, 0, 1) and view.position == (0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("nothing here", "no view option"),
+        ("-vth -vh 190 -vv 190", "illegal size"),
+        ("-vta -vd 0 0 1 -vh 180 -vv 180", "parallel"),
+        ("-vta -vd 0 0 0 -vh 180 -vv 180", "no length"),
+    ],
+)
+def test_impossible_views_are_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        parse_view(text)

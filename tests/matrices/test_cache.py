@@ -1,0 +1,202 @@
+"""Matrices kept on disk: found again, never wrong, and resumed after a kill."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.matrices.cache import MatrixCache, State, default_folder, digest
+from tests.trace import rooms
+
+STATE = State(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
+
+
+@pytest.fixture
+def cache(tmp_path) -> MatrixCache:
+    return MatrixCache(tmp_path / "cache")
+
+
+def batches(log: list[int], fail_at: int | None = None):
+    """Batches of random numbers keyed by their number, that note themselves in `log`."""
+
+    def batch(number: int):
+        if number == fail_at:
+            raise KeyboardInterrupt
+        log.append(number)
+        return np.random.default_rng(number).random((4, 5))
+
+    return batch
+
+
+def test_a_state_comes_back_as_it_was(cache):
+    entry = cache.entry("view matrix", 1)
+    assert entry.load() is None
+    entry.save(STATE)
+    found = entry.load()
+    assert (found.count, found.seconds, found.finished) == (3, 1.5, True)
+    assert np.array_equal(found.mean, STATE.mean) and np.array_equal(found.spread, STATE.spread)
+    assert list(cache.folder.iterdir()) == [entry.path]  # nothing half written stays
+
+
+def test_a_finished_matrix_is_not_traced_again(cache):
+    from mitsuba_cfs.trace.estimate import accumulate
+
+    log: list[int] = []
+    first, second = (accumulate(batches(log), entry=cache.entry("m", 1)) for _ in range(2))
+    assert log == list(range(16))
+    assert np.array_equal(first.values, second.values)
+    assert np.array_equal(first.standard_error, second.standard_error)
+    accumulate(batches(log), entry=cache.entry("m", 2))
+    assert len(log) == 32
+
+
+def test_a_stopped_run_goes_on_to_the_same_bits(cache):
+    from mitsuba_cfs.trace.estimate import accumulate
+
+    whole = accumulate(batches([]))
+    log: list[int] = []
+    with pytest.raises(KeyboardInterrupt):
+        accumulate(batches(log, fail_at=7), entry=cache.entry("m", 1))
+    resumed = accumulate(batches(log), entry=cache.entry("m", 1))
+    assert log == list(range(16))  # each batch once
+    assert np.array_equal(whole.values, resumed.values)
+    assert np.array_equal(whole.standard_error, resumed.standard_error)
+
+
+@pytest.mark.parametrize("damage", ["short", "empty", "bits", "text"])
+def test_a_damaged_file_is_ignored_and_written_anew(cache, damage):
+    from mitsuba_cfs.trace.estimate import accumulate
+
+    entry = cache.entry("m", 1)
+    whole = accumulate(batches([]), entry=entry)
+    data = bytearray(entry.path.read_bytes())
+    middle = len(data) // 2
+    data[middle] ^= 0xFF
+    entry.path.write_bytes(
+        {"short": data[:middle], "empty": b"", "bits": data, "text": b"no zip"}[damage]
+    )
+    assert entry.load() is None
+    again = accumulate(batches([]), entry=entry)
+    assert np.array_equal(whole.values, again.values)
+    assert entry.load().finished
+
+
+def test_a_folder_that_cannot_be_written_costs_a_warning_only(tmp_path, caplog):
+    from mitsuba_cfs.trace.estimate import accumulate
+
+    (tmp_path / "file").write_text("in the way")
+    entry = MatrixCache(tmp_path / "file").entry("m", 1)
+    result = accumulate(batches([]), entry=entry)
+    assert np.array_equal(result.values, accumulate(batches([])).values)
+    assert "not kept" in caplog.text
+
+
+def test_the_longest_unused_files_go_first(cache):
+    small = replace(cache, limit=3 * 1600)
+    for number in range(6):
+        entry = small.entry("m", number)
+        entry.save(STATE)
+        os.utime(entry.path, (1000 + number, 1000 + number))
+    small.trim()
+    left = {file for file in cache.folder.iterdir()}
+    assert sum(file.stat().st_size for file in left) <= small.limit
+    assert left and small.entry("m", 5).path in left and small.entry("m", 0).path not in left
+
+
+def test_every_input_counts():
+    room, groups = rooms.test_room()
+    darker = replace(room, reflectance=room.reflectance * 0.99)
+    inputs = [
+        (room, groups, 1, 0.5, None, "a"),
+        (darker, groups, 1, 0.5, None, "a"),
+        (room, rooms.skylight_room()[1], 1, 0.5, None, "a"),
+        (room, groups, 2, 0.5, None, "a"),
+        (room, groups, 1, 0.5, 0, "a"),
+        (room, groups, 1, 0.5, None, "a", None),
+        (room, [*groups, 1], 0.5, None, "a"),
+    ]
+    assert len({digest(*values) for values in inputs}) == len(inputs)
+    assert digest(*inputs[0]) == digest(*rooms.test_room(), 1, 0.5, None, "a")
+    assert digest("ab", "c") != digest("a", "bc")
+    assert digest(1) != digest(1.0) != digest("1.0")
+    with pytest.raises(ValueError, match="cannot hash"):
+        digest(object())
+
+
+def test_the_environment_names_the_folder(monkeypatch, tmp_path):
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path))
+    assert default_folder() == tmp_path
+    monkeypatch.delenv("CFS_CACHE")
+    assert default_folder().name == "cfs"
+
+
+def test_view_and_daylight_matrices_come_from_the_cache(variant, cache):
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+
+    def both(samples: int):
+        view = view_matrix(room, groups, [[1, 1, 1]], [[0, 0, 1]], samples=samples, cache=cache)
+        daylight = daylight_matrix(
+            rooms.NOTHING, groups, subdivision=1, samples=samples, cache=cache
+        )
+        return view, daylight
+
+    first, second = both(64), both(64)
+    assert len(list(cache.folder.iterdir())) == 2
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(one.values, other.values) and one.seconds == other.seconds
+    both(32)
+    assert len(list(cache.folder.iterdir())) == 4
+
+
+SLOW_RUN = """
+    import sys, time
+    from pathlib import Path
+    import numpy as np
+    from mitsuba_cfs import variants
+    variants.activate("llvm_ad_mono")
+    from mitsuba_cfs.matrices.cache import MatrixCache
+    from mitsuba_cfs.trace import estimate
+
+    estimate.SAVE_SECONDS = 0.0
+    estimate.SAVE_SHARE = 0.0
+
+    def batch(number):
+        if number == 6:
+            Path(sys.argv[2]).touch()
+            time.sleep(60)  # the batch under way when the signal comes
+        return np.random.default_rng(number).random((4, 5))
+
+    estimate.accumulate(batch, entry=MatrixCache(Path(sys.argv[1])).entry("m", 1))
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_a_killed_process_loses_the_batch_under_way_only(cache):
+    from mitsuba_cfs.trace.estimate import accumulate
+
+    program = [sys.executable, "-c", textwrap.dedent(SLOW_RUN), str(cache.folder)]
+    here = cache.folder.parent / "batch6"
+    process = subprocess.Popen([*program, str(here)], cwd=Path(__file__).parents[2])
+    end = time.monotonic() + 60
+    while not here.exists() and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    state = cache.entry("m", 1).load()
+    assert state.count == 6 and not state.finished
+    log: list[int] = []
+    resumed = accumulate(batches(log), entry=cache.entry("m", 1))
+    assert log == list(range(6, 16))
+    assert np.array_equal(resumed.values, accumulate(batches([])).values)

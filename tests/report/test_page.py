@@ -1,0 +1,128 @@
+"""The report as a file: self-contained, escaped, complete, and robust where results are few."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenes.report import write_report
+from scenes.report.page import report_html
+from scenes.results import GlareResults
+from tests.report.synthetic import run_result
+
+LARGEST = 12e6  # bytes, as asked of a run of two rooms with pictures of 600 pixels
+
+
+@pytest.fixture(scope="module")
+def result():
+    return run_result(picture_size=96)
+
+
+@pytest.fixture(scope="module")
+def page(result) -> str:
+    return report_html(result)
+
+
+class Links(HTMLParser):
+    """Everything that a page could fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attributes) -> None:
+        for name, value in attributes:
+            if name in ("src", "href", "srcset", "data", "poster") and value:
+                self.found.append(value)
+
+
+def test_nothing_is_fetched(page) -> None:
+    links = Links()
+    links.feed(page)
+    assert links.found
+    assert all(link.startswith(("data:image/", "#")) for link in links.found)
+    assert not re.search(r"url\(|@import|\bfetch\(|XMLHttpRequest|import\(", page)
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    assert policy in page  # the browser itself refuses the network
+
+
+def test_every_anchor_of_the_contents_is_there(page) -> None:
+    for anchor in re.findall(r'href="#([^"]+)"', page):
+        assert f'id="{anchor}"' in page
+
+
+def test_names_from_files_cannot_become_markup(page) -> None:
+    assert "102 &lt;corner&gt; Meeting room west &amp; archive" in page
+    assert "<corner>" not in page
+    assert "<blank>" not in page
+
+
+def test_key_numbers_are_those_of_the_result(result, page) -> None:
+    for number, room in enumerate(result.spaces, start=1):
+        section = page[page.index(f'id="room-{number}"') :]
+        section = section[: section.index("</section>")]
+        operative = room.thermal.temperatures["operative_c"]
+        occupied = room.thermal.comfort["occupied"]
+        worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
+        cards = dict(
+            re.findall(r'">([^<>]+)</abbr></h4>\s*<p class="value"><b>([^<]+)</b>', section)
+        )
+        assert (
+            cards["Spatial daylight autonomy"] == f"{room.daylight.room_metrics['sda300_50']:.0f}"
+        )
+        assert cards["Glare at its worst"] == f"{worst:.2f}"
+        assert cards["Peak temperature"] == f"{operative.max():.1f}"
+        warm = int(((operative > 26) & occupied).sum())
+        assert cards["Warm hours"].replace("\u202f", "") == f"{warm}"
+        assert cards["Adaptive comfort"] == f"{room.thermal.comfort_summary['within_80']:.0f}"
+
+
+def test_hashes_versions_seed_problems_and_notes_are_shown(result, page) -> None:
+    for entry in result.manifest["inputs"].values():
+        assert entry["sha256"] in page
+    for text in (result.manifest["versions"]["mitsuba"], result.notes[0], "llvm_ad_mono"):
+        assert text in page
+    for problem in result.problems:
+        assert problem.consequence in page
+
+
+def test_file_is_small_with_full_pictures(tmp_path) -> None:
+    path = tmp_path / "report.html"
+    write_report(run_result(picture_size=600, pictures=10), path)
+    assert path.stat().st_size < LARGEST
+    assert path.read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+def test_report_of_little(result) -> None:
+    """One room without pictures, 20 days, few metrics, a bare manifest, dark all the time."""
+    room, hours = result.spaces[0], slice(0, 480)
+    thermal = replace(
+        room.thermal,
+        temperatures=room.thermal.temperatures.iloc[hours],
+        gains=room.thermal.gains.iloc[hours] * 0,
+        comfort=room.thermal.comfort.iloc[hours][["comfort_c", "within_80"]],
+    )
+    metrics = pd.DataFrame({"x": [1.0], "y": [-2.0], "z": [0.8], "daylight_factor": [np.nan]})
+    daylight = replace(
+        room.daylight, points=room.daylight.points[:1], sensor_metrics=metrics, room_metrics={},
+        illuminance=np.zeros((480, 1), np.float32), relative_error=np.zeros(1),
+    )  # fmt: skip
+    few = replace(room, thermal=thermal, daylight=daylight, glare=GlareResults(room.glare.view, ()))
+    small = replace(
+        result, times=result.times[hours], sun=result.sun[hours], spaces=(few,), problems=(),
+        notes=(), manifest={"inputs": {"weather": "a.epw"}},
+    )  # fmt: skip
+    page = report_html(small)
+    assert "No luminance picture was asked for." in page
+    assert not re.search(r"\bnan\b", page[: page.rindex("<script>")], re.IGNORECASE)
+    assert "480 hours" in page
+
+
+def test_no_room_is_a_wrong_call(result) -> None:
+    with pytest.raises(ValueError, match="at least one room"):
+        report_html(replace(result, spaces=()))

@@ -1,0 +1,193 @@
+"""The console command's contract: one line and an exit code for every mistake of the user's."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pydantic
+import pytest
+
+from mitsuba_cfs.errors import DataError, VariantError
+from scenes import cli
+from scenes.commands.progress_bar import ProgressBar
+from thermal.errors import ThermalInputError
+
+
+class _Options(pydantic.BaseModel):
+    views: int
+    seed: int
+
+
+def _cfs(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", "from scenes.cli import main; main()", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+        timeout=180,
+    )
+
+
+@pytest.fixture
+def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], object]], int]:
+    """Run `cfs fail`, whose command calls the given function; gives the exit code."""
+
+    def run(action: Callable[[], object]) -> int:
+        monkeypatch.setattr(cli.LazyGroup, "list_commands", lambda *_: ["fail"])
+        monkeypatch.setattr(
+            cli.LazyGroup, "get_command", lambda *_: click.Command("fail", callback=action)
+        )
+        return cli.run(["fail"])
+
+    return run
+
+
+def _raise(error: BaseException) -> Callable[[], object]:
+    def action() -> None:
+        raise error
+
+    return action
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (
+            DataError("expected 145 values, got 144", file="blind.xml", element="Wavelength 2"),
+            "error: blind.xml: Wavelength 2: expected 145 values, got 144",
+        ),
+        (VariantError("no LLVM"), "error: no LLVM"),
+        (ThermalInputError("zone A", "volume\nis negative"), "error: zone A: volume is negative"),
+        (FileNotFoundError(2, "No such file", "a.ifc"), "error: a.ifc: No such file"),
+        (PermissionError(13, "Permission denied", "out"), "error: out: Permission denied"),
+        (click.ClickException("bad"), "error: bad"),
+        (MemoryError(), "error: out of memory"),
+    ],
+)
+def test_a_users_mistake_is_one_line(failing, capsys, error: Exception, line: str) -> None:
+    assert failing(_raise(error)) == 1
+    captured = capsys.readouterr()
+    assert captured.err == line + "\n"
+    assert captured.out == ""
+
+
+def test_a_bad_study_file_names_its_field(failing, capsys) -> None:
+    code = failing(lambda: _Options.model_validate({"views": "many"}))
+    assert code == 1
+    line = capsys.readouterr().err
+    assert line.startswith("error: _Options: views: ")
+    assert line.endswith("(and 1 more)\n")
+    assert len(line.splitlines()) == 1
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), click.Abort()])
+def test_interruption_is_exit_130(failing, capsys, error: BaseException) -> None:
+    assert failing(_raise(error)) == 130
+    assert capsys.readouterr().err.strip() == "interrupted"
+
+
+def test_a_fault_of_the_program_keeps_its_traceback(failing) -> None:
+    with pytest.raises(ZeroDivisionError):
+        failing(lambda: 1 / 0)
+
+
+def test_debugging_shows_the_traceback_of_a_users_mistake(failing, monkeypatch) -> None:
+    monkeypatch.setenv("CFS_DEBUG", "1")
+    with pytest.raises(DataError):
+        failing(_raise(DataError("bad")))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (("doktor",), "cfs: No such command 'doktor'"),
+        (("doctor", "--loud"), "cfs doctor: No such option"),
+        (("doctor", "now"), "cfs doctor: Got unexpected extra argument"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(arguments: tuple[str, ...], line: str) -> None:
+    done = _cfs(*arguments)
+    assert done.returncode == 2
+    assert done.stderr.startswith(line)
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stdout == ""
+
+
+def test_help_lists_every_command_that_there_is() -> None:
+    done = _cfs("--help")
+    assert done.returncode == 0
+    folder = Path(cli.__file__).parent / "commands"
+    for name in cli.COMMANDS:
+        listed = any(line.split()[:1] == [name] for line in done.stdout.splitlines())
+        assert listed == ((folder / f"{name}.py").exists() or (folder / name).is_dir()), name
+
+
+def test_help_needs_no_heavy_imports() -> None:
+    code = (
+        "import sys\n"
+        "from scenes import cli\n"
+        "cli.run(['--help'])\n"
+        "heavy = {'numpy', 'pandas', 'mitsuba', 'drjit', 'ifcopenshell', 'rich', 'pydantic'}\n"
+        "sys.exit(', '.join(heavy & set(sys.modules)) or 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_command_listed_can_be_loaded() -> None:
+    context = click.Context(cli.cfs)
+    for name in cli.cfs.list_commands(context):
+        assert isinstance(cli.cfs.get_command(context, name), click.Command), name
+
+
+def test_version() -> None:
+    assert _cfs("--version").stdout.startswith("cfs ")
+
+
+def test_interrupt_from_the_keyboard_ends_quietly() -> None:
+    code = (
+        "import time, click\n"
+        "from scenes import cli\n"
+        "def wait():\n"
+        "    click.echo('ready')\n"
+        "    time.sleep(60)\n"
+        "cli.LazyGroup.get_command = lambda *_: click.Command('wait', callback=wait)\n"
+        "cli.main(['wait'])\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-u", "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().strip() == "ready"
+    time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert errors.strip() == "interrupted"
+
+
+def test_progress_without_a_terminal_is_one_line_a_stage(capsys) -> None:
+    with ProgressBar(terminal=False) as progress:
+        for stage in ("reading", "tracing"):
+            for fraction in (0.0, 0.5, 1.0):
+                progress(stage, fraction)
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["reading", "tracing"]
+
+
+def test_progress_of_a_stage_that_failed_is_not_reported_as_done(capsys) -> None:
+    with pytest.raises(DataError), ProgressBar(terminal=False) as progress:
+        progress("reading", 0.5)
+        raise DataError("bad")
+    assert capsys.readouterr().err == ""

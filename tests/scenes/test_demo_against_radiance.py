@@ -1,0 +1,85 @@
+"""Illuminance of the demo's room over a year, against Radiance's own three-phase method.
+
+Radiance gets the geometry that this project exports, the same BSDF file and the same weather; V,
+D, the sky and the product are its own (rfluxmtx, gendaymtx, dctimestep).
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests import radiance
+
+pytest.importorskip("pyradiance")
+pytestmark = [pytest.mark.peer, pytest.mark.usefixtures("variant")]
+
+DEMO = Path(str(files("scenes") / "demo"))
+WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
+SYSTEM = DEMO / "venetian_blind.xml"
+RAYS = "-n 2 -ab 8 -ad 60000 -lw 1e-6"
+SPACING = 1.0  # [m] 24 sensors and less keep Radiance's part of the test short
+
+
+def radiance_illuminance(space, building, folder: Path) -> np.ndarray:
+    """Illuminance [S, H] [lx] of every hour of the year by Radiance."""
+    from bim.to_radiance import write_radiance
+
+    files = write_radiance(space, building, folder, sky_division=4, spacing=SPACING)
+    sensors = files.sensors.read_bytes()
+    count = sensors.count(b"\n")
+    radiance.run(f"epw2wea {WEATHER} year.wea", folder)
+    radiance.run("gendaymtx -of -m 4 year.wea > sky.smx", folder)
+    total = 0.0
+    for name, window in files.windows.items():
+        room, outdoors = (
+            f"{files.materials.name} {part.name}" for part in (files.room, files.outdoors)
+        )
+        radiance.run(
+            f"rfluxmtx -faf -I+ {RAYS} -y {count} - {window.name} {room} > {name}.vmx",
+            folder,
+            sensors,
+        )
+        radiance.run(
+            f"rfluxmtx -ff -n 2 -ab 4 -ad 1 -lw 1e-6 -c 10000 {window.name} {files.sky.name} "
+            f"{outdoors} > {name}.dmx",
+            folder,
+        )
+        command = f"dctimestep -of {name}.vmx {SYSTEM} {name}.dmx sky.smx"
+        out = radiance.run(command, folder)  # gendaymtx's sky is bluish: all channels count
+        total = total + radiance.read_float_matrix(out, radiance.LUMINANCE)
+    return total
+
+
+@pytest.mark.parametrize("name", ["A", "B"])
+def test_year_of_illuminance(name, tmp_path):
+    from bim.read_ifc import read_ifc
+    from scenes.job.daylight import room_daylight, room_scene
+    from scenes.job.inputs import read_system, read_weather
+    from scenes.job.options import JobOptions
+    from scenes.job.run import year_of_skies
+
+    building = read_ifc(DEMO / "office.ifc")
+    space = building.space(name)
+    options = JobOptions(DEMO / "office.ifc", WEATHER, SYSTEM, sensor_spacing=SPACING)
+    weather = read_weather(WEATHER)
+    ours, _, _ = room_daylight(
+        room_scene(building, space, options),
+        read_system(SYSTEM),
+        year_of_skies(weather, options),
+        weather,
+        options,
+        lambda stage, fraction: None,
+    )
+    theirs = radiance_illuminance(space, building, tmp_path).T
+    assert theirs.shape == ours.illuminance.shape
+    lit = theirs.mean(axis=1) > 1.0  # daylit hours
+    assert lit.sum() > 4000
+    mean = ours.illuminance[lit].mean() / theirs[lit].mean()
+    sensor = ours.illuminance.mean(axis=0) / theirs.mean(axis=0)
+    print(f"room {name}: mean {mean:.4f}, sensors {sensor.min():.4f} to {sensor.max():.4f}")
+    assert mean == pytest.approx(1, abs=0.02), mean
+    assert sensor == pytest.approx(np.ones_like(sensor), abs=0.05), sensor

@@ -1,0 +1,108 @@
+"""Sun positions: published ones, gendaymtx's own, the axes, and DNI from global and diffuse."""
+
+from __future__ import annotations
+
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mitsuba_cfs.sky import sun
+from mitsuba_cfs.sky.weather import Weather, read_epw
+
+
+def weather_at(times, latitude=0.0, longitude=0.0, zone=0.0, elevation=0.0, **series) -> Weather:
+    """Weather whose interval middles are the given times."""
+    middle = pd.DatetimeIndex(times)
+    none = np.zeros(len(middle))
+    ends = middle + pd.Timedelta(minutes=30)
+    return Weather(
+        "x", latitude, longitude, zone, elevation, 1.0, ends, none, none, **series
+    )  # fmt: skip
+
+
+def test_spa_is_that_of_its_paper():
+    """Reda and Andreas's worked example: 17 October 2003, 12:30:30 in Golden, Colorado."""
+    weather = weather_at(
+        ["2003-10-17 12:30:30"],
+        39.742476,
+        -105.1786,
+        -7.0,
+        1830.14,
+        pressure_pa=np.array([82000.0]),
+        dry_bulb_c=np.array([11.0]),
+    )
+    towards = sun.sun_directions(weather)
+    # zenith 50.11162 and azimuth 194.34024 degrees, to the table's digits
+    assert np.degrees(sun.altitude(towards))[0] == pytest.approx(90 - 50.11162, abs=1e-4)
+    assert np.degrees(sun.azimuth(towards))[0] == pytest.approx(194.34024, abs=1e-4)
+
+
+@pytest.mark.parametrize("model", sun.SUN_MODELS)
+def test_the_sun_goes_where_it_should(model):
+    hours = ["2017-06-21 06:00", "2017-06-21 12:00", "2017-06-21 18:00", "2017-06-21 00:00"]
+    east, noon, west, night = sun.sun_directions(weather_at(hours, 48.0, 15.0, 1.0), model=model)
+    assert east[0] > 0.9 and west[0] < -0.9  # x is east
+    assert noon[1] < 0 and night[1] > 0  # noon sun in the south: y is north
+    assert night[2] < 0 < noon[2]
+    assert np.degrees(np.arcsin(noon[2])) == pytest.approx(90 - 48 + 23.44, abs=0.3)
+    south = sun.sun_directions(weather_at(hours, -48.0, 15.0, 1.0), model=model)[1]
+    assert south[1] > 0  # noon sun in the north
+
+
+def test_longitude_and_time_zone():
+    """15 degrees further east, one hour earlier by the zone's clock."""
+    first = weather_at(["2017-03-05 09:00"], 30.0, 15.0, 1.0)
+    second = weather_at(["2017-03-05 08:00"], 30.0, 30.0, 1.0)
+    third = weather_at(["2017-03-05 10:00"], 30.0, 30.0, 3.0)
+    expected = sun.sun_directions(first, model="radiance")
+    for other in (second, third):
+        np.testing.assert_allclose(sun.sun_directions(other, model="radiance"), expected)
+
+
+@pytest.mark.peer
+def test_radiance_model_is_that_of_gendaymtx(tmp_path, chicago, radiance):
+    path = tmp_path / "suns.rad"
+    subprocess.run([radiance / "gendaymtx", "-D", path, "-n", chicago], check=True)
+    lines = [line.split() for line in path.read_text().splitlines() if line.startswith("4 ")]
+    theirs = np.array([line[1:4] for line in lines], dtype=float)
+    ours = sun.sun_directions(read_epw(chicago), model="radiance")
+    ours = ours[sun.is_up(ours)]
+    np.testing.assert_allclose(ours, theirs, atol=1e-6)  # six printed digits
+
+
+@pytest.mark.peer
+def test_spa_explains_measured_global_better(chicago):
+    """Global = diffuse + normal sin(altitude) in the file itself judges the position."""
+    weather = read_epw(chicago)
+    residual = {}
+    for model in sun.SUN_MODELS:
+        sine = np.maximum(sun.sun_directions(weather, model=model)[:, 2], 0.0)
+        whole = weather.diffuse_horizontal + weather.direct_normal * sine
+        residual[model] = np.sqrt(np.mean((whole - weather.global_horizontal) ** 2))
+    assert residual["spa"] < 0.7 * residual["radiance"]
+
+
+def test_rotation_is_counter_clockwise_from_above():
+    np.testing.assert_allclose(sun.rotated([[1.0, 0, 0.5]], 90), [[0, 1, 0.5]], atol=1e-15)
+
+
+def test_azimuth_and_altitude_are_inverse_to_direction():
+    altitude, azimuth = np.array([-0.3, 0.1, 1.2]), np.array([0.2, 3.0, 6.0])
+    towards = sun.direction(altitude, azimuth)
+    np.testing.assert_allclose(sun.altitude(towards), altitude)
+    np.testing.assert_allclose(sun.azimuth(towards), azimuth)
+    np.testing.assert_allclose(sun.direction(0.0, np.pi / 2), [1, 0, 0], atol=1e-15)
+
+
+def test_direct_normal_from_global():
+    sine = np.sin(np.radians([30.0, 30.0, 2.9, 3.1, -5.0, 4.0]))
+    whole = np.array([500.0, 90.0, 50.0, 50.0, 10.0, 500.0])
+    diffuse = np.array([100.0, 100.0, 20.0, 20.0, 0.0, 0.0])
+    found = sun.direct_normal_from_global(whole, diffuse, sine)
+    assert found[0] == pytest.approx(800)
+    assert found[1] == 0  # more diffuse than global: a measuring error
+    assert found[2] == 0 and found[3] == pytest.approx(30 / sine[3])  # the guard
+    assert found[4] == 0  # at night
+    assert found[5] == pytest.approx(1408.6, abs=0.1)  # not above what arrives from space

@@ -1,0 +1,228 @@
+"""EPW and WEA files: what is read, what is derived, and one clear line for each kind of fault."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from weather_files import epw_rows, write_epw
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky import air
+from mitsuba_cfs.sky.wea import read_wea, write_wea
+from mitsuba_cfs.sky.weather import read_epw
+
+FEBRUARY_3_14H = 24 * (31 + 2) + 13  # row of the hour that ends at 14:00
+DNI, DRY, DEW, HUMIDITY, PRESSURE, INFRARED, COVER = 14, 6, 7, 8, 9, 12, 23
+
+
+def test_reads_site_and_series(tmp_path, year):
+    year[FEBRUARY_3_14H][DNI] = "123"
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    assert weather.site == "Testville, XYZ"
+    assert (weather.latitude_deg, weather.longitude_deg) == (48.0, 8.0)
+    assert (weather.timezone_h, weather.elevation_m, weather.step_h) == (1.0, 250.0, 1.0)
+    assert weather.direct_normal[FEBRUARY_3_14H] == 123
+    assert weather.times[FEBRUARY_3_14H].strftime("%m-%d %H:%M") == "02-03 14:00"
+    assert weather.midpoints[FEBRUARY_3_14H].strftime("%m-%d %H:%M") == "02-03 13:30"
+    assert weather.times[-1].strftime("%m-%d %H:%M") == "01-01 00:00"
+    assert weather.ground_depth_m == [0.5]
+    assert weather.ground_temperature_c[0, 11] == 12
+    assert weather.direct_normal_illuminance is None  # the file marks it missing
+
+
+@pytest.mark.peer
+def test_columns_agree_with_pvlib(chicago):
+    from pvlib import iotools
+
+    ours, (theirs, site) = read_epw(chicago), iotools.read_epw(chicago)
+    assert (site["latitude"], site["longitude"]) == (ours.latitude_deg, ours.longitude_deg)
+    assert (site["TZ"], site["altitude"]) == (ours.timezone_h, ours.elevation_m)
+    pairs = {
+        "ghi": ours.global_horizontal,
+        "dni": ours.direct_normal,
+        "dhi": ours.diffuse_horizontal,
+        "global_hor_illum": ours.global_horizontal_illuminance,
+        "direct_normal_illum": ours.direct_normal_illuminance,
+        "diffuse_horizontal_illum": ours.diffuse_horizontal_illuminance,
+        "temp_air": ours.dry_bulb_c,
+        "temp_dew": ours.dew_point_c,
+        "atmospheric_pressure": ours.pressure_pa,
+        "wind_speed": ours.wind_speed,
+        "wind_direction": ours.wind_direction_deg,
+        "ghi_infrared": ours.horizontal_infrared,
+    }
+    for name, values in pairs.items():
+        np.testing.assert_array_equal(values, theirs[name].to_numpy(dtype=float), err_msg=name)
+    np.testing.assert_allclose(ours.relative_humidity * 100, theirs["relative_humidity"])
+
+
+@pytest.mark.parametrize(("steps", "leap"), [(1, True), (2, False), (4, True)])
+def test_leap_years_and_parts_of_hours(tmp_path, steps, leap):
+    weather = read_epw(write_epw(tmp_path / "a.epw", epw_rows(steps, leap), steps))
+    assert len(weather.times) == 24 * steps * (366 if leap else 365)
+    assert weather.step_h == 1 / steps
+    assert weather.times[0].minute == (60 // steps) % 60
+    assert weather.times[24 * steps * 59].strftime("%m-%d") == ("02-29" if leap else "03-01")
+
+
+def test_missing_fields_that_can_be_derived(tmp_path, year):
+    for row in year:
+        row[PRESSURE], row[DEW], row[INFRARED] = "999999", "99.9", "9999"
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    # standard atmosphere at 250 m (ASHRAE table: 98.36 kPa); dew point of 10 degC and 71 %: 4.97
+    np.testing.assert_allclose(weather.pressure_pa, 98358, atol=20)
+    np.testing.assert_allclose(weather.dew_point_c, 4.97, atol=0.02)
+    back = air.relative_humidity(weather.dry_bulb_c, weather.dew_point_c)
+    np.testing.assert_allclose(back, 0.71, rtol=1e-12)  # the formula and its inverse
+    # EnergyPlus's formula worked by hand: eps = (.787 + .764 ln(278.12/273)) 1.0595, T = 283.15
+    emissivity = (0.787 + 0.764 * np.log(278.12 / 273)) * (1 + 0.112 - 0.0875 + 0.035)
+    np.testing.assert_allclose(
+        weather.horizontal_infrared, emissivity * 5.6704e-8 * 283.15**4, rtol=2e-4
+    )
+
+
+def test_blank_fields_are_missing_and_a_byte_order_mark_is_not_text(tmp_path, year):
+    year[3][DEW], year[4][PRESSURE], year[5][20] = "", " ", ""
+    path = write_epw(tmp_path / "a.epw", year)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n") + b"\r\n")
+    weather = read_epw(path)
+    assert weather.dew_point_c[3] == pytest.approx(4.97, abs=0.02)
+    assert weather.pressure_pa[4] == pytest.approx(98358, abs=20)
+    assert weather.wind_direction_deg is None
+    year[6][DNI] = ""
+    with pytest.raises(DataError, match="line 15: direct normal irradiance: missing"):
+        read_epw(write_epw(path, year))
+
+
+def spoil(row, column, text):
+    def change(rows):
+        rows[row][column] = text
+        return rows
+
+    return change
+
+
+FAULTS = {
+    "missing DNI": (spoil(FEBRUARY_3_14H, DNI, "9999"), ("line 814", "direct normal", "hour 14")),
+    "no number": (spoil(9, DNI, "abc"), ("line 18", "direct normal irradiance", "'abc'")),
+    "not finite": (spoil(9, DRY, "nan"), ("line 18", "dry bulb temperature", "'nan'")),
+    "negative": (spoil(9, DNI, "-5"), ("line 18", "0 to 1500", "-5")),
+    "missing temperature": (spoil(0, DRY, "99.9"), ("line 9", "dry bulb temperature", "missing")),
+    "dew and humidity": (
+        lambda rows: spoil(3, DEW, "99.9")(spoil(3, HUMIDITY, "999")(rows)),
+        ("line 12", "relative humidity", "dew point"),
+    ),
+    "hour left out": (
+        lambda rows: rows[:100] + rows[101:],
+        ("line 109", "expected month 1, day 5"),
+    ),
+    "hour twice": (lambda rows: rows[:100] + rows[99:], ("line 109", "expected month 1, day 5")),
+    "rows swapped": (
+        lambda rows: [*rows[:50], rows[51], rows[50], *rows[52:]],
+        ("line 59", "out of order"),
+    ),
+    "half a year": (lambda rows: rows[:4380], ("8760 or 8784", "4380 rows")),
+    "one hour short": (lambda rows: rows[:-1], ("8760 or 8784", "8759 rows")),
+    "no rows": (lambda rows: [], ("8760 or 8784", "0 rows")),
+    "short row": (lambda rows: [*rows[:-1], rows[-1][:10]], ("line 8768", "24 fields")),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_name_line_and_field(tmp_path, year, fault):
+    change, words = FAULTS[fault]
+    path = write_epw(tmp_path / "bad.epw", change(year))
+    with pytest.raises(DataError) as caught:
+        read_epw(path)
+    for word in (*words, "bad.epw"):
+        assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("LOCATION", "LOCATON", ("not an EPW",)),
+        (",48.0,", ",98.0,", ("latitude", "98")),
+        (",8.0,1.0", ",east,1.0", ("longitude", "'east'")),
+        ("DATA PERIODS", "DATA", ("line 8", "DATA PERIODS")),
+        ("TURES,1,.5", "TURES,2,.5", ("line 4", "GROUND TEMPERATURES")),
+    ],
+)
+def test_header_faults(tmp_path, year, old, new, words):
+    path = write_epw(tmp_path / "bad.epw", year[:24])
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(DataError) as caught:
+        read_epw(path)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(DataError, match=r"nowhere\.epw: cannot be read"):
+        read_epw(tmp_path / "nowhere.epw")
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_wea_round_trip(tmp_path, steps):
+    weather = read_epw(write_epw(tmp_path / "a.epw", epw_rows(steps), steps))
+    write_wea(weather, tmp_path / "a.wea")
+    back = read_wea(tmp_path / "a.wea")
+    assert (back.latitude_deg, back.longitude_deg, back.timezone_h) == (48.0, 8.0, 1.0)
+    assert back.step_h == weather.step_h
+    np.testing.assert_array_equal(back.direct_normal, weather.direct_normal)
+    np.testing.assert_array_equal(back.diffuse_horizontal, weather.diffuse_horizontal)
+    assert list(back.times.strftime("%j %H:%M")) == list(weather.times.strftime("%j %H:%M"))
+
+
+@pytest.mark.peer
+def test_wea_is_what_epw2wea_writes(tmp_path, chicago, radiance):
+    import subprocess
+
+    theirs = tmp_path / "theirs.wea"
+    subprocess.run([radiance / "epw2wea", chicago, theirs], check=True)
+    ours, back = read_epw(chicago), read_wea(theirs)
+    assert (back.longitude_deg, back.timezone_h) == (ours.longitude_deg, ours.timezone_h)
+    np.testing.assert_array_equal(back.direct_normal, ours.direct_normal)
+    assert list(back.times.strftime("%j %H:%M")) == list(ours.times.strftime("%j %H:%M"))
+
+
+WEA = """place A_B
+latitude 48
+longitude -8
+time_zone -15
+site_elevation 250
+weather_data_file_units {unit}
+"""
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("1 1 0.5 0 0\n1 1 1.5 0\n", ("line 8", "month day hour")),
+        ("1 1 0.5 0 0\n1 1 1.5 x 0\n", ("line 8", "direct irradiance")),
+        ("1 1 0.5 0 0\n1 1 1.5 0 0\n1 1 3.5 0 0\n", ("line 9", "missing")),
+        ("1 1 1.5 0 0\n1 1 0.5 0 0\n", ("line 8", "out of order")),
+        ("1 1 0.5 0 0\n1 1 1.5 0 0\n", ("8760 or 8784", "2 rows")),
+        ("2 30 0.5 0 0\n", ("line 7", "not a date")),
+    ],
+)
+def test_wea_faults(tmp_path, rows, words):
+    path = tmp_path / "bad.wea"
+    path.write_text(WEA.format(unit=1) + rows)
+    with pytest.raises(DataError) as caught:
+        read_wea(path)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_wea_of_some_hours_and_of_horizontal_direct(tmp_path):
+    path = tmp_path / "a.wea"
+    path.write_text(WEA.format(unit=2) + "3 21 12.5 300 100\n6 21 12.5 700 90\n6 21 23.5 0 0\n")
+    weather = read_wea(path, whole_year=False)
+    assert list(weather.global_horizontal) == [400, 790, 0]
+    # near solar noon the altitude is 42 degrees plus the declination (0.0 and 23.4 degrees);
+    # the time is within half an hour of noon, which costs 0.5 degrees or 1 %
+    noon = np.radians([42.0, 65.4])
+    np.testing.assert_allclose(weather.direct_normal[:2], [300, 700] / np.sin(noon), rtol=0.015)
+    assert weather.direct_normal[2] == 0

@@ -1,0 +1,161 @@
+"""Who may import whom (DESIGN.md), and the rules of size and naming, read from the source."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parent.parent
+PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
+MAY_IMPORT = {
+    "mitsuba_cfs": {"mitsuba_cfs"},
+    "thermal": {"thermal"},
+    "bim": {"bim", "mitsuba_cfs", "thermal"},
+    "scenes": {"scenes", "bim", "mitsuba_cfs", "thermal"},
+}
+# Only where rays are traced or a plugin is defined.
+TRACING = (
+    "mitsuba_cfs/variants.py",
+    "mitsuba_cfs/trace/",
+    "mitsuba_cfs/bsdf/plugin",
+    "mitsuba_cfs/bsdf/generate.py",
+    "mitsuba_cfs/bsdf/tensor_plugin.py",
+    "mitsuba_cfs/bsdf/traced_",
+    "scenes/benchmarks/",
+    "scenes/validation/",
+    "scenes/commands/self_test.py",
+)
+IFC = ("bim/ifc/", "bim/read_ifc.py", "scenes/demo/")
+PLOTTING = ("scenes/",)
+LIMITED = {
+    "mitsuba": TRACING,
+    "drjit": TRACING,
+    "ifcopenshell": IFC,
+    "matplotlib": PLOTTING,
+    "plotly": PLOTTING,
+}
+LONGEST_MODULE = 400
+CATCH_ALL_NAMES = {"utils.py", "util.py", "common.py", "helpers.py", "misc.py"}
+
+MODULES = sorted(path for package in PACKAGES for path in (REPOSITORY / package).rglob("*.py"))
+
+
+def _name(path: Path) -> str:
+    return path.relative_to(REPOSITORY).as_posix()
+
+
+def _imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Top-level names of all modules imported anywhere in a module, with the line.
+
+    `import_module("x")` and `find_spec("x")` with a plain text count too.
+    """
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name.partition(".")[0], node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.module.partition(".")[0], node.lineno
+        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+            called = ast.unparse(node.func).rpartition(".")[2]
+            if called in {"import_module", "find_spec", "__import__"}:
+                yield str(node.args[0].value).partition(".")[0], node.lineno
+
+
+def _faults(name: str, source: str) -> list[str]:
+    """What a module does against the rules."""
+    tree = ast.parse(source)
+    package = name.partition("/")[0]
+    faults = []
+    for imported, line in _imports(tree):
+        if imported in PACKAGES and imported not in MAY_IMPORT[package]:
+            faults.append(f"{name}:{line}: {package} must not import {imported}")
+        if imported in LIMITED and not name.startswith(LIMITED[imported]):
+            faults.append(f"{name}:{line}: {imported} only in {', '.join(LIMITED[imported])}")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and any(alias.name == "*" for alias in node.names):
+            faults.append(f"{name}:{node.lineno}: import *")
+    if len(source.splitlines()) > LONGEST_MODULE:
+        faults.append(f"{name}: longer than {LONGEST_MODULE} lines")
+    if Path(name).name in CATCH_ALL_NAMES:
+        faults.append(f"{name}: a name that says nothing")
+    if not package == "scenes" and re.search(r"^\s*print\(", source, re.MULTILINE):
+        faults.append(f"{name}: the library never prints")
+    return faults
+
+
+@pytest.mark.parametrize("path", MODULES, ids=_name)
+def test_module_keeps_to_the_rules(path: Path) -> None:
+    assert not _faults(_name(path), path.read_text())
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [
+        ("mitsuba_cfs/x.py", "from bim.model import Building"),
+        ("thermal/x.py", "def f():\n    import mitsuba_cfs.errors"),
+        ("bim/x.py", "import scenes"),
+        ("thermal/x.py", "import mitsuba as mi"),
+        ("mitsuba_cfs/sky/x.py", "from importlib import import_module\nimport_module('drjit')"),
+        ("bim/x.py", "import ifcopenshell.geom"),
+        ("bim/x.py", "import matplotlib.pyplot as plt"),
+        ("bim/x.py", "from bim.model import *"),
+        ("bim/utils.py", ""),
+        ("bim/x.py", "x = 1\n" * 401),
+        ("bim/x.py", "def f():\n    print(1)\n"),
+    ],
+)
+def test_planted_fault_is_found(name: str, source: str) -> None:
+    assert len(_faults(name, source)) == 1
+
+
+def test_modules_were_found() -> None:
+    assert {_name(path).partition("/")[0] for path in MODULES} == set(PACKAGES)
+
+
+def test_the_wheel_holds_exactly_the_four_packages() -> None:
+    settings = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["tool"]["setuptools"]
+    expected = {pattern for package in PACKAGES for pattern in (package, f"{package}.*")}
+    assert set(settings["packages"]["find"]["include"]) == expected
+
+
+def test_every_folder_of_modules_is_a_package() -> None:
+    folders = {path.parent for path in MODULES}
+    missing = [_name(folder) for folder in folders if not (folder / "__init__.py").is_file()]
+    assert not missing, "these would be left out of the wheel"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_data_files_are_packed_into_the_wheel(package: str) -> None:
+    """Every file that is no Python source has an ending that pyproject.toml lists."""
+    settings = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["tool"]["setuptools"]
+    endings = {pattern.removeprefix("**/*") for pattern in settings["package-data"]["*"]}
+    files = [path for path in (REPOSITORY / package).rglob("*") if path.is_file()]
+    data = [path for path in files if path.suffix not in {".py", ".pyc", ".nbi", ".nbc"}]
+    unpacked = [_name(path) for path in data if path.suffix not in endings]
+    assert not unpacked
+
+
+def test_modules_that_trace_no_rays_start_without_mitsuba() -> None:
+    """Importing a reader, a table or a formula must not start Dr.Jit (and choose its LLVM)."""
+    names = [_name(path) for path in MODULES]
+    tracing = [place for place in TRACING if place != "mitsuba_cfs/variants.py"]
+    pure = [name for name in names if not name.startswith((*tracing, "scenes/"))]
+    modules = [
+        name.removesuffix(".py").removesuffix("/__init__").replace("/", ".") for name in pure
+    ]
+    code = "\n".join(
+        [
+            "import importlib, sys",
+            f"for name in {modules!r}:",
+            "    importlib.import_module(name)",
+            "    assert not {'mitsuba', 'drjit'} & set(sys.modules), name",
+        ]
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,108 @@
+"""Comfort: closed forms, pythermalcomfort's adaptive model, and the summary's counts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pythermalcomfort.models import adaptive_ashrae, adaptive_en
+
+from thermal.comfort import (
+    adaptive_comfort,
+    hours_between,
+    mean_radiant_temperature,
+    operative_from_films,
+    operative_temperature,
+    pmv_ppd,
+    prevailing_mean,
+    room_centre_mrt,
+    running_mean,
+    running_mean_en16798,
+    standard_effective_temperature,
+    summarise,
+)
+from thermal.errors import ThermalInputError
+
+
+def test_means_of_a_constant_year_are_that_constant():
+    outdoor = np.full(8760, 17.0)
+    for mean in (running_mean, running_mean_en16798, prevailing_mean):
+        np.testing.assert_allclose(mean(outdoor), 17.0)
+
+
+def test_running_mean_looks_back_only():
+    outdoor = np.zeros(8760)
+    outdoor[100 * 24 : 101 * 24] = 1.0
+    mean = running_mean(outdoor)
+    assert np.all(mean[: 101 * 24] == 0.0)
+    assert mean[101 * 24] == pytest.approx(0.3 / (1 - 0.7**7))
+    assert mean[103 * 24] == pytest.approx(0.49 * mean[101 * 24])
+
+
+@pytest.mark.parametrize("share", ["80", "90"])
+def test_ashrae_bands_agree_with_pythermalcomfort(share):
+    operative, outdoor = np.meshgrid(np.linspace(15, 36, 211), np.linspace(11, 33, 23))
+    ours = adaptive_comfort(operative.ravel(), outdoor.ravel(), f"ASHRAE 55 {share} %")
+    theirs = adaptive_ashrae(
+        tdb=operative.ravel(), tr=operative.ravel(), t_running_mean=outdoor.ravel(), v=0.1
+    )
+    expected = theirs.acceptability_80 if share == "80" else theirs.acceptability_90
+    # pythermalcomfort rounds its limits to 0.1 K
+    clear = np.abs(ours.excess) > 0.06
+    inside = (operative.ravel() > ours.low_c + 0.06) & (operative.ravel() < ours.high_c - 0.06)
+    assert np.all(ours.comfortable[inside]) and np.all(np.asarray(expected)[inside])
+    assert not np.any(ours.comfortable[clear]) and not np.any(np.asarray(expected)[clear])
+
+
+@pytest.mark.parametrize(
+    ("category", "field"), [("I", "cat_i"), ("II", "cat_ii"), ("III", "cat_iii")]
+)
+def test_en_bands_agree_with_pythermalcomfort(category, field):
+    operative = np.linspace(15, 36, 211)
+    outdoor = np.full(211, 20.0)
+    ours = adaptive_comfort(operative, outdoor, f"EN 16798-1 {category}")
+    theirs = adaptive_en(tdb=operative, tr=operative, t_running_mean=20.0, v=0.1)
+    expected = np.asarray(getattr(theirs, f"acceptability_{field}"))
+    away = np.minimum(np.abs(operative - ours.low_c), np.abs(operative - ours.high_c)) > 0.06
+    np.testing.assert_array_equal(ours.comfortable[away], expected[away])
+
+
+def test_radiant_temperatures():
+    assert mean_radiant_temperature([[20.0, 20.0]], [0.3, 0.7]) == pytest.approx(20.0)
+    hot = mean_radiant_temperature([[0.0, 100.0]], [0.5, 0.5])[0]
+    assert hot == pytest.approx((0.5 * 273.15**4 + 0.5 * 373.15**4) ** 0.25 - 273.15)
+    assert room_centre_mrt([[20.0, 26.0]], [18.0]) == pytest.approx(20.5)
+    with pytest.raises(ThermalInputError, match="person"):
+        mean_radiant_temperature([[0.0, 1.0]], [0.3, 0.3])
+
+
+def test_operative_temperature_forms():
+    assert operative_temperature(20.0, 24.0) == pytest.approx(22.0)
+    assert operative_temperature(20.0, 24.0, 0.4) == pytest.approx((24 + 2 * 20) / 3)
+    assert operative_from_films(20.0, 24.0, 4.7) == pytest.approx(22.0)
+
+
+def test_summary_counts_add_up():
+    rng = np.random.default_rng(3)
+    operative, outdoor = rng.uniform(15, 35, 8760), rng.uniform(0, 35, 8760)
+    comfort = adaptive_comfort(operative, outdoor)
+    chosen = hours_between(8, 18, 8760)
+    summary = summarise(comfort, chosen)
+    assert summary.hours == 3650
+    parts = (summary.comfortable, summary.too_warm, summary.too_cold, summary.not_applicable)
+    assert sum(parts) == summary.hours
+    assert summary.discomfort_by_month.sum() == summary.hours - summary.comfortable
+    assert summary.degree_hours_warm > 0 and summary.degree_hours_cold > 0
+
+
+def test_pmv_of_iso_7730_annex_d():
+    # ISO 7730 table D.1, row 1: 22 degC, 0.1 m/s, 60 %, 1.2 met, 0.5 clo -> -0.75, 17 %
+    pmv, ppd = pmv_ppd([22.0], [22.0], humidity=60.0)
+    assert pmv[0] == pytest.approx(-0.75, abs=0.02)
+    assert ppd[0] == pytest.approx(17.0, abs=0.6)
+
+
+def test_set_at_its_reference_condition():
+    # the SET environment: 50 %, 0.1 m/s, 1.0 met, 0.6 clo gives its own temperature back
+    air = np.array([25.0])
+    value = standard_effective_temperature(air, air, metabolic_rate=1.0, clothing=0.6)
+    assert value[0] == pytest.approx(25.0, abs=0.4)

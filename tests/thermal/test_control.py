@@ -1,0 +1,88 @@
+"""Shading control: each rule's closed form, and a room whose state switches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.thermal.rooms import box, climate, sun
+from thermal.balance import simulate
+from thermal.blackbox import Fenestration
+from thermal.climate import Solar
+from thermal.control import (
+    always,
+    by_cut_off,
+    by_glare,
+    by_irradiance,
+    by_schedule,
+    cut_off_angle,
+    profile_angle,
+    switched,
+)
+from thermal.errors import ThermalInputError
+from thermal.zone import WindowElement, Zone
+
+
+def test_irradiance_control_has_hysteresis():
+    light = np.array([0, 150, 250, 180, 120, 90, 180, 250], dtype=float)
+    assert by_irradiance(light, 200.0).tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
+    assert by_irradiance(light, 200.0, 100.0).tolist() == [0, 0, 1, 1, 1, 0, 0, 1]
+
+
+def test_schedule_and_always():
+    assert by_schedule(np.arange(24) // 12, 30).tolist() == [0] * 12 + [1] * 12 + [0] * 6
+    assert np.all(always(2, 5) == 2)
+
+
+def test_glare_takes_the_most_open_state_that_is_good_enough():
+    dgp = np.array([[0.30, 0.50, 0.60, 0.60], [0.25, 0.34, 0.40, 0.55], [0.2, 0.2, 0.34, 0.45]])
+    assert by_glare(dgp, 0.35).tolist() == [0, 1, 2, 2]
+
+
+def test_cut_off_of_the_reference_blind():
+    # 80 mm slats 72 mm apart at 45 degrees: tan = (0.9 - 0.7071)/0.7071
+    assert np.degrees(cut_off_angle(np.radians(45.0), 0.08, 0.072)) == pytest.approx(
+        15.26, abs=0.01
+    )
+    # level slats as far apart as they are wide: 45 degrees
+    assert np.degrees(cut_off_angle(0.0, 0.08, 0.08)) == pytest.approx(45.0)
+
+
+def test_cut_off_opens_as_the_sun_rises_and_without_sun():
+    elevation = np.radians([12.0, 25.0, 50.0, 50.0])
+    local = np.stack([np.zeros(4), np.sin(elevation), np.cos(elevation)], axis=1)
+    state = by_cut_off(local, [300, 300, 300, 0], np.radians([0.0, 45.0, 70.0]), 0.08, 0.08)
+    # cut-off at 45, 22.5 and 10 degrees
+    assert state.tolist() == [2, 1, 0, 0]
+    np.testing.assert_allclose(profile_angle(local)[:3], elevation[:3])
+
+
+def test_switched_room_equals_each_state_while_it_holds():
+    hours = 96
+    states = (Fenestration("open", 1.2), Fenestration("shut", 0.8))
+    base = box(window=states[0])
+    window = WindowElement("window", 4.5, base.windows[0].normal, states)
+    zone = Zone("room", 60.0, base.surfaces, (window,))
+    bright, dim = sun(hours, zone), sun(hours, zone, strength=0.2)
+    weather = climate(hours, outdoor=8.0)
+    shut_all = switched([bright, dim], always(1, hours))
+    expected = simulate(
+        Zone("room", 60.0, base.surfaces, (WindowElement("w", 4.5, window.normal, states[1:]),)),
+        weather,
+        dim,
+    )
+    np.testing.assert_allclose(simulate(zone, weather, shut_all).air_c, expected.air_c, atol=1e-9)
+    half = switched([bright, dim], np.repeat([0, 1], hours // 2))
+    np.testing.assert_array_equal(half.inside[: hours // 2], bright.inside[: hours // 2])
+    np.testing.assert_array_equal(half.inside[hours // 2 :], dim.inside[hours // 2 :])
+    result = simulate(zone, weather, half)
+    assert result.air_c[-1] < simulate(zone, weather, bright).air_c[-1]
+
+
+def test_unknown_states_are_refused():
+    zone = box(window=Fenestration("open", 1.2))
+    light: Solar = sun(24, zone)
+    with pytest.raises(ThermalInputError, match="shading state"):
+        switched([light], np.ones(24, dtype=int))
+    with pytest.raises(ThermalInputError, match="24 states"):
+        by_schedule([0, 1], 24)

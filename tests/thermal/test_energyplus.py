@@ -1,0 +1,125 @@
+"""The room against EnergyPlus: stored hours of Table 15's room, and the sun on its facade.
+
+Bars (issue 7): air and walls 0.2, 0.15, 0.5, 0.5 K; window 0.3, 0.25, 0.7, 0.8 K over 128 cases.
+The fast test takes three orientations of one climate and holds them to the same bars; the slow one
+takes all cases; a peer test runs EnergyPlus itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenes.validation.energyplus_cases import EPW_FILES, pairs
+from scenes.validation.energyplus_loads import annual_loads
+from scenes.validation.energyplus_statistics import case_row, comfort_classification, pooled
+from scenes.validation.facade_sun import facade_sun, sun_steps
+from scenes.validation.reference_room import ORIENTATIONS, facade_normal
+
+BARS = {
+    "dgu": (0.2, 0.3),
+    "ext_shade": (0.15, 0.25),
+    "ext_blind": (0.5, 0.7),
+    "int_shade": (0.5, 0.8),
+}
+
+
+def compared(real_data, reference_data, closure, climates, orientations) -> pd.DataFrame:
+    """Pooled errors by system."""
+    rows = [
+        case_row(ours[0], theirs)
+        for theirs, ours in pairs(
+            reference_data / "energyplus",
+            real_data / "epw",
+            closures=(closure,),
+            climates=climates,
+            orientations=orientations,
+        )
+    ]
+    return pooled(pd.DataFrame(rows), ["system"])
+
+
+def hold(table: pd.DataFrame) -> None:
+    """The bars of the issue."""
+    for system, (air, window) in BARS.items():
+        assert table.loc[system, "air rmse"] <= air, system
+        assert table.loc[system, "wall rmse"] <= air, system
+        assert table.loc[system, "window rmse"] <= window, system
+
+
+def test_sun_on_the_facade_is_energyplus_own(real_data, reference_data):
+    from mitsuba_cfs.sky.weather import read_epw
+
+    weather = read_epw(real_data / "epw" / EPW_FILES["Houlton"])
+    steps = sun_steps(weather, 6)
+    columns = ["cfs", "ori", "I_inc", "I_beam", "I_sky"]
+    table = pd.read_parquet(reference_data / "energyplus" / "ep_Houlton.parquet", columns=columns)
+    for orientation in ("S", "NW"):
+        sun = facade_sun(steps, facade_normal(orientation))
+        hours = table[(table.cfs == "dgu") & (table.ori == orientation)]
+        for name, values in (("I_beam", sun.beam), ("I_sky", sun.sky), ("I_inc", sun.total)):
+            error = values.reshape(-1, 6).mean(axis=1) - hours[name].to_numpy()
+            # the table has one decimal: 0.03 rms; the sky model's tables have four digits
+            assert np.sqrt(np.mean(error**2)) < 0.15, (orientation, name)
+
+
+def test_better_closure_meets_the_bars_in_one_climate(real_data, reference_data):
+    hold(compared(real_data, reference_data, "films", ("Frankfurt",), ("S", "E", "N")))
+
+
+def test_plain_kuhn_shows_the_dissertation_s_errors(real_data, reference_data):
+    table = compared(real_data, reference_data, "kuhn", ("Frankfurt",), ("S", "N"))
+    # dissertation: air and wall 0.6 K, window 0.8 to 1.2 K, behind an interior shade 2.8 K
+    assert table["air rmse"].max() <= 0.6
+    assert table.loc["int_shade", "window rmse"] > 2.0
+    assert table.loc["int_shade", "window rmse"] < 3.0
+
+
+@pytest.mark.slow
+def test_better_closure_meets_the_bars_in_all_cases(real_data, reference_data):
+    hold(compared(real_data, reference_data, "films", tuple(EPW_FILES), tuple(ORIENTATIONS)))
+
+
+@pytest.mark.slow
+def test_comfort_agrees(real_data, reference_data):
+    from mitsuba_cfs.sky.weather import read_epw
+
+    outdoor = read_epw(real_data / "epw" / EPW_FILES["Frankfurt"]).dry_bulb_c
+    total = None
+    for theirs, ours in pairs(
+        reference_data / "energyplus",
+        real_data / "epw",
+        closures=("films",),
+        climates=("Frankfurt",),
+        systems=("dgu", "ext_blind", "ext_shade"),
+    ):
+        counts = comfort_classification(ours[0], theirs, outdoor, "ASHRAE 55 80 %")
+        total = counts if total is None else total + counts
+    assert total.agreement >= 0.985
+    assert total.true_positive_rate > 0.94  # dissertation, table 17
+    assert total.true_negative_rate > 0.99
+
+
+@pytest.mark.peer
+@pytest.mark.slow
+def test_energyplus_run_here_and_now_is_the_reference(real_data, reference_data, tmp_path):
+    pytest.importorskip("pyenergyplus")
+    from scenes.validation.energyplus_model import room_model, run_energyplus
+
+    epw = real_data / "epw" / EPW_FILES["Frankfurt"]
+    table = pd.read_parquet(reference_data / "energyplus" / "ep_Frankfurt.parquet")
+    live = run_energyplus(room_model("ext_blind", "S"), epw, tmp_path)
+    stored = table[(table.cfs == "ext_blind") & (table.ori == "S")]
+    for name in ("T_air", "T_facade", "T_win_in"):
+        # stored with two decimals; warm-up tolerance 0.01 K
+        assert np.abs(live[name].to_numpy() - stored[name].to_numpy()).max() < 0.05, name
+
+
+def test_heating_and_cooling_agree(real_data, reference_data):
+    table = annual_loads(reference_data / "energyplus", real_data / "epw", ("Frankfurt",))
+    heating = table["heating"] / table["EnergyPlus heating"] - 1
+    cooling = table["cooling"] - table["EnergyPlus cooling"]
+    # REFERENCE.md: the prototype with the same closure reached 2 % and 16 kWh rms over these 32
+    assert np.sqrt(np.mean(heating**2)) < 0.02
+    assert np.sqrt(np.mean(cooling**2)) < 16.0

@@ -1,0 +1,245 @@
+"""View, daylight and absorption matrices against closed forms and identities."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.surfaces import WindowGroup
+
+from . import rooms
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+UP = [0.0, 0.0, 1.0]
+
+
+def configuration_factor(a: float, b: float, c: float) -> float:
+    """Share of a small plane's view on a rectangle a x b at right angles to it.
+
+    The rectangle stands at distance c, its lower edge a at the level of the plane, one corner
+    opposite to it.  Siegel and Howell, configuration factor C-12.
+    """
+    root = np.hypot(b, c)
+    return (np.arctan(a / c) - c / root * np.arctan(a / root)) / (2 * np.pi)
+
+
+def window_factor(x: float, y: float, z: float) -> float:
+    """Configuration factor of the test room's window from an upward sensor at (x, y, z)."""
+    total = 0.0
+    for height, sign_z in ((rooms.Z1 - z, 1), (rooms.Z0 - z, -1)):
+        if height <= 0:
+            continue
+        for width, sign_x in ((rooms.X1 - x, 1), (rooms.X0 - x, -1)):
+            total += sign_z * sign_x * configuration_factor(width, height, y)
+    return total
+
+
+def test_view_matrix_row_sum_in_a_black_room_is_pi_times_the_configuration_factor():
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room(scale=0.0)
+    points = np.array([[1.0, 0.5, 0.8], [1.8, 2.0, 0.8], [3.0, 4.4, 0.8], [1.8, 1.0, 2.0]])
+    result = view_matrix(room, groups, points, np.tile(UP, (4, 1)), samples=16384)
+    expected = [np.pi * window_factor(*p) for p in points]
+    total = result.values.sum(axis=(1, 2))
+    # entries of a row are nearly independent; 4 sigma of the sum, at least the float32 ray offsets
+    error = np.sqrt((result.standard_error**2).sum(axis=(1, 2)))
+    assert np.all(np.abs(total - expected) < 4 * error + 1e-4 * total), (total, expected)
+
+
+def test_uniform_sky_gives_pi_on_a_horizontal_sensor_and_one_on_a_window():
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
+
+    sky = sky_irradiance_matrix(rooms.NOTHING, [[0, 0, 0]], [UP], subdivision=1, samples=65536)
+    assert sky.values[0, 0] == pytest.approx(0, abs=1e-5)  # no ground above the horizon
+    assert sky.values[0].sum() == pytest.approx(np.pi, rel=1e-6)  # every path ends in the sky
+    patches = ReinhartSky(1)
+    edges = np.append(patches.row_height * np.arange(8), np.pi / 2)
+    ring = np.pi * np.diff(np.sin(edges) ** 2) / patches.row_counts
+    error = 5 * sky.standard_error[0, 1:] + 1e-6
+    assert np.all(np.abs(sky.values[0, 1:] - np.repeat(ring, patches.row_counts)) < error)
+
+    _, groups = rooms.test_room()
+    daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=1, samples=1024)
+    assert daylight.values.sum(axis=2) == pytest.approx(np.ones((1, 145)), rel=1e-6)
+
+
+def test_daylight_matrix_sends_each_klems_patch_to_the_sky_it_faces():
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+
+    _, groups = rooms.test_room()
+    daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=4, samples=4096).values[0]
+    sky = ReinhartSky(4)
+    mean = daylight @ sky.directions
+    expected = KLEMS_FULL.incident_directions() @ window_frame([0, -1, 0])
+    above = expected[:, 2] > 0.3  # patches that see no ground
+    cosine = np.einsum("kj,kj->k", mean, expected) / np.linalg.norm(mean, axis=1)
+    # the mean direction lies within the patch: less than 8 degrees from its centre
+    assert np.all(cosine[above] > np.cos(np.radians(8)))
+
+
+def test_a_wall_of_reflectance_r_before_the_window_reflects_r_times_what_it_receives():
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+
+    r = 0.6
+    wall = rooms.surfaces(
+        [(rooms.quad((-90, -8, -90), (90, -8, -90), (90, -8, 90), (-90, -8, 90)), r)]
+    )
+    _, groups = rooms.test_room()
+    values = daylight_matrix(wall, groups, subdivision=1, samples=2048).values[0]
+    # straight ahead the window sees only the wall, which sees half a sky and half a ground
+    assert values[0].sum() == pytest.approx(r, abs=0.01)
+
+
+def test_clear_opening_three_phase_is_the_two_phase_matrix():
+    """V T D with T = 1 against sky coefficients traced straight through the open hole."""
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    points, directions = [[1.2, 1.5, 0.85], [2.0, 3.5, 0.85]], [UP, UP]
+    view = view_matrix(room, groups, points, directions, samples=32768).values[:, 0]
+    daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=1, samples=8192).values[0]
+    direct = sky_irradiance_matrix(
+        room, points, directions, subdivision=1, samples=131072, max_depth=40
+    )
+    three_phase = view @ daylight
+    total = direct.values.sum(axis=1)
+    assert three_phase.sum(axis=1) == pytest.approx(total, rel=0.004)
+    # the horizon runs through Klems patches, whose light spreads evenly above and below it
+    assert np.abs(three_phase[:, 0] - direct.values[:, 0]).max() < 0.02 * total.max()
+
+
+def test_absorbed_shares_sum_to_one_and_follow_the_reflectances():
+    from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
+
+    room, groups = rooms.test_room()
+    values = absorption_matrix(room, groups, samples=2048).values[0]
+    # what is missing has left through the rounded seams of the float32 mesh
+    assert values.sum(axis=1) == pytest.approx(np.ones(145), abs=3e-3)
+    black = absorption_matrix(rooms.test_room(scale=0.0)[0], groups, samples=2048).values[0]
+    assert black[:, -1] == pytest.approx(np.zeros(145), abs=1e-6)  # nothing comes back
+    mirror = absorption_matrix(room, groups, window_reflectance=[1.0], samples=2048).values[0]
+    assert mirror[:, -1] == pytest.approx(
+        np.zeros(145), abs=1e-6
+    )  # nothing stays in a white window
+    assert mirror.sum(axis=1) == pytest.approx(np.ones(145), abs=3e-3)
+    down = KLEMS_FULL.index(np.radians(50), np.radians(270))  # light from the sun goes down
+    assert black[down, 0] > 0.9  # ... to the floor
+
+
+def test_picture_does_not_depend_on_the_block_and_its_illuminance_is_the_view_matrix(monkeypatch):
+    from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
+    from mitsuba_cfs.trace import image
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    view = fisheye((1.8, 2.5, 1.2), (0, -1, 0), 64)
+    luminance = np.linspace(500, 5000, 145)[None, :, None]
+    whole = image.luminance_pictures(room, groups, view, luminance, samples=16)
+    monkeypatch.setattr(image, "BLOCK_BYTES", 8 * 145 * 1000)
+    blocks = image.luminance_pictures(room, groups, view, luminance, samples=16)
+    np.testing.assert_allclose(whole, blocks, rtol=1e-5)
+
+    directions, counts = pixel_directions(view)
+    weight = pixel_solid_angles(view) * counts * np.maximum(directions @ [0, -1, 0], 0)
+    at_eye = view_matrix(room, groups, [view.position], [view.direction], samples=16384)
+    expected = at_eye.values[0, 0] @ luminance[0, :, 0]
+    # pixels of 2.8 degrees at the window's edges: 1 %
+    assert (weight * whole[0]).sum() == pytest.approx(expected, rel=0.01)
+
+
+def test_seed_and_batches_key_the_result():
+    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    options = {"samples": 256, "stopping": Stopping(batches=2)}
+    one, same, other = (
+        view_matrix(room, groups, [[1, 1, 1]], [UP], seed=seed, **options).values
+        for seed in (1, 1, 2)
+    )
+    np.testing.assert_allclose(one, same, rtol=1e-12)  # order of the float64 sums
+    assert np.abs(one - other).max() > 1e-4
+
+
+def test_stated_error_is_the_spread_between_seeds():
+    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    runs = [
+        view_matrix(
+            room, groups, [[1.5, 2.0, 0.8]], [UP], samples=512, seed=s, stopping=Stopping(batches=8)
+        )
+        for s in range(24)
+    ]
+    values = np.stack([r.values for r in runs])
+    stated = np.mean([r.standard_error**2 for r in runs])
+    # mean variance over 145 entries from 24 runs: a few per cent; batches of 8 as much again
+    assert values.var(axis=0, ddof=1).mean() == pytest.approx(stated, rel=0.2)
+
+
+def test_stated_error_of_sums_is_the_spread_between_seeds():
+    """Entries of a row go together: they share the points that the sensors' rays hit."""
+    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    points = [[0.5 + 0.4 * i, 0.5 + 0.5 * j, 0.8] for i in range(8) for j in range(8)]
+    runs = [
+        view_matrix(
+            room, groups, points, np.tile(UP, (64, 1)), samples=512, seed=s,
+            stopping=Stopping(batches=8),
+        )
+        for s in range(10)
+    ]  # fmt: skip
+    for weights in (np.ones(145), np.linspace(1, 3, 145)):
+        sums = np.stack([r.values @ weights for r in runs])
+        stated = np.mean([r.error_of(weights) ** 2 for r in runs])
+        # 10 runs whose sensors go together: the variance is known to about 30 %; entries taken
+        # as independent would give less than half of it
+        assert sums.var(axis=0, ddof=1).mean() == pytest.approx(stated, rel=0.5)
+
+
+def test_sensors_do_not_change_each_other():
+    """A row is the same, but for noise, whoever else is asked for."""
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    first = np.array([1.0, 4.55, 0.8])  # 5 cm from the back wall
+    others = [[2.0, y, 1.2] for y in np.linspace(0.3, 4.3, 31)]
+    alone = view_matrix(room, groups, [first], [UP], samples=16384)
+    crowd = view_matrix(room, groups, [first, *others], np.tile(UP, (32, 1)), samples=4096)
+    error = np.hypot(alone.sum_error[0], crowd.sum_error[0])
+    assert error < 0.02 * alone.values.sum()
+    difference = alone.values[0].sum() - crowd.values[0].sum()
+    assert abs(difference) < 4 * error
+
+
+def test_rays_that_leave_through_a_gap_bring_nothing():
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    keep = room.surface != 2  # without its back wall
+    gap = replace(
+        room,
+        triangles=room.triangles[keep],
+        reflectance=room.reflectance[keep],
+        surface=room.surface[keep],
+    )
+    points = [[1.0, 2.0, 0.8], [2.0, 4.0, 0.8]]
+    whole, less = (view_matrix(r, groups, points, [UP, UP]).values.sum() for r in (room, gap))
+    assert 0.5 * whole < less < 0.98 * whole
+
+
+def test_windows_of_one_group_must_share_their_orientation():
+    _, groups, _ = rooms.l_shaped_room()
+    with pytest.raises(ValueError, match="turned"):
+        WindowGroup("both", (groups[0].windows[0], groups[1].windows[0]))

@@ -1,0 +1,1 @@
+"""Kuhn's Blackbox fenestration model in a transient room heat balance."""

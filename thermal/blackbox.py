@@ -1,0 +1,238 @@
+"""Kuhn's Blackbox: a fenestration system as two virtual layers, from measurable data.
+
+    T_e --R_e-- [outer layer, alpha_o] --R-- [inner layer, alpha_i] --R_i-- T_i
+
+With g, U, R_e and R_i of one measuring condition (q_i = g - tau, alpha = 1 - tau - rho):
+
+    R = 1/U - R_e - R_i      alpha_i = (q_i/U - alpha R_e)/R      alpha_o = alpha - alpha_i
+
+In the room balance the films are those of the hour and R may depend on temperature; the layer
+absorptances stay.  At the measuring condition U and g come back exactly.
+
+Source: Kuhn et al. 2011, Energy and Buildings 43:19-27, whose primes mark the measuring condition.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal.errors import require, require_range
+
+R_OUTER = 0.04  # [m2 K/W] EN 673:2011 / ISO 6946 outer film
+R_INNER = 0.13  # [m2 K/W] EN 673:2011 / ISO 6946 inner film
+MEASUREMENT_SLACK = 0.15  # absorptance that measuring errors and film assumptions may explain
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class LayerResistance:
+    """Resistance between the two layers: "constant", "linear U" or "surface", and coefficients.
+
+    constant   R = c0                                                          [m2 K/W]
+    linear U   R = 1/(c0 + c1 (T_m - 10)) - c2         c2 = R_e + R_i of the measurement
+    surface    1/R = c0 + c1 x + c2 d + c3 d^2 + c4 x d + c5 x^2
+    with T_m the mean of the two layers [degC], x = T_m - 10, d = |T_inner - T_outer|.
+    """
+
+    kind: str
+    coefficients: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        counts = {"constant": 1, "linear U": 3, "surface": 6}
+        require(self.kind in counts, "layer resistance", f"{self.kind!r} is not of {list(counts)}")
+        got = len(self.coefficients)
+        expected = counts[self.kind]
+        require(got == expected, "layer resistance", f"expected {expected} coefficients, got {got}")
+        nominal = float(self.at(10.0, 5.0))
+        require(nominal > 0, "layer resistance", f"R_s must be positive, got {nominal:.3g} m2 K/W")
+
+    def at(self, mean_c: ArrayLike, difference: ArrayLike) -> NDArray[np.float64]:
+        """R [m2 K/W] at the mean layer temperature [degC] and the difference between them [K]."""
+        x, d = np.asarray(mean_c, dtype=float) - 10.0, np.abs(np.asarray(difference, dtype=float))
+        c = self.coefficients
+        if self.kind == "constant":
+            return np.full(np.broadcast(x, d).shape, c[0])
+        if self.kind == "linear U":
+            return 1.0 / (c[0] + c[1] * x) - c[2] + 0.0 * d
+        return 1.0 / (c[0] + c[1] * x + c[2] * d + c[3] * d**2 + c[4] * x * d + c[5] * x**2)
+
+
+@dataclass(frozen=True, slots=True)
+class Fenestration:
+    """A fenestration system between two films, as the room balance needs it.
+
+    The extra conductances and the report weight are 0 and 1 in plain Kuhn.  They close the model
+    for shades that also lose heat to the air behind them; see `with_realised_films`.
+    """
+
+    name: str
+    u_value: float  # [W/(m2 K)] at the measuring condition
+    r_outer: float = R_OUTER  # [m2 K/W] films of the measurement
+    r_inner: float = R_INNER
+    resistance: LayerResistance | None = None  # None: constant, from U
+    extra_outer: float = 0.0  # [W/(m2 K)] outer layer to outdoor air, besides the film
+    extra_inner: float = 0.0  # [W/(m2 K)] inner layer to room air, besides the film
+    inner_report: float = 1.0  # share of (T_inner - T_room) that the visible face shows
+    emissivity_in: float = 0.84
+    emissivity_out: float = 0.84
+    layer_resistance: LayerResistance = field(init=False)
+
+    def __post_init__(self) -> None:
+        item = f"fenestration {self.name}"
+        require_range(self.u_value, 0.1, 7.0, f"{item}: U", "W/(m2 K)")
+        require_range(self.r_outer, 1e-3, 1.0, f"{item}: R_e", "m2 K/W")
+        require_range(self.r_inner, 1e-3, 1.0, f"{item}: R_i", "m2 K/W")
+        r = 1.0 / self.u_value - self.r_outer - self.r_inner
+        if self.resistance is None:
+            require(r > 0, item, f"U = {self.u_value:g} leaves no resistance between the layers")
+            object.__setattr__(self, "layer_resistance", LayerResistance("constant", (r,)))
+        else:
+            object.__setattr__(self, "layer_resistance", self.resistance)
+        for value, label in ((self.extra_outer, "extra outer"), (self.extra_inner, "extra inner")):
+            require_range(value, 0.0, 200.0, f"{item}: {label} conductance", "W/(m2 K)")
+        require_range(self.emissivity_in, 0.0, 1.0, f"{item}: inside emissivity")
+        require_range(self.emissivity_out, 0.0, 1.0, f"{item}: outside emissivity")
+        require_range(self.inner_report, 0.0, 1.5, f"{item}: inner report weight")
+
+
+@dataclass(frozen=True, slots=True)
+class LayerAbsorptances:
+    """Solar absorptances of the two virtual layers, per direction."""
+
+    outer: NDArray[np.float64]  # [...]
+    inner: NDArray[np.float64]  # [...]
+    clipped: float  # largest absorptance that had to be moved to stay between 0 and alpha
+
+
+def layer_absorptances(
+    transmittance: ArrayLike,
+    reflectance: ArrayLike,
+    g_value: ArrayLike,
+    u_value: float,
+    *,
+    r_outer: float = R_OUTER,
+    r_inner: float = R_INNER,
+    item: str = "fenestration",
+) -> LayerAbsorptances:
+    """Absorptances of the outer and inner layer, from data of one measuring condition.
+
+    Values a little out of range come from measuring errors, or from a film R_i that an interior
+    shade does not have; they are clipped so that the total stays, and the log says by how much.
+
+    Args:
+        transmittance, reflectance, g_value: [...] solar, per direction (or diffuse).
+        u_value: [W/(m2 K)]; r_outer, r_inner: [m2 K/W] films at which g and U were measured.
+
+    Raises: `ThermalInputError` for g below the transmittance, R not positive, values out of range.
+
+    Source: Kuhn et al. 2011; the dissertation's eq. (21) ff. with its misprints put right.
+    """
+    tau, rho, g = (np.asarray(v, dtype=float) for v in (transmittance, reflectance, g_value))
+    require_range(u_value, 0.1, 7.0, f"{item}: U", "W/(m2 K)")
+    r = 1.0 / u_value - r_outer - r_inner
+    require(r > 0, f"{item}: R_s", f"must be positive, got {r:.3g} m2 K/W at U = {u_value:g}")
+    for values, label in ((tau, "transmittance"), (rho, "reflectance"), (g, "g")):
+        require(bool(np.all((values >= 0) & (values <= 1))), f"{item}: {label}", "outside 0 to 1")
+    excess = float(np.max(tau + rho, initial=0.0)) - 1.0
+    require(excess <= 0.02, f"{item}: absorptance", f"tau + rho exceeds 1 by {excess:.3f}")
+    short = float(np.max(tau - g, initial=0.0))
+    require(short <= 0.01, f"{item}: g", f"lies {short:.3f} below the solar transmittance")
+    alpha, q_i = np.maximum(1.0 - tau - rho, 0.0), np.maximum(g - tau, 0.0)
+    inner = (q_i / u_value - alpha * r_outer) / r
+    kept = np.clip(inner, 0.0, alpha)
+    clipped = float(np.max(np.abs(inner - kept), initial=0.0))
+    message = f"a layer's absorptance is out of range by {clipped:.3f}"
+    require(clipped <= MEASUREMENT_SLACK, f"{item}: g and U", message)
+    if clipped > 1e-6:
+        _log.warning("%s: %s; clipped", item, message)
+    return LayerAbsorptances(outer=alpha - kept, inner=kept, clipped=clipped)
+
+
+def secondary_heat_gain(
+    absorptance_outer: ArrayLike,
+    absorptance_inner: ArrayLike,
+    u_value: float,
+    *,
+    r_outer: float = R_OUTER,
+    r_inner: float = R_INNER,
+) -> NDArray[np.float64]:
+    """Secondary gain q_i = U [R_e alpha_o + (R_e + R) alpha_i] per unit irradiance."""
+    outer, inner = np.asarray(absorptance_outer), np.asarray(absorptance_inner)
+    return u_value * (r_outer * outer + (1.0 / u_value - r_inner) * inner)
+
+
+def steady_window(
+    outdoor_c: float,
+    indoor_c: float,
+    absorbed_outer: ArrayLike,
+    absorbed_inner: ArrayLike,
+    r: float,
+    *,
+    r_outer: float = R_OUTER,
+    r_inner: float = R_INNER,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Outer and inner layer temperature [degC] and heat to the room [W/m2], in the steady state.
+
+    absorbed_outer, absorbed_inner: [...] [W/m2].  The heat leaves out what is transmitted.
+    """
+    s_o, s_i = np.asarray(absorbed_outer, float), np.asarray(absorbed_inner, float)
+    total = r_outer + r + r_inner
+    to_room = ((outdoor_c - indoor_c) + r_outer * s_o + (r_outer + r) * s_i) / total
+    inner = indoor_c + r_inner * to_room
+    outer = inner + r * (to_room - s_i)
+    return outer, inner, to_room
+
+
+def linear_u(
+    u_value: float, *, slope: float = 0.0065, reference_c: float = 10.0
+) -> LayerResistance:
+    """R from a U-value that grows linearly with the mean layer temperature (Fener: 0.65 %/K)."""
+    per_kelvin = u_value * slope
+    at_ten = u_value + per_kelvin * (10.0 - reference_c)
+    return LayerResistance("linear U", (at_ten, per_kelvin, R_OUTER + R_INNER))
+
+
+def fit_conductance_surface(
+    mean_c: ArrayLike, difference: ArrayLike, resistance: ArrayLike
+) -> LayerResistance:
+    """R(T_m, dT) fitted by least squares to resistances [m2 K/W] of an ISO 15099 program."""
+    x, d = np.asarray(mean_c, float) - 10.0, np.abs(np.asarray(difference, float))
+    basis = np.stack([np.ones_like(x), x, d, d**2, x * d, x**2], axis=1)
+    conductance = 1.0 / np.asarray(resistance, dtype=float)
+    coefficients, *_ = np.linalg.lstsq(basis, conductance, rcond=None)
+    return LayerResistance("surface", tuple(float(c) for c in coefficients))
+
+
+def with_realised_films(
+    plain: Fenestration,
+    *,
+    r_inner_realised: float | None = None,
+    r_outer_realised: float | None = None,
+) -> Fenestration:
+    """The better closure: layer-to-environment resistances that the system really has.
+
+    A shade next to the room (or outdoors) also loses heat to the air behind it.  What its film
+    does not carry goes through an extra conductance 1/R_realised - 1/R_nominal to the air.
+    The absorptances must then be computed with the realised resistances too.
+
+    Args: realised resistances [m2 K/W] from one ISO 15099 state or a thermographic test.
+    """
+    r_i = plain.r_inner if r_inner_realised is None else r_inner_realised
+    r_o = plain.r_outer if r_outer_realised is None else r_outer_realised
+    return Fenestration(
+        name=plain.name,
+        u_value=plain.u_value,
+        r_outer=r_o,
+        r_inner=r_i,
+        resistance=plain.resistance,
+        extra_outer=plain.extra_outer + max(1.0 / r_o - 1.0 / plain.r_outer, 0.0),
+        extra_inner=plain.extra_inner + max(1.0 / r_i - 1.0 / plain.r_inner, 0.0),
+        inner_report=1.0,
+        emissivity_in=plain.emissivity_in,
+        emissivity_out=plain.emissivity_out,
+    )

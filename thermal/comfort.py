@@ -1,0 +1,240 @@
+"""Thermal comfort: radiant and operative temperature, adaptive bands, PMV and SET."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal.errors import require
+
+KELVIN = 273.15
+
+# (slope, intercept, below, above, lowest and highest valid outdoor mean), all [degC] or [K]
+ADAPTIVE_BANDS = {
+    "ASHRAE 55 90 %": (0.31, 17.8, 2.5, 2.5, 10.0, 33.5),
+    "ASHRAE 55 80 %": (0.31, 17.8, 3.5, 3.5, 10.0, 33.5),
+    "EN 16798-1 I": (0.33, 18.8, 3.0, 2.0, 10.0, 30.0),
+    "EN 16798-1 II": (0.33, 18.8, 4.0, 3.0, 10.0, 30.0),
+    "EN 16798-1 III": (0.33, 18.8, 5.0, 4.0, 10.0, 30.0),
+}
+
+
+def mean_radiant_temperature(surface_c: ArrayLike, view_factors: ArrayLike) -> NDArray[np.float64]:
+    """MRT [H] [degC] of a point: (sum_j F_j T_j^4)^(1/4).
+
+    Args: surface_c: [H, N]; view_factors: [N] from the person to the surfaces, sum 1.
+
+    Source: ISO 7726, annex B.
+    """
+    f = np.asarray(view_factors, dtype=float)
+    fits = abs(f.sum() - 1.0) < 1e-3
+    require(fits, "view factors of the person", f"sum to {f.sum():.4f} instead of 1")
+    kelvin = np.asarray(surface_c, dtype=float) + KELVIN
+    return (kelvin**4 @ f) ** 0.25 - KELVIN
+
+
+def room_centre_mrt(
+    surface_c: ArrayLike, floor_c: ArrayLike, area: ArrayLike | None = None
+) -> NDArray[np.float64]:
+    """MRT [H] [degC] at the room's centre: mean of all surfaces' mean and of the floor.
+
+    Args: surface_c: [H, N]; floor_c: [H]; area: [N] weights, plain mean (dissertation) without.
+    """
+    surfaces = np.asarray(surface_c, dtype=float)
+    weight = np.ones(surfaces.shape[-1]) if area is None else np.asarray(area, dtype=float)
+    return 0.5 * (surfaces @ (weight / weight.sum()) + np.asarray(floor_c, dtype=float))
+
+
+def operative_temperature(
+    air_c: ArrayLike, mrt_c: ArrayLike, air_speed: float = 0.1
+) -> NDArray[np.float64]:
+    """Operative temperature [...] [degC]: the mean below 0.2 m/s, else ISO 7726's weights."""
+    air, mrt = np.asarray(air_c, dtype=float), np.asarray(mrt_c, dtype=float)
+    require(air_speed >= 0, "air speed", f"is negative: {air_speed} m/s")
+    weight = 1.0 if air_speed < 0.2 else np.sqrt(10.0 * air_speed)
+    return (mrt + weight * air) / (1.0 + weight)
+
+
+def operative_from_films(
+    air_c: ArrayLike, mrt_c: ArrayLike, convective: ArrayLike, radiative: ArrayLike = 4.7
+) -> NDArray[np.float64]:
+    """Operative temperature (h_r T_r + h_c T_a)/(h_r + h_c); films in W/(m2 K)."""
+    h_c, h_r = np.asarray(convective, dtype=float), np.asarray(radiative, dtype=float)
+    return (h_r * np.asarray(mrt_c) + h_c * np.asarray(air_c)) / (h_r + h_c)
+
+
+def running_mean(outdoor_c: ArrayLike, *, alpha: float = 0.7, days: int = 7) -> NDArray[np.float64]:
+    """Running mean outdoor temperature [H] [degC] of the days before, the year taken as cyclic.
+
+    (1 - a) sum_k a^(k-1) t_(d-k) / (1 - a^n): the division, missing in the dissertation, makes the
+    weights sum to 1.  EN 16798-1: alpha 0.8.
+    """
+    daily = _daily_means(outdoor_c)
+    require(0.0 < alpha < 1.0, "running mean", f"alpha must lie between 0 and 1, got {alpha}")
+    weights = alpha ** np.arange(days)
+    return _days_before(daily, weights / weights.sum())
+
+
+def running_mean_en16798(outdoor_c: ArrayLike) -> NDArray[np.float64]:
+    """Running mean [H] [degC] of seven days with the weights of EN 16798-1, eq. (B.2)."""
+    weights = np.array([1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2])
+    return _days_before(_daily_means(outdoor_c), weights / 3.8)
+
+
+def prevailing_mean(outdoor_c: ArrayLike, *, days: int = 30) -> NDArray[np.float64]:
+    """Plain mean [H] [degC] of the days before (ASHRAE 55 allows 7 to 30; EnergyPlus uses 30)."""
+    return _days_before(_daily_means(outdoor_c), np.full(days, 1.0 / days))
+
+
+def _daily_means(outdoor_c: ArrayLike) -> NDArray[np.float64]:
+    outdoor = np.asarray(outdoor_c, dtype=float)
+    require(len(outdoor) % 24 == 0, "outdoor temperature", "expected whole days of 24 hours")
+    return outdoor.reshape(-1, 24).mean(axis=1)
+
+
+def _days_before(daily: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    mean = sum(w * np.roll(daily, k + 1) for k, w in enumerate(weights))
+    return np.repeat(mean, 24)
+
+
+@dataclass(frozen=True, slots=True)
+class AdaptiveComfort:
+    """Hours against one adaptive band."""
+
+    band: str
+    low_c: NDArray[np.float64]  # [H] operative temperature limits
+    high_c: NDArray[np.float64]  # [H]
+    applicable: NDArray[np.bool_]  # [H] the outdoor mean lies in the standard's range
+    comfortable: NDArray[np.bool_]  # [H] applicable and within the limits
+    excess: NDArray[np.float64]  # [H] kelvin above the upper limit (positive) or below (negative)
+
+
+def adaptive_comfort(
+    operative_c: ArrayLike, outdoor_mean_c: ArrayLike, band: str = "ASHRAE 55 80 %"
+) -> AdaptiveComfort:
+    """Operative temperatures [H] against an adaptive band of `ADAPTIVE_BANDS`.
+
+    Source: ASHRAE 55-2020, 5.4; EN 16798-1:2019, B.2.2.
+    """
+    require(band in ADAPTIVE_BANDS, "comfort band", f"{band!r} is not of {list(ADAPTIVE_BANDS)}")
+    slope, intercept, below, above, lowest, highest = ADAPTIVE_BANDS[band]
+    operative = np.asarray(operative_c, dtype=float)
+    mean = np.asarray(outdoor_mean_c, dtype=float)
+    require(operative.shape == mean.shape, "comfort", "one outdoor mean for every hour is needed")
+    comfort = intercept + slope * mean
+    low, high = comfort - below, comfort + above
+    applicable = (mean >= lowest) & (mean <= highest)
+    excess = np.maximum(operative - high, 0.0) + np.minimum(operative - low, 0.0)
+    return AdaptiveComfort(band, low, high, applicable, applicable & (excess == 0.0), excess)
+
+
+def hours_between(start: int, end: int, hours: int) -> NDArray[np.bool_]:
+    """Mask [H] of the hours that lie between two clock times, every day."""
+    require(
+        0 <= start < end <= 24, "clock times", f"expected 0 <= start < end <= 24: {start}, {end}"
+    )
+    hour_end = np.arange(hours) % 24 + 1
+    return (hour_end > start) & (hour_end <= end)
+
+
+@dataclass(frozen=True, slots=True)
+class ComfortSummary:
+    """Comfort of one room over the chosen hours."""
+
+    band: str
+    hours: int  # chosen hours
+    comfortable: int
+    too_warm: int
+    too_cold: int
+    not_applicable: int  # outdoor mean outside the standard's range
+    degree_hours_warm: float  # [K h] above the upper limit
+    degree_hours_cold: float  # [K h] below the lower limit
+    discomfort_by_month: NDArray[np.int64]  # [12] hours outside the band or not applicable
+
+
+def summarise(
+    comfort: AdaptiveComfort, chosen: ArrayLike, months: ArrayLike | None = None
+) -> ComfortSummary:
+    """Counts of the chosen hours [H] (a mask); months: [H] 1 to 12, a common year without."""
+    mask = np.asarray(chosen, dtype=bool)
+    valid = mask & comfort.applicable
+    warm, cold = valid & (comfort.excess > 0), valid & (comfort.excess < 0)
+    month = _months(len(mask)) if months is None else np.asarray(months)
+    outside = mask & ~comfort.comfortable
+    return ComfortSummary(
+        band=comfort.band,
+        hours=int(mask.sum()),
+        comfortable=int((mask & comfort.comfortable).sum()),
+        too_warm=int(warm.sum()),
+        too_cold=int(cold.sum()),
+        not_applicable=int((mask & ~comfort.applicable).sum()),
+        degree_hours_warm=float(comfort.excess[warm].sum()),
+        degree_hours_cold=float(np.abs(comfort.excess[cold]).sum()),
+        discomfort_by_month=np.bincount(month[outside] - 1, minlength=12)[:12],
+    )
+
+
+def _months(hours: int) -> NDArray[np.int64]:
+    days = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31]
+    if hours == 8784:
+        days[1] = 29
+    require(hours == 24 * sum(days), "months", f"needed for {hours} hours, not a whole year")
+    return np.repeat(np.arange(1, 13), 24 * np.array(days))
+
+
+def pmv_ppd(
+    air_c: ArrayLike,
+    mrt_c: ArrayLike,
+    *,
+    air_speed: float = 0.1,
+    humidity: ArrayLike = 50.0,
+    metabolic_rate: float = 1.2,
+    clothing: float = 0.5,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Predicted mean vote [H] and percentage dissatisfied [H] (ISO 7730, pythermalcomfort).
+
+    humidity: relative [%]; metabolic_rate in met, clothing in clo.  Hours outside the standard's
+    limits are computed all the same.
+    """
+    from pythermalcomfort.models import pmv_ppd_iso
+
+    air = np.asarray(air_c, dtype=float)
+    result = pmv_ppd_iso(
+        tdb=air,
+        tr=np.asarray(mrt_c, dtype=float),
+        vr=np.full_like(air, air_speed),
+        rh=np.broadcast_to(np.asarray(humidity, dtype=float), air.shape),
+        met=metabolic_rate,
+        clo=clothing,
+        limit_inputs=False,
+        round_output=False,
+    )
+    return np.asarray(result.pmv, dtype=float), np.asarray(result.ppd, dtype=float)
+
+
+def standard_effective_temperature(
+    air_c: ArrayLike,
+    mrt_c: ArrayLike,
+    *,
+    air_speed: float = 0.1,
+    humidity: ArrayLike = 50.0,
+    metabolic_rate: float = 1.2,
+    clothing: float = 0.5,
+) -> NDArray[np.float64]:
+    """SET [H] [degC] (Gagge two-node model, pythermalcomfort); arguments as for `pmv_ppd`."""
+    from pythermalcomfort.models import set_tmp
+
+    air = np.asarray(air_c, dtype=float)
+    result = set_tmp(
+        tdb=air,
+        tr=np.asarray(mrt_c, dtype=float),
+        v=np.full_like(air, air_speed),
+        rh=np.broadcast_to(np.asarray(humidity, dtype=float), air.shape),
+        met=metabolic_rate,
+        clo=clothing,
+        limit_inputs=False,
+        round_output=False,
+    )
+    return np.asarray(result.set, dtype=float)

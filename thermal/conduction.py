@@ -1,0 +1,75 @@
+"""One-dimensional conduction through a wall: finite differences as a two-port per time step.
+
+Backward Euler on nodes that lie on the layer boundaries and between them; each cell gives half of
+its capacity to the node on either side.  The inner nodes are eliminated once for a fixed step: what
+a wall shows to its two faces is
+
+    C_out (T_o - T_o') = G_o (y_o + u_o T_o + v_o T_i - T_o) + q_o
+    C_in  (T_i - T_i') = G_i (y_i + u_i T_o + v_i T_i - T_i) + q_i      (C: capacity over step)
+
+with y = w . T' from the inner nodes of the step before.  Unconditionally stable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.errors import require
+from thermal.zone import Layer
+
+CELL = 0.02  # [m]; 5, 10 and 20 mm agree to 0.01 K in a year's run
+
+
+@dataclass(frozen=True, slots=True)
+class WallGrid:
+    """Nodes of one wall, outside to inside; the first and the last are its faces."""
+
+    conductance: NDArray[np.float64]  # [N - 1] between neighbouring nodes [W/(m2 K)]
+    capacity: NDArray[np.float64]  # [N] [J/(m2 K)]
+
+    def inner_inverse(self, step_s: float) -> NDArray[np.float64]:
+        """Inverse [N - 2, N - 2] of the inner nodes' matrix for a time step [s]."""
+        g, c = self.conductance, self.capacity[1:-1] / step_s
+        matrix = np.diag(c + g[:-1] + g[1:])
+        matrix -= np.diag(g[1:-1], 1) + np.diag(g[1:-1], -1)
+        return np.linalg.inv(matrix)
+
+
+def wall_grid(layers: Sequence[Layer], *, cell: float = CELL) -> WallGrid:
+    """The nodes of a wall whose layers go from outside to inside, cells at most `cell` [m] wide."""
+    require(len(layers) > 0, "wall", "has no layers")
+    conductance: list[float] = []
+    capacity: list[float] = [0.0]
+    for layer in layers:
+        massless = layer.density * layer.heat_capacity == 0.0
+        cells = 2 if massless else max(2, ceil(layer.thickness / cell - 1e-9))
+        dx = layer.thickness / cells
+        half = 0.5 * dx * layer.density * layer.heat_capacity
+        for _ in range(cells):
+            conductance.append(layer.conductivity / dx)
+            capacity[-1] += half
+            capacity.append(half)
+    return WallGrid(np.array(conductance), np.array(capacity))
+
+
+def half_of_symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
+    """The inner half of a symmetric partition, to be used as "adiabatic" at its mid-plane."""
+    total = sum(layer.thickness for layer in layers) / 2
+    kept: list[Layer] = []
+    for layer in reversed(layers):
+        if total <= 1e-12:
+            break
+        part = min(layer.thickness, total)
+        kept.append(Layer(part, layer.conductivity, layer.density, layer.heat_capacity))
+        total -= part
+    return tuple(reversed(kept))
+
+
+def u_value(layers: Sequence[Layer], *, r_outer: float = 0.04, r_inner: float = 0.13) -> float:
+    """Steady U-value [W/(m2 K)] between two films [m2 K/W] (ISO 6946)."""
+    return 1.0 / (r_outer + sum(layer.resistance for layer in layers) + r_inner)

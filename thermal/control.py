@@ -1,0 +1,120 @@
+"""Shading control: which state of a window holds in every hour, and the sun of that state.
+
+State 0 is the open one; higher numbers are more closed.  The optical and the thermal state switch
+together: `switched` picks the sun, and hands the state to the heat balance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal.climate import Solar
+from thermal.errors import require
+
+StateArray = NDArray[np.int64]
+
+
+def always(state: int, hours: int) -> StateArray:
+    """The same state in every hour [H]."""
+    require(state >= 0, "shading state", f"is negative: {state}")
+    return np.full(hours, state, dtype=np.int64)
+
+
+def by_schedule(day: ArrayLike, hours: int) -> StateArray:
+    """The states of a day's 24 hours, repeated [H]."""
+    profile = np.asarray(day, dtype=np.int64)
+    require(profile.shape == (24,), "shading schedule", f"expected 24 states, got {profile.shape}")
+    return np.resize(profile, hours)
+
+
+def by_irradiance(
+    irradiance: ArrayLike, close_above: float, open_below: float | None = None, *, closed: int = 1
+) -> StateArray:
+    """Closed [H] when the facade receives more than a threshold [W/m2], with hysteresis.
+
+    Once closed it opens below `open_below` (default: the same threshold).
+    """
+    e = np.asarray(irradiance, dtype=float)
+    lower = close_above if open_below is None else open_below
+    require(lower <= close_above, "shading control", "opens at more light than it closes at")
+    state = np.zeros(len(e), dtype=np.int64)
+    shut = False
+    for hour, value in enumerate(e):
+        shut = value > close_above or (shut and value >= lower)
+        state[hour] = closed if shut else 0
+    return state
+
+
+def by_glare(glare: ArrayLike, limit: float) -> StateArray:
+    """The most open state [H] whose glare stays below a limit; the last one where none does.
+
+    glare: [J, H] DGP (limit 0.35 to 0.45) or vertical eye illuminance [lx] in each state.
+    """
+    values = np.asarray(glare, dtype=float)
+    require(values.ndim == 2, "glare", f"expected [states, hours], got {values.shape}")
+    fine = values < limit
+    return np.where(fine.any(axis=0), fine.argmax(axis=0), len(values) - 1).astype(np.int64)
+
+
+def profile_angle(sun_local: ArrayLike) -> NDArray[np.float64]:
+    """Angle [H] [rad] of the sun above the horizon in the plane across horizontal slats.
+
+    sun_local: [H, 3] to the sun in the window frame (y up, z outward); pi/2 behind the facade.
+    """
+    s = np.asarray(sun_local, dtype=float)
+    return np.where(s[:, 2] > 0, np.arctan2(s[:, 1], np.maximum(s[:, 2], 1e-12)), np.pi / 2)
+
+
+def cut_off_angle(tilt: ArrayLike, width: float, spacing: float) -> NDArray[np.float64]:
+    """Profile angle [...] [rad] from which on slats let no direct sun pass between them.
+
+    tan(phi) = (spacing/width - sin(tilt))/cos(tilt), tilt [rad] positive when the slats close
+    towards the sky: the shadow width (sin tilt + cos tilt tan phi) then covers the spacing.
+    """
+    require(width > 0 and spacing > 0, "slats", "width and spacing must be positive")
+    beta = np.asarray(tilt, dtype=float)
+    return np.arctan2(spacing / width - np.sin(beta), np.cos(beta))
+
+
+def by_cut_off(
+    sun_local: ArrayLike, beam: ArrayLike, tilts: ArrayLike, width: float, spacing: float
+) -> StateArray:
+    """The most open slat tilt [H] that stops the beam; the last one where none does.
+
+    Args: sun_local: [H, 3]; beam: [H] on the facade [W/m2] (0: slats stay open); tilts: [J] [rad]
+        of the states, from open to closed.
+    """
+    limits = cut_off_angle(tilts, width, spacing)
+    stops = profile_angle(sun_local)[None, :] >= limits[:, None]
+    state = np.where(stops.any(axis=0), stops.argmax(axis=0), len(limits) - 1)
+    return np.where(np.asarray(beam, dtype=float) > 0, state, 0).astype(np.int64)
+
+
+def switched(states: Sequence[Solar], chosen: ArrayLike) -> Solar:
+    """The sun of the chosen state in every hour, all windows of the zone switching together.
+
+    Args: states: the sun in each state, alike in shape; chosen: [H] index of the state.
+    """
+    choice = np.asarray(chosen, dtype=np.int64)
+    require(len(states) > 0, "shading states", "there is none")
+    rows, windows = states[0].absorbed_outer.shape
+    fits = len(choice) > 0 and rows % len(choice) == 0
+    require(fits, "shading state", f"{len(choice)} hours do not fit {rows} rows of sun")
+    inside = bool(np.all((choice >= 0) & (choice < len(states))))
+    require(inside, "shading state", f"expected 0 to {len(states) - 1}")
+    at = np.repeat(choice, rows // len(choice))
+
+    def pick(name: str) -> NDArray[np.float64] | None:
+        arrays = [getattr(s, name) for s in states]
+        if any(a is None for a in arrays):
+            return None
+        same = all(a.shape == arrays[0].shape for a in arrays)
+        require(same, f"solar {name}", "the states differ in shape")
+        return np.stack(arrays)[at, np.arange(rows)]
+
+    names = ("absorbed_outer", "absorbed_inner", "inside", "facade", "window_inside")
+    parts = {name: pick(name) for name in (*names, "window_facade")}
+    return Solar(**parts, state=np.repeat(choice[:, None], windows, axis=1))

@@ -1,0 +1,259 @@
+"""The heat balance network of one or several zones, flattened to arrays for the compiled loop.
+
+Faces (axis N) are the inside faces of all zones: per zone its opaque surfaces, its windows, its
+window frames, in this order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.conduction import WallGrid, wall_grid
+from thermal.convection import DOE2_LEEWARD, DOE2_WINDWARD, local_wind_factor
+from thermal.errors import require
+from thermal.longwave import exchange_from_view_factors, exchange_star, outside_factors
+from thermal.zone import ROUGHNESS, Layer, OpaqueSurface, WindowElement, Zone
+
+OUTDOOR, GROUND, ADIABATIC, TWIN, PARTITION, PARTNER, WINDOW = range(7)
+_CODES = {"outdoor": OUTDOOR, "ground": GROUND, "adiabatic": ADIABATIC, "twin": TWIN}
+_RESISTANCE_KINDS = {"constant": 0, "linear U": 1, "surface": 2}
+
+
+class Faces(NamedTuple):
+    """One entry per inside face N; capacities are over the time step [W/(m2 K)]."""
+
+    area: NDArray[np.float64]  # [N] [m2]
+    zone: NDArray[np.int64]  # [N] index of the zone
+    kind: NDArray[np.int64]  # [N] OUTDOOR ... WINDOW
+    partner: NDArray[np.int64]  # [N] face at the other side, or -1
+    window: NDArray[np.int64]  # [N] index of the window, or -1
+    normal: NDArray[np.float64]  # [N, 3] out of the room
+    height: NDArray[np.float64]  # [N] glazing height for the inside film [m]
+    emissivity_out: NDArray[np.float64]  # [N]
+    hemisphere: NDArray[np.float64]  # [N, 3] shares of sky, air, ground
+    roughness: NDArray[np.float64]  # [N] DOE-2 multiplier
+    wind: NDArray[np.float64]  # [N, 2] a (local wind factor)^b, windward and leeward
+    radiant_share: NDArray[np.float64]  # [N] of the zone's radiant gains
+    first_node: NDArray[np.int64]  # [N] of the wall's inner nodes, -1 without
+    node_count: NDArray[np.int64]  # [N]
+    port: NDArray[np.float64]  # [N, 8] C_out, C_in, G_out, G_in, u_o, v_o, u_i, v_i
+
+
+class Nodes(NamedTuple):
+    """Inner nodes (axis M) of all walls, factored for the fixed step."""
+
+    capacity: NDArray[np.float64]  # [M] over the step [W/(m2 K)]
+    below: NDArray[np.float64]  # [M] conductance to the node before, 0 at the first
+    pivot: NDArray[np.float64]  # [M] inverse pivots of the forward sweep
+    from_out: NDArray[np.float64]  # [M] share of the outer face's temperature
+    from_in: NDArray[np.float64]  # [M] share of the inner face's temperature
+
+
+class Glass(NamedTuple):
+    """Windows (axis W) in their shading states (axis J)."""
+
+    kind: NDArray[np.int64]  # [W, J] of the layer resistance
+    coefficient: NDArray[np.float64]  # [W, J, 6]
+    extra: NDArray[np.float64]  # [W, J, 2] outer and inner extra conductance [W/(m2 K)]
+
+
+class Network(NamedTuple):
+    """All that the compiled loop needs of the building."""
+
+    faces: Faces
+    nodes: Nodes
+    glass: Glass
+    exchange: NDArray[np.float64]  # [N, N] longwave exchange areas [m2]
+    air_capacity: NDArray[np.float64]  # [Z] volume times capacity factor [m3]
+    link: NDArray[np.float64]  # [Z, Z] air exchanged between zones [m3/s]
+
+
+def frame_surface(window: WindowElement) -> OpaqueSurface:
+    """The frame of a window as a massless opaque surface."""
+    resistance = 1.0 / window.frame_u - 0.17
+    return OpaqueSurface(
+        name=f"{window.name} frame",
+        area=window.frame_area,
+        layers=(Layer(0.05, 0.05 / resistance, 0.0, 0.0),),
+        normal=window.normal,
+        absorptance_out=window.frame_absorptance,
+        roughness="very smooth",
+        height=window.height,
+    )
+
+
+def framed(zone: Zone) -> list[WindowElement]:
+    """The windows of a zone that have a frame, in order."""
+    return [window for window in zone.windows if window.frame_area > 0]
+
+
+def network(
+    zones: Sequence[Zone], *, step_s: float, terrain: str, cell: float, link: NDArray[np.float64]
+) -> Network:
+    """The network of coupled zones; link: [Z, Z] air exchange [m3/s], symmetric."""
+    elements = [(z, e) for z, zone in enumerate(zones) for e in _elements(zone)]
+    partners = _partners(zones, elements)
+    ports, nodes = _walls([e for _, e in elements], partners, step_s, cell)
+    faces = _faces(zones, elements, partners, ports, terrain)
+    exchange = np.zeros((len(elements), len(elements)))
+    for z, zone in enumerate(zones):
+        mine = np.flatnonzero(faces.zone == z)
+        exchange[np.ix_(mine, mine)] = _zone_exchange(zone, [elements[i][1] for i in mine])
+    capacity = np.array([zone.volume * zone.air_capacity_factor for zone in zones])
+    return Network(faces, nodes, _glass(elements), exchange, capacity, link)
+
+
+def _elements(zone: Zone) -> list[OpaqueSurface | WindowElement]:
+    return [*zone.surfaces, *zone.windows, *(frame_surface(w) for w in framed(zone))]
+
+
+def emissivity_in(element: OpaqueSurface | WindowElement) -> float:
+    """Inside emissivity of a surface or of a window's first state."""
+    if isinstance(element, OpaqueSurface):
+        return element.emissivity_in
+    return element.states[0].emissivity_in
+
+
+def _zone_exchange(
+    zone: Zone, elements: list[OpaqueSurface | WindowElement]
+) -> NDArray[np.float64]:
+    area = [e.area for e in elements]
+    eps = [emissivity_in(e) for e in elements]
+    if len(elements) == 1:
+        return np.zeros((1, 1))
+    if zone.view_factors is None:
+        return exchange_star(area, eps)
+    require(
+        np.shape(zone.view_factors) == (len(area), len(area)),
+        f"zone {zone.name}: view factors",
+        f"expected [{len(area)}, {len(area)}] (surfaces, windows, frames)",
+    )
+    return exchange_from_view_factors(area, eps, zone.view_factors)
+
+
+def _partners(
+    zones: Sequence[Zone], elements: list[tuple[int, OpaqueSurface | WindowElement]]
+) -> list[int]:
+    names = {zone.name: z for z, zone in enumerate(zones)}
+    where = {(z, e.name): i for i, (z, e) in enumerate(elements)}
+    partners = [-1] * len(elements)
+    for i, (z, e) in enumerate(elements):
+        if not isinstance(e, OpaqueSurface) or e.outside in _CODES:
+            continue
+        item = f"surface {e.name}"
+        require(e.outside in names, item, f"no zone {e.outside!r} is simulated with it")
+        j = where.get((names[e.outside], e.partner), -1)
+        require(j >= 0, item, f"zone {e.outside} has no surface {e.partner!r}")
+        other = elements[j][1]
+        mutual = (
+            isinstance(other, OpaqueSurface)
+            and other.outside == zones[z].name
+            and other.partner == e.name
+        )
+        require(mutual, item, f"its partner {other.name} does not name it back")
+        same = abs(other.area - e.area) <= 0.01 * e.area
+        require(same, item, f"its partner has {other.area:g} m2 instead of {e.area:g} m2")
+        partners[i] = j
+    return partners
+
+
+def _walls(
+    elements: list[OpaqueSurface | WindowElement], partners: list[int], step_s: float, cell: float
+) -> tuple[list[tuple[int, int, NDArray[np.float64]]], Nodes]:
+    ports, rows = [], []
+    count = 0
+    for i, e in enumerate(elements):
+        if isinstance(e, WindowElement) or 0 <= partners[i] < i:
+            ports.append((-1, 0, np.zeros(8)))
+            continue
+        port, node_rows = _two_port(wall_grid(e.layers, cell=cell), step_s)
+        ports.append((count, node_rows.shape[1], port))
+        rows.append(node_rows)
+        count += node_rows.shape[1]
+    table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
+    return ports, Nodes(*(np.ascontiguousarray(row) for row in table))
+
+
+def _two_port(grid: WallGrid, step_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    g, capacity = grid.conductance, grid.capacity / step_s
+    inner = capacity[1:-1]
+    n = len(inner)
+    below = np.concatenate([[0.0], g[1:-1]])
+    pivot = np.zeros(n)
+    for m in range(n):
+        diagonal = inner[m] + g[m] + g[m + 1]
+        pivot[m] = 1.0 / (diagonal - (below[m] ** 2 * pivot[m - 1] if m else 0.0))
+    inverse = grid.inner_inverse(step_s)
+    from_out, from_in = inverse[:, 0] * g[0], inverse[:, -1] * g[-1]
+    ends = [from_out[0], from_in[0], from_out[-1], from_in[-1]]
+    port = np.array([capacity[0], capacity[-1], g[0], g[-1], *ends])
+    return port, np.stack([inner, below, pivot, from_out, from_in])
+
+
+def _faces(
+    zones: Sequence[Zone],
+    elements: list[tuple[int, OpaqueSurface | WindowElement]],
+    partners: list[int],
+    ports: list[tuple[int, int, NDArray[np.float64]]],
+    terrain: str,
+) -> Faces:
+    kinds, windows = [], []
+    for i, (_, e) in enumerate(elements):
+        windows.append(sum(w >= 0 for w in windows) if isinstance(e, WindowElement) else -1)
+        if isinstance(e, WindowElement):
+            kinds.append(WINDOW)
+        elif partners[i] >= 0:
+            kinds.append(PARTITION if partners[i] > i else PARTNER)
+        else:
+            kinds.append(_CODES[e.outside])
+    solid = [e for _, e in elements]
+    area = np.array([e.area for e in solid])
+    zone = np.array([z for z, _ in elements])
+    weight = area * np.array([emissivity_in(e) for e in solid])
+    weight = np.maximum(weight, 1e-12 * area)  # all black to longwave: share by area
+    totals = np.bincount(zone, weights=weight, minlength=len(zones))
+    factor = [local_wind_factor(e.height, terrain) for e in solid]
+    forms = (DOE2_WINDWARD, DOE2_LEEWARD)
+    return Faces(
+        area=area,
+        zone=zone,
+        kind=np.array(kinds),
+        partner=np.array(partners),
+        window=np.array(windows),
+        normal=np.array([e.normal for e in solid]),
+        height=np.array([getattr(e, "glazing_height", 1.5) for e in solid]),
+        emissivity_out=np.array([_emissivity_out(e) for e in solid]),
+        hemisphere=np.array([outside_factors(e.normal[2]) for e in solid]),
+        roughness=np.array([ROUGHNESS[getattr(e, "roughness", "very smooth")] for e in solid]),
+        wind=np.array([[a * f**b for a, b in forms] for f in factor]),
+        radiant_share=weight / totals[zone],
+        first_node=np.array([p[0] for p in ports]),
+        node_count=np.array([p[1] for p in ports]),
+        port=np.array([p[2] for p in ports]),
+    )
+
+
+def _emissivity_out(element: OpaqueSurface | WindowElement) -> float:
+    if isinstance(element, OpaqueSurface):
+        return element.emissivity_out
+    return element.states[0].emissivity_out
+
+
+def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
+    windows = [e for _, e in elements if isinstance(e, WindowElement)]
+    states = max((len(w.states) for w in windows), default=1)
+    kind = np.zeros((len(windows), states), dtype=np.int64)
+    coefficient = np.zeros((len(windows), states, 6))
+    extra = np.zeros((len(windows), states, 2))
+    for w, window in enumerate(windows):
+        for j in range(states):
+            state = window.states[min(j, len(window.states) - 1)]
+            r = state.layer_resistance
+            kind[w, j] = _RESISTANCE_KINDS[r.kind]
+            coefficient[w, j, : len(r.coefficients)] = r.coefficients
+            extra[w, j] = state.extra_outer, state.extra_inner
+    return Glass(kind, coefficient, extra)

@@ -1,0 +1,121 @@
+"""What the compiled time loop is given and fills: records of arrays, one entry per axis letter.
+
+N inside faces, M inner nodes of walls, Z zones, W windows, H hours, T time steps.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+AIR_HEAT = 1006.0  # [J/(kg K)]
+TERMS = ("inside sun", "glass sun", "facade sun", "gains", "air exchange", "ideal loads")
+TERMS += ("facade", "windows", "partitions", "storage")  # [W] into the zone; storage: increase
+
+
+# The records below only lend their arrays: without `_nrt=False` every access would count
+# references, and functions called from one cache file to another are not inlined by LLVM; together
+# that is nine tenths of a run.  So nothing that is compiled allocates, and all but the entry point
+# in `kernel` is inlined.
+inlined = njit(inline="always", error_model="numpy", _nrt=False)
+
+
+def compiled(entry: Callable) -> Callable:
+    """The compiled entry point, kept on disk where a folder for it can be written."""
+    _drop_stale_cache(Path(inspect.getfile(entry)))
+    try:
+        return njit(cache=True, error_model="numpy", _nrt=False)(entry)
+    except RuntimeError:  # numba: no locator available
+        return njit(error_model="numpy", _nrt=False)(entry)
+
+
+def _drop_stale_cache(entry: Path) -> None:
+    """Remove cached code of a module that is older than one of the modules inlined into it."""
+    with suppress(OSError):
+        newest = max(source.stat().st_mtime for source in entry.parent.glob("*.py"))
+        for file in (entry.parent / "__pycache__").glob(f"{entry.stem}.*.nb[ic]"):
+            if file.stat().st_mtime < newest:
+                file.unlink(missing_ok=True)
+
+
+class Weather(NamedTuple):
+    """Values at the end of each step T."""
+
+    outdoor: NDArray[np.float64]  # [T] [degC]
+    sky: NDArray[np.float64]  # [T] [degC]
+    ground: NDArray[np.float64]  # [T] [degC]
+    speed: NDArray[np.float64]  # [T] [m/s]
+    windward: NDArray[np.float64]  # [T] V^0.89
+    leeward: NDArray[np.float64]  # [T] V^0.617
+    origin: NDArray[np.float64]  # [T, 2] unit vector to where the wind comes from
+    density: NDArray[np.float64]  # [T] of outdoor air [kg/m3]
+
+
+class Drive(NamedTuple):
+    """What acts on the zones; R is the solar time axis (hours or steps)."""
+
+    inner: NDArray[np.float64]  # [R, N] absorbed at the inside faces [W]
+    outer: NDArray[np.float64]  # [R, N] absorbed at the outside faces or outer layers [W/m2]
+    state: NDArray[np.int64]  # [H, W] shading state
+    convective: NDArray[np.float64]  # [H, Z] gains [W]
+    radiant: NDArray[np.float64]  # [H, Z] gains [W]
+    airflow: NDArray[np.float64]  # [H, Z] outdoor air [m3/s]
+    heating_c: NDArray[np.float64]  # [T, Z] set point
+    cooling_c: NDArray[np.float64]  # [T, Z]
+    limit: NDArray[np.float64]  # [Z, 2] heating and cooling power [W]
+
+
+class State(NamedTuple):
+    """Temperatures [degC], changed in place."""
+
+    inner: NDArray[np.float64]  # [N] inside faces
+    outer: NDArray[np.float64]  # [N] outside faces
+    node: NDArray[np.float64]  # [M] inner nodes of the walls
+    air: NDArray[np.float64]  # [Z]
+    load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
+
+
+class Work(NamedTuple):
+    """Scratch of a step."""
+
+    matrix: NDArray[np.float64]  # [N + Z, N + Z] lower triangle
+    right: NDArray[np.float64]  # [N + Z]
+    unknown: NDArray[np.float64]  # [N + Z]
+    still: NDArray[np.float64]  # [M] node temperatures that the step before alone would give
+    film: NDArray[np.float64]  # [N] inside film plus extra conductance [W/(m2 K)]
+    # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
+    outdoor: NDArray[np.float64]
+    old_inner: NDArray[np.float64]  # [N]
+    old_outer: NDArray[np.float64]  # [N]
+    old_air: NDArray[np.float64]  # [Z]
+
+
+class Means(NamedTuple):
+    """What the loop fills."""
+
+    inner: NDArray[np.float64]  # [H, N] inside faces [degC]
+    outer: NDArray[np.float64]  # [H, N] outside faces [degC]
+    air: NDArray[np.float64]  # [H, Z] [degC]
+    terms: NDArray[np.float64]  # [H, Z, 10] sums over the steps of the heat flows [W]
+
+
+class Method(NamedTuple):
+    """Choices of the run."""
+
+    steps: int  # per hour
+    step_s: float
+    solar_every: int  # steps for which one solar row holds
+    inside: int  # 0 TARP and ISO 15099, 1 constant
+    outside: int  # 0 DOE-2, 1 MoWiTT, 2 constant
+    outside_film: float  # [W/(m2 K)] for 2
+    iterations: int
+    tolerance: float  # [K] between iterates
+    warm_tolerance: float  # [K] between warm-up days
+    warm_days: int

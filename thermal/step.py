@@ -1,0 +1,329 @@
+"""One implicit time step of the heat balance, compiled.
+
+Backward Euler: the inside faces of all zones and their air are solved together, with the walls
+eliminated to two-ports and the outer window layers to conductances.  Film coefficients, longwave
+coefficients and layer resistances are those of the last iterate.  The equations that are solved are
+linear, so their energy balance closes to rounding whatever the number of iterations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.climate import SIGMA
+from thermal.convection import (
+    constant_inside,
+    doe2_outside,
+    iso15099_inside,
+    mowitt_outside,
+    tarp_inside,
+)
+from thermal.network import (
+    ADIABATIC,
+    GROUND,
+    OUTDOOR,
+    PARTITION,
+    PARTNER,
+    TWIN,
+    WINDOW,
+    Faces,
+    Network,
+    Nodes,
+)
+from thermal.records import AIR_HEAT, Drive, Method, State, Weather, Work, inlined
+
+
+@inlined
+def copy_into(source: NDArray[np.float64], target: NDArray[np.float64], first: int) -> None:
+    """Copy an array into another, from an index on."""
+    for i in range(source.size):
+        target[first + i] = source[i]
+
+
+@inlined
+def _cube(a_c: float, b_c: float) -> float:
+    a, b = a_c + 273.15, b_c + 273.15
+    return (a * a + b * b) * (a + b)
+
+
+@inlined
+def _layer_conductance(kind: int, c: NDArray[np.float64], inner: float, outer: float) -> float:
+    x, d = 0.5 * (inner + outer) - 10.0, abs(inner - outer)
+    if kind == 0:
+        return 1.0 / c[0]
+    if kind == 1:
+        u = min(max(c[0] + c[1] * x, 0.05), 0.95 / c[2])
+        return 1.0 / (1.0 / u - c[2])
+    return max(c[0] + c[1] * x + c[2] * d + c[3] * d * d + c[4] * x * d + c[5] * x * x, 0.02)
+
+
+@inlined
+def _inside_film(faces: Faces, i: int, surface: float, air: float, choice: int) -> float:
+    nz = faces.normal[i, 2]
+    if choice == 1:
+        return constant_inside(surface, air, nz)
+    if faces.kind[i] == WINDOW and abs(nz) < 0.1:
+        return iso15099_inside(surface, air, faces.height[i])
+    return tarp_inside(surface, air, nz)
+
+
+@inlined
+def _outside_exchange(
+    faces: Faces, i: int, surface: float, weather: Weather, t: int, method: Method
+) -> tuple[float, float]:
+    """Sum of the outside coefficients [W/(m2 K)], and of them times their temperatures."""
+    out, sky = weather.outdoor[t], weather.sky[t]
+    nx, ny, nz = faces.normal[i]
+    faces_wind = abs(nz) > 0.98 or nx * weather.origin[t, 0] + ny * weather.origin[t, 1] >= -1e-9
+    if faces_wind:
+        forced = faces.wind[i, 0] * weather.windward[t]
+    else:
+        forced = faces.wind[i, 1] * weather.leeward[t]
+    if method.outside == 0:
+        h = doe2_outside(surface, out, nz, forced, faces.roughness[i])
+    elif method.outside == 1:
+        h = mowitt_outside(surface, out, forced)
+    else:
+        h = method.outside_film
+    radiant = SIGMA * faces.emissivity_out[i]
+    h_sky = radiant * faces.hemisphere[i, 0] * _cube(surface, sky)
+    share = faces.hemisphere[i, 1] + faces.hemisphere[i, 2]
+    h_out = h + radiant * share * _cube(surface, out)
+    return h_sky + h_out, h_sky * sky + h_out * out
+
+
+@inlined
+def _still_nodes(faces: Faces, nodes: Nodes, state: State, work: Work) -> None:
+    """Inner nodes with both faces at zero: the part that comes from the step before."""
+    for i in range(faces.area.size):
+        first, count = faces.first_node[i], faces.node_count[i]
+        for m in range(first, first + count):
+            carried = nodes.capacity[m] * state.node[m]
+            if m > first:
+                carried += nodes.below[m] * work.still[m - 1]
+            work.still[m] = carried * nodes.pivot[m]
+        for m in range(first + count - 2, first - 1, -1):
+            work.still[m] += nodes.below[m + 1] * nodes.pivot[m] * work.still[m + 1]
+
+
+@inlined
+def _wall_row(
+    net: Network,
+    i: int,
+    state: State,
+    work: Work,
+    weather: Weather,
+    t: int,
+    outer_sun: float,
+    method: Method,
+) -> tuple[float, float]:
+    """Diagonal and right side [per m2] of an opaque face, its outer face eliminated."""
+    faces = net.faces
+    c_o, c_i, g_o, g_i, u_o, v_o, u_i, v_i = faces.port[i]
+    first, count, kind = faces.first_node[i], faces.node_count[i], faces.kind[i]
+    y_o, y_i = work.still[first], work.still[first + count - 1]
+    diagonal = c_i + g_i * (1.0 - v_i)
+    right = c_i * work.old_inner[i] + g_i * y_i
+    if kind == GROUND:
+        return diagonal, right + g_i * u_i * weather.ground[t]
+    if kind == TWIN:
+        return diagonal - g_i * u_i, right
+    if kind == PARTITION:
+        return diagonal, right
+    h, h_t = 0.0, 0.0
+    if kind == OUTDOOR:
+        h, h_t = _outside_exchange(faces, i, state.outer[i], weather, t, method)
+    outer_diagonal = c_o + g_o * (1.0 - u_o) + h
+    outer_right = c_o * work.old_outer[i] + g_o * y_o + h_t
+    if kind == OUTDOOR:
+        outer_right += outer_sun
+    row = work.outdoor[i]
+    row[0], row[1], row[2], row[3], row[4] = outer_diagonal, outer_right, g_o * v_o, h, h_t
+    through = g_i * u_i / outer_diagonal
+    return diagonal - through * g_o * v_o, right + through * outer_right
+
+
+@inlined
+def _window_row(
+    net: Network,
+    i: int,
+    state: State,
+    work: Work,
+    weather: Weather,
+    t: int,
+    shading: int,
+    outer_sun: float,
+    method: Method,
+) -> tuple[float, float]:
+    """Diagonal and right side [per m2] of an inner window layer, its outer layer eliminated."""
+    w = net.faces.window[i]
+    h, h_t = _outside_exchange(net.faces, i, state.outer[i], weather, t, method)
+    extra = net.glass.extra[w, shading, 0]
+    c = _layer_conductance(
+        net.glass.kind[w, shading],
+        net.glass.coefficient[w, shading],
+        state.inner[i],
+        state.outer[i],
+    )
+    outer_diagonal = h + extra + c
+    h_t += extra * weather.outdoor[t]
+    outer_right = h_t + outer_sun
+    row = work.outdoor[i]
+    row[0], row[1], row[2], row[3], row[4] = outer_diagonal, outer_right, c, h + extra, h_t
+    return c - c * c / outer_diagonal, outer_right * c / outer_diagonal
+
+
+@inlined
+def _assemble(
+    net: Network,
+    state: State,
+    work: Work,
+    weather: Weather,
+    drive: Drive,
+    t: int,
+    method: Method,
+) -> None:
+    faces, a, b = net.faces, work.matrix, work.right
+    n, zones = faces.area.size, net.air_capacity.size
+    hour, sun = t // method.steps, t // method.solar_every
+    for i in range(n + zones):
+        for j in range(i + 1):
+            a[i, j] = 0.0
+    heat = weather.density[t] * AIR_HEAT
+    for z in range(zones):
+        flow = heat * drive.airflow[hour, z]
+        store = heat * net.air_capacity[z] / method.step_s
+        a[n + z, n + z] = store + flow
+        b[n + z] = store * work.old_air[z] + flow * weather.outdoor[t] + drive.convective[hour, z]
+        for y in range(z):
+            a[n + z, n + y] -= heat * net.link[z, y]
+        for y in range(zones):
+            if y != z:
+                a[n + z, n + z] += heat * net.link[z, y]
+    for i in range(n):
+        z, kind, area = faces.zone[i], faces.kind[i], faces.area[i]
+        film = _inside_film(faces, i, state.inner[i], state.air[z], method.inside)
+        if kind == WINDOW:
+            shading = drive.state[hour, faces.window[i]]
+            film += net.glass.extra[faces.window[i], shading, 1]
+            d, r = _window_row(
+                net, i, state, work, weather, t, shading, drive.outer[sun, i], method
+            )
+        elif kind == PARTNER:
+            p = faces.partner[i]
+            c_o, _, g_o, _, u_o, v_o, _, _ = faces.port[p]
+            d = c_o + g_o * (1.0 - u_o)
+            r = c_o * work.old_inner[i] + g_o * work.still[faces.first_node[p]]
+            a[i, p] -= area * g_o * v_o
+        else:
+            d, r = _wall_row(net, i, state, work, weather, t, drive.outer[sun, i], method)
+        work.film[i] = film
+        a[i, i] += area * (d + film)
+        b[i] = area * r + drive.inner[sun, i] + drive.radiant[hour, z] * faces.radiant_share[i]
+        a[n + z, i] = -area * film
+        a[n + z, n + z] += area * film
+        for j in range(i):
+            if net.exchange[i, j] > 0.0:
+                k = SIGMA * net.exchange[i, j] * _cube(state.inner[i], state.inner[j])
+                a[i, j] -= k
+                a[i, i] += k
+                a[j, j] += k
+
+
+@inlined
+def _solve(net: Network, work: Work, state: State, drive: Drive, t: int) -> None:
+    """Eliminate the faces (symmetric, diagonally dominant: no pivoting), then the air."""
+    a, b, x = work.matrix, work.right, work.unknown
+    n, total = net.faces.area.size, work.right.size
+    for k in range(n):
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, total):
+            f = a[i, k] * inverse
+            if f != 0.0:
+                for j in range(k + 1, i + 1):
+                    a[i, j] -= f * a[j, k]
+                b[i] -= f * b[k]
+    _solve_air(work, state, drive, t, n)
+    for k in range(n - 1, -1, -1):
+        s = b[k]
+        for j in range(k + 1, total):
+            s -= a[j, k] * x[j]
+        x[k] = s / a[k, k]
+
+
+@inlined
+def _solve_air(work: Work, state: State, drive: Drive, t: int, n: int) -> None:
+    """Air temperatures and ideal loads: Gauss-Seidel with the loads' limits as projections."""
+    a, b, x = work.matrix, work.right, work.unknown
+    zones = x.size - n
+    for z in range(zones):
+        x[n + z] = state.air[z]
+    for _ in range(1000):
+        change = 0.0
+        for z in range(zones):
+            s = b[n + z]
+            for y in range(zones):
+                if y != z:
+                    s -= (a[n + z, n + y] if y < z else a[n + y, n + z]) * x[n + y]
+            stiffness = a[n + z, n + z]
+            free = s / stiffness
+            load = 0.0
+            if free < drive.heating_c[t, z]:
+                load = min(stiffness * drive.heating_c[t, z] - s, drive.limit[z, 0])
+            elif free > drive.cooling_c[t, z]:
+                load = max(stiffness * drive.cooling_c[t, z] - s, -drive.limit[z, 1])
+            state.load[z] = load
+            fresh = (s + load) / stiffness
+            change = max(change, abs(fresh - x[n + z]))
+            x[n + z] = fresh
+        if change < 1e-12 or zones == 1:
+            break
+
+
+@inlined
+def _outer_from_inner(net: Network, state: State, work: Work, weather: Weather, t: int) -> None:
+    faces = net.faces
+    for i in range(faces.area.size):
+        kind = faces.kind[i]
+        if kind == OUTDOOR or kind == WINDOW or kind == ADIABATIC:
+            row = work.outdoor[i]
+            state.outer[i] = (row[1] + row[2] * state.inner[i]) / row[0]
+        elif kind == GROUND:
+            state.outer[i] = weather.ground[t]
+        elif kind == TWIN:
+            state.outer[i] = state.inner[i]
+        else:
+            state.outer[i] = state.inner[faces.partner[i]]
+
+
+@inlined
+def step(
+    net: Network,
+    state: State,
+    work: Work,
+    weather: Weather,
+    drive: Drive,
+    t: int,
+    method: Method,
+) -> None:
+    """One time step: iterate the coefficients, then move the walls' nodes."""
+    faces, nodes = net.faces, net.nodes
+    n = faces.area.size
+    copy_into(state.inner, work.old_inner, 0)
+    copy_into(state.outer, work.old_outer, 0)
+    copy_into(state.air, work.old_air, 0)
+    _still_nodes(faces, nodes, state, work)
+    for _ in range(method.iterations):
+        _assemble(net, state, work, weather, drive, t, method)
+        _solve(net, work, state, drive, t)
+        change = 0.0
+        for i in range(n):
+            change = max(change, abs(work.unknown[i] - state.inner[i]))
+            state.inner[i] = work.unknown[i]
+        for z in range(work.old_air.size):
+            change = max(change, abs(work.unknown[n + z] - state.air[z]))
+            state.air[z] = work.unknown[n + z]
+        _outer_from_inner(net, state, work, weather, t)
+        if change < method.tolerance:
+            break

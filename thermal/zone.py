@@ -1,0 +1,212 @@
+"""The thermal zone as frozen data: layers, surfaces, windows, gains, set points.
+
+Normals point out of the room: a floor has (0, 0, -1), a ceiling (0, 0, 1), a facade its exterior
+normal.  Layers are listed from outside to inside.  Temperatures are in degrees Celsius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal.blackbox import Fenestration
+from thermal.errors import require, require_range
+
+ROUGHNESS = {  # DOE-2 roughness multiplier R_f; EnergyPlus Engineering Reference
+    "very rough": 2.17,
+    "rough": 1.67,
+    "medium rough": 1.52,
+    "medium smooth": 1.13,
+    "smooth": 1.11,
+    "very smooth": 1.0,
+}
+OUTSIDE = ("outdoor", "ground", "adiabatic", "twin")
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """A homogeneous layer of a construction; density 0 makes a pure resistance."""
+
+    thickness: float  # [m]
+    conductivity: float  # [W/(m K)]
+    density: float  # [kg/m3]
+    heat_capacity: float  # [J/(kg K)]
+
+    def __post_init__(self) -> None:
+        require(self.thickness > 0, "layer thickness", f"must be positive, got {self.thickness} m")
+        require_range(self.conductivity, 1e-3, 500.0, "layer conductivity", "W/(m K)")
+        require_range(self.density, 0.0, 2e4, "layer density", "kg/m3")
+        require_range(self.heat_capacity, 0.0, 1e4, "layer heat capacity", "J/(kg K)")
+
+    @property
+    def resistance(self) -> float:
+        """Thermal resistance [m2 K/W]."""
+        return self.thickness / self.conductivity
+
+
+@dataclass(frozen=True, slots=True)
+class OpaqueSurface:
+    """An opaque surface of a zone.
+
+    `outside` is "outdoor", "ground", "adiabatic" (no heat flow at the outer face), "twin" (the
+    same room behind it: the outer face copies the inner one, EnergyPlus "Adiabatic"), or the name
+    of another zone; then `partner` names the surface of that zone which is the other face.
+    """
+
+    name: str
+    area: float  # [m2]
+    layers: tuple[Layer, ...]  # outside to inside
+    normal: NDArray[np.float64]  # [3] unit vector out of the room
+    outside: str = "outdoor"
+    partner: str = ""
+    emissivity_in: float = 0.9
+    emissivity_out: float = 0.9
+    absorptance_in: float = 0.5  # solar, used where transmitted sunlight is distributed
+    absorptance_out: float = 0.6  # solar
+    roughness: str = "medium rough"
+    height: float = 1.5  # [m] of the centroid above the ground outside, for the wind profile
+
+    def __post_init__(self) -> None:
+        item = f"surface {self.name}"
+        require(self.area > 0, item, f"area must be positive, got {self.area} m2")
+        require(len(self.layers) > 0, item, "has no layers (thickness, conductivity, density, cp)")
+        _set_unit_normal(self, item)
+        for value, label in (
+            (self.emissivity_in, "inside emissivity"),
+            (self.emissivity_out, "outside emissivity"),
+            (self.absorptance_in, "inside solar absorptance"),
+            (self.absorptance_out, "outside solar absorptance"),
+        ):
+            require_range(value, 0.0, 1.0, f"{item}: {label}")
+        known = ", ".join(ROUGHNESS)
+        require(
+            self.roughness in ROUGHNESS, item, f"roughness {self.roughness!r} is not of {known}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class WindowElement:
+    """A window of a zone: glazed area, frame, and one fenestration system per shading state."""
+
+    name: str
+    area: float  # [m2] glazed
+    normal: NDArray[np.float64]  # [3] exterior unit normal
+    states: tuple[Fenestration, ...]  # shading states; state 0 is used unless told otherwise
+    glazing_height: float = 1.5  # [m] for the inside film (ISO 15099)
+    frame_area: float = 0.0  # [m2]
+    frame_u: float = 2.0  # [W/(m2 K)] with the films 0.04 and 0.13 m2 K/W
+    frame_absorptance: float = 0.6  # solar, outside
+    height: float = 1.75  # [m] of the centroid above the ground outside
+
+    def __post_init__(self) -> None:
+        item = f"window {self.name}"
+        require(self.area > 0, item, f"area must be positive, got {self.area} m2")
+        require(len(self.states) > 0, item, "has no fenestration system")
+        require(self.glazing_height > 0, item, "glazing height must be positive")
+        require(self.frame_area >= 0, item, f"frame area must not be negative: {self.frame_area}")
+        if self.frame_area > 0:
+            require_range(self.frame_u, 0.1, 5.5, f"{item}: frame U", "W/(m2 K)")
+        require_range(self.frame_absorptance, 0.0, 1.0, f"{item}: frame solar absorptance")
+        _set_unit_normal(self, item)
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Internal heat gains of a zone, hourly; scalars hold for every hour."""
+
+    convective: NDArray[np.float64] | float = 0.0  # [H] [W] to the air
+    radiant: NDArray[np.float64] | float = 0.0  # [H] [W] longwave, spread over the surfaces
+
+
+@dataclass(frozen=True, slots=True)
+class IdealLoads:
+    """Ideal convective heating and cooling; scalars hold for every hour, infinity switches off.
+
+    Arrays have a value for every hour H, or for every time step T.
+    """
+
+    heating_c: NDArray[np.float64] | float = -np.inf  # [H] or [T] [degC] air set point
+    cooling_c: NDArray[np.float64] | float = np.inf  # [H] or [T] [degC]
+    heating_limit: float = np.inf  # [W]
+    cooling_limit: float = np.inf  # [W], positive
+
+    def __post_init__(self) -> None:
+        crossed = np.max(self.heating_c) > np.min(self.cooling_c) and np.any(
+            _same_length(self.heating_c, self.cooling_c)
+            > _same_length(self.cooling_c, self.heating_c)
+        )
+        require(not crossed, "set points", "the heating set point lies above the cooling one")
+        limits = min(self.heating_limit, self.cooling_limit)
+        require(limits >= 0, "set points", f"a heating or cooling limit is negative: {limits} W")
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """A room (or several with one air node): its faces, its air, what heats it."""
+
+    name: str
+    volume: float  # [m3] of air
+    surfaces: tuple[OpaqueSurface, ...]
+    windows: tuple[WindowElement, ...] = ()
+    infiltration_ach: NDArray[np.float64] | float = 0.5  # [H] [1/h] outdoor air, all sources
+    gains: Gains = field(default_factory=Gains)
+    loads: IdealLoads = field(default_factory=IdealLoads)
+    air_capacity_factor: float = 1.0  # multiplies the heat capacity of the air (furniture)
+    # [N, N] view factors between inside faces (surfaces, then windows, then frames); None: star
+    view_factors: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        item = f"zone {self.name}"
+        require(self.volume > 0, item, f"volume must be positive, got {self.volume} m3")
+        require(len(self.surfaces) > 0, item, "has no surfaces")
+        names = [s.name for s in self.surfaces] + [w.name for w in self.windows]
+        twice = sorted({n for n in names if names.count(n) > 1})
+        require(not twice, item, f"names used twice: {', '.join(twice)}")
+        require(bool(np.all(np.asarray(self.infiltration_ach) >= 0)), item, "negative infiltration")
+        require(self.air_capacity_factor >= 0, item, "negative air capacity factor")
+        walls = sum(s.area for s in self.surfaces)
+        for window in self.windows:
+            message = f"window {window.name} of {window.area:g} m2 is larger than all walls"
+            require(window.area + window.frame_area < walls, item, message)
+
+    @property
+    def floor_area(self) -> float:
+        """Area [m2] of the surfaces that face up."""
+        return sum(s.area for s in self.surfaces if s.normal[2] < -0.7)
+
+    def index_of(self, name: str) -> int:
+        """Position of the opaque surface called `name`."""
+        for i, surface in enumerate(self.surfaces):
+            if surface.name == name:
+                return i
+        raise ValueError(f"zone {self.name} has no surface {name!r}")
+
+
+def scheduled(weekday_profile: ArrayLike, hours: int = 8760) -> NDArray[np.float64]:
+    """Hourly factors [H] from a daily profile [24] that repeats every day."""
+    profile = np.asarray(weekday_profile, dtype=float)
+    require(profile.shape == (24,), "schedule", f"expected 24 values, got {profile.shape}")
+    return np.resize(profile, hours)
+
+
+def work_hours(start: int, end: int, hours: int = 8760) -> NDArray[np.float64]:
+    """Hourly factors [H]: 1 in the hours that lie between two clock times, 0 elsewhere."""
+    require(0 <= start < end <= 24, "schedule", f"expected 0 <= start < end <= 24: {start}, {end}")
+    hour_end = np.arange(1, 25)
+    return scheduled((hour_end > start) & (hour_end <= end), hours)
+
+
+def _same_length(values: ArrayLike, other: ArrayLike) -> NDArray[np.float64]:
+    """Values repeated to the length of the finer of two arrays of set points."""
+    array, length = np.atleast_1d(np.asarray(values, dtype=float)), np.size(other)
+    return np.repeat(array, max(length // array.size, 1))
+
+
+def _set_unit_normal(element: OpaqueSurface | WindowElement, item: str) -> None:
+    normal = np.asarray(element.normal, dtype=float)
+    require(normal.shape == (3,), item, f"normal: expected [3], got {normal.shape}")
+    length = float(np.linalg.norm(normal))
+    require(length > 0, item, "normal has no length")
+    object.__setattr__(element, "normal", normal / length)
