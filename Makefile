@@ -37,7 +37,7 @@ $(VENV)/.run: $(INPUTS)
 	@touch $@
 
 $(VENV)/.dev: $(INPUTS)
-	@bash .ci/set-up '.[dev,peers]'
+	@bash .ci/set-up '.[dev,peers,distributed]'
 	@touch $@ $(VENV)/.run
 
 clean:

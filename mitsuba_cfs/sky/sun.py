@@ -26,11 +26,10 @@ def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float6
 
     Source: Reda and Andreas 2004, Solar Energy 76:577 (pvlib's implementation); Radiance `sun.c`.
     """
-    if model == "spa":
-        return _spa_directions(weather)
-    if model == "radiance":
-        return _radiance_directions(weather)
-    raise ValueError(f"sun model: expected one of {SUN_MODELS}, got {model!r}")
+    if model not in SUN_MODELS:
+        raise ValueError(f"sun model: expected one of {SUN_MODELS}, got {model!r}")
+    found = _spa_directions(weather) if model == "spa" else _radiance_directions(weather)
+    return rotated(found, weather.turned_deg) if weather.turned_deg else found
 
 
 def _spa_directions(weather: Weather) -> NDArray[np.float64]:

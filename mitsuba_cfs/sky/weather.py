@@ -46,6 +46,7 @@ class Weather:
     albedo: float = 0.2  # ground reflectance; 0.2 is gendaymtx's and EnergyPlus's default
     ground_depth_m: FloatArray | None = None  # [G]
     ground_temperature_c: FloatArray | None = None  # [G, 12] monthly, January first
+    turned_deg: float = 0.0  # north is so far counter-clockwise of +y, see `turned`
 
     def __post_init__(self) -> None:
         if not -90 <= self.latitude_deg <= 90 or not -180 <= self.longitude_deg <= 180:
@@ -71,6 +72,19 @@ class Weather:
         hours = np.asarray(hours)
         chosen = {name: getattr(self, name)[hours] for name in self.series()}
         return replace(self, times=self.times[hours], **chosen)
+
+    def turned(self, angle_deg: float) -> Weather:
+        """The same weather round a model turned clockwise, seen from above, by an angle.
+
+        The model stays where it is, sun and wind turn about it, so that whatever was traced of it
+        serves every orientation.
+        """
+        wind = self.wind_direction_deg
+        if wind is not None:
+            wind = np.mod(wind - angle_deg, 360.0)
+        return replace(
+            self, turned_deg=(self.turned_deg + angle_deg) % 360.0, wind_direction_deg=wind
+        )
 
     @property
     def midpoints(self) -> pd.DatetimeIndex:

@@ -106,3 +106,18 @@ def test_direct_normal_from_global():
     assert found[2] == 0 and found[3] == pytest.approx(30 / sine[3])  # the guard
     assert found[4] == 0  # at night
     assert found[5] == pytest.approx(1408.6, abs=0.1)  # not above what arrives from space
+
+
+def test_weather_turned_round_the_model():
+    """Turning a south window's room by 50 degrees: it sees sun and wind as a window at 230 does."""
+    hours = pd.date_range("2017-06-21 05:00", periods=14, freq="h")
+    wind = np.linspace(0.0, 350.0, len(hours))
+    weather = weather_at(hours, 48.0, 15.0, 1.0, wind_direction_deg=wind)
+    turned = weather.turned(20.0).turned(30.0)
+    south, facade = (sun.direction(0.0, np.radians(angle)) for angle in (180.0, 230.0))
+    for model in sun.SUN_MODELS:
+        seen = sun.sun_directions(turned, model=model) @ south
+        assert seen == pytest.approx(sun.sun_directions(weather, model=model) @ facade, abs=1e-12)
+    assert np.mod(turned.wind_direction_deg - 180.0, 360.0) == pytest.approx(
+        np.mod(wind - 230.0, 360.0), abs=1e-9
+    )
