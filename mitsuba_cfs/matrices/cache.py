@@ -181,6 +181,7 @@ def code_version() -> str:
     """The tracer's version: its own source and those of what it is built on."""
     package = Path(__file__).parents[1]
     sources = [*sorted((package / "trace").glob("*.py")), package / "bsdf" / "klems.py"]
+    sources += sorted((package / "bsdf").glob("*plugin*.py"))
     sources += [package / "sky" / "patches.py", package / "surfaces.py", package / "directions.py"]
     versions = [metadata.version(name) for name in ("mitsuba", "drjit")]
     return digest(*versions, *(source.read_bytes() for source in sources))

@@ -35,6 +35,9 @@ class DirectionBins:
         self._tangent_low = mi.Float(tangents[:-1][ring].astype(np.float32))
         self._tangent_high = mi.Float(tangents[1:][ring].astype(np.float32))
         self._place = mi.Float((np.arange(self.size) - first[ring]).astype(np.float32))
+        # By ring: polar angle of the middles, and where the last is followed by grazing incidence
+        self._middles = basis.centres()[0][first]
+        self._middle = mi.Float(np.append(self._middles, np.pi / 2).astype(np.float32))
 
     def index(self, local: mi.Vector3f) -> mi.UInt32:
         """Patch of local direction(s) with z > 0."""
@@ -48,6 +51,37 @@ class DirectionBins:
         place = dr.select(place < 0, place + whole, place)
         place = dr.select(place >= whole, place - whole, place)
         return dr.gather(mi.UInt32, self._first, ring) + mi.UInt32(place)
+
+    def between(self, values: mi.Float, local: mi.Vector3f) -> mi.Float:
+        """Transmittance at local direction(s) with z > 0 from those of the patches' middles [K].
+
+        Linear in polar angle between the rings and in azimuth within a ring; 0 at 90 degrees.
+        """
+        theta = dr.atan2(dr.norm(mi.Vector2f(local.x, local.y)), local.z)
+        ring = mi.UInt32(0)
+        for middle in self._middles[1:]:
+            ring += dr.select(theta >= float(middle), mi.UInt32(1), mi.UInt32(0))
+        low, high = (dr.gather(mi.Float, self._middle, ring + k) for k in (0, 1))
+        share = dr.clip((theta - low) / (high - low), 0, 1)
+        last = ring + 1 >= len(self._middles)
+        turn = dr.atan2(-local.y, local.x) * dr.inv_two_pi
+        inner = self._within_ring(values, ring, turn)
+        outer = self._within_ring(values, dr.select(last, ring, ring + 1), turn)
+        return dr.lerp(inner, dr.select(last, 0.0, outer), share)
+
+    def _within_ring(self, values: mi.Float, ring: mi.UInt32, turn: mi.Float) -> mi.Float:
+        """Linear between the two patches of a ring next to an azimuth [turns]."""
+        count, first = (
+            dr.gather(mi.Float, self._count, ring),
+            dr.gather(mi.UInt32, self._first, ring),
+        )
+        place = turn * count
+        low = dr.floor(place)
+        whole, left = mi.Int32(count), mi.Int32(low)
+        left = dr.select(left < 0, left + whole, left)
+        right = dr.select(left + 1 >= whole, 0, left + 1)
+        a, b = (dr.gather(mi.Float, values, first + mi.UInt32(k)) for k in (left, right))
+        return dr.lerp(a, b, place - low)
 
     def sample(self, patch: mi.UInt32, u: mi.Point2f) -> mi.Vector3f:
         """A local direction in the patch, uniform in projected solid angle."""

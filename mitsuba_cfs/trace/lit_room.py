@@ -34,7 +34,7 @@ class AngularBeam:
 
 
 class PatchBeam:
-    """A share of light that keeps its beam, by the Klems patch of the outdoor direction."""
+    """A share of light that keeps its beam, between the Klems patches of the outdoor direction."""
 
     def __init__(self, basis: KlemsBasis, values: ArrayLike) -> None:
         """From the shares [K]."""
@@ -44,7 +44,7 @@ class PatchBeam:
     def at(self, local: mi.Vector3f) -> mi.Float:
         """Share at the local directions of light that passes along the line of `local`."""
         outward = dr.mulsign(local, local.z)
-        return dr.gather(mi.Float, self._values, self._bins.index(outward))
+        return self._bins.between(self._values, outward)
 
 
 class System:
