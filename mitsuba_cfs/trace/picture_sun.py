@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
-from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles, rays
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.picture_disc import disc_rays, disc_reach
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
-SUBPIXEL = np.radians(0.025)  # places on the sun's disc lie so close: the disc holds 360
 WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
 PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered sun
 
@@ -199,27 +199,19 @@ class PictureSun:
 
     def _add_disc(self, values, lit, suns, strength) -> None:
         """Add the sun's disc seen through the straight beam, by its share of each pixel."""
-        reach = 2 * np.sin((SUN_RADIUS + self._size) / 2)
+        reach = 2 * np.sin(disc_reach(self._size) / 2)
         near = self._tree.query_ball_point(suns, reach)
         hour = np.repeat(np.arange(len(lit)), [len(found) for found in near])
         if not len(hour):
             return
         pixel = np.concatenate([found for found in near if found]).astype(np.int64)
-        count = int(np.clip(np.ceil(self._size / SUBPIXEL), 4, 64))
-        inner = (np.arange(count) + 0.5) / count
-        dx, dy = (a.ravel()[None] for a in np.meshgrid(inner, inner))
-        number = self.pixels[pixel][:, None]
-        x = (number % self._view.width + dx) / self._view.width
-        y = 1.0 - (number // self._view.width + dy) / self._view.height
-        directions, exists = rays(self._view, x, y)
-        cosine = np.einsum("ijk,ik->ij", directions, suns[hour])
-        pair, place = np.nonzero(exists & (cosine >= np.cos(SUN_RADIUS)))
+        pair, way, share = disc_rays(self._view, self.pixels[pixel], suns[hour], self._size)
         if not len(pair):
             return
-        way = mi.Vector3f(directions[pair, place].T.astype(np.float32))
+        way = mi.Vector3f(way.T.astype(np.float32))
         tau = self._straight(mi.Point3f(self._eye), way, mi.Bool(True)).numpy()
-        share = np.bincount(pair, tau, minlength=len(hour)) / count**2
-        np.add.at(values, (lit[hour], pixel), share * strength[hour] / SUN_SOLID_ANGLE)
+        seen = np.bincount(pair, tau, minlength=len(hour)) * share
+        np.add.at(values, (lit[hour], pixel), seen * strength[hour] / SUN_SOLID_ANGLE)
 
 
 def _on_disc(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:

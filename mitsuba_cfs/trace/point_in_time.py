@@ -1,4 +1,4 @@
-"""Point-in-time path tracing: sensors or pixels of a room under one sky, through the real BSDF."""
+"""Point-in-time path tracing: sensors of a room under one sky, through the real BSDF."""
 
 from __future__ import annotations
 
@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import normalize
-from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.lit_room import Room, Sky
-from mitsuba_cfs.trace.sampling import path_generator, pixel_places
+from mitsuba_cfs.trace.sampling import path_generator
 from mitsuba_cfs.trace.scene import OPAQUE
 
 CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
 TO_WINDOW, TO_SUN = 0.5, 0.15  # shares of a room path's directions; the rest follows the cosine
-PIXEL_BLOCK = 2**18  # paths of a picture traced at a time
 
 
 def _interaction(room: Room, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
@@ -31,25 +29,20 @@ def _interaction(room: Room, group: int, direction: mi.Vector3f) -> mi.SurfaceIn
     return si
 
 
-def _on_disc(sky: Sky, u: mi.Point2f) -> mi.Vector3f:
+def on_disc(sky: Sky, u: mi.Point2f) -> mi.Vector3f:
     """A direction uniform on the sun's disc."""
     local = mi.warp.square_to_uniform_cone(u, float(np.cos(SUN_RADIUS)))
     return mi.Frame3f(sky.sun).to_world(local)
 
 
-def _sun_at(
+def straight_to_sky(
     room: Room,
-    sky: Sky,
     position: mi.Point3f,
-    normal: mi.Vector3f,
+    towards: mi.Vector3f,
     outdoors: mi.Bool,
-    u: mi.Point2f,
     active: mi.Bool,
 ) -> mi.Float:
-    """Irradiance straight from the sun: outdoors, or in the room through a window's beam."""
-    towards = _on_disc(sky, u)
-    cosine = dr.dot(normal, towards)
-    active = active & (cosine > 0) & (sky.sun_radiance > 0)
+    """Transmittance of the straight way to the sky: 1 outdoors, a window's beam; 0 if hidden."""
     ray = mi.Ray3f(position, towards)
     tau = mi.Float(1)
     if any(system.beam is not None for system in room.systems):
@@ -68,10 +61,27 @@ def _sun_at(
     else:
         active &= outdoors
     free = active & ~room.outside.scene.ray_test(ray, coherent=False, active=active)
-    return dr.select(free, cosine * tau * sky.sun_radiance * float(SUN_SOLID_ANGLE), 0.0)
+    return dr.select(free, tau, 0.0)
 
 
-def _leave(
+def sun_at(
+    room: Room,
+    sky: Sky,
+    position: mi.Point3f,
+    normal: mi.Vector3f,
+    outdoors: mi.Bool,
+    u: mi.Point2f,
+    active: mi.Bool,
+) -> mi.Float:
+    """Irradiance straight from the sun: outdoors, or in the room through a window's beam."""
+    towards = on_disc(sky, u)
+    cosine = dr.dot(normal, towards)
+    active = active & (cosine > 0) & (sky.sun_radiance > 0)
+    tau = straight_to_sky(room, position, towards, outdoors, active)
+    return dr.select(active, cosine * tau * sky.sun_radiance * float(SUN_SOLID_ANGLE), 0.0)
+
+
+def leave(
     room: Room,
     sky: Sky,
     position: mi.Point3f,
@@ -104,7 +114,7 @@ def _density(
     distance: mi.Float,
     glass_cosine: mi.Float,  # of the window that was met, 0 for none
 ) -> mi.Float:
-    """Density [1/sr] of the directions that `_leave` gives in the room.
+    """Density [1/sr] of the directions that `leave` gives in the room.
 
     A path that aims at a window and meets something before it is given up, so only directions
     that meet a window have that part of the density.
@@ -121,6 +131,41 @@ def _density(
     return rest * cosine * dr.inv_pi + TO_WINDOW * window + TO_SUN * cone
 
 
+def window_parts(
+    room: Room,
+    group: mi.Int32,
+    direction: mi.Vector3f,
+    towards: mi.Vector3f,
+    generator: mi.PCG32,
+    glazed: mi.Bool,
+) -> tuple[mi.Float, mi.Float, mi.Float, mi.Vector3f, mi.Float, mi.Vector3f]:
+    """What a window does to a ray along `direction` that meets it, from either side.
+
+    Returns: light scattered from the sun `towards` [1/sr, cosine included]; the straight beam's
+    transmittance; the mirror's reflectance and direction; weight and direction of what scatters.
+    """
+    u = mi.Point2f(generator.next_float32(), generator.next_float32())
+    choice = generator.next_float32()
+    scattered, straight, mirrored, rest = (mi.Float(0) for _ in range(4))
+    mirror, away = mi.Vector3f(direction), mi.Vector3f(direction)
+    for g, system in enumerate(room.systems):
+        mine = glazed & (group == g)
+        local = room.inside.to_group(g, direction)
+        straight = dr.select(mine, system.straight(local), straight)
+        mirrored = dr.select(mine, system.mirrored(local), mirrored)
+        back = room.inside.to_world(g, local * mi.Vector3f(1, 1, -1))
+        mirror = dr.select(mine, back, mirror)
+        if system.bsdf is not None:
+            si, context = _interaction(room, g, direction), mi.BSDFContext()
+            value = system.bsdf.eval(context, si, si.to_local(towards), mine)
+            sunny = mine & (room.inside.to_group(g, towards).z > 0)
+            scattered = dr.select(sunny, value[0], scattered)
+            sample, weight = system.bsdf.sample(context, si, choice, u, mine)
+            rest = dr.select(mine, weight[0], rest)
+            away = dr.select(mine, si.to_world(sample.wo), away)
+    return scattered, straight, mirrored, mirror, rest, away
+
+
 def _at_window(
     room: Room,
     group: mi.Int32,
@@ -128,60 +173,42 @@ def _at_window(
     towards: mi.Vector3f,
     generator: mi.PCG32,
     glazed: mi.Bool,
-) -> tuple[mi.Float, mi.Float, mi.Vector3f, mi.Float]:
-    """What a window does to a ray along `direction` that meets it, from either side.
+) -> tuple[mi.Float, mi.Vector3f, mi.Float]:
+    """Light scattered from the sun, see `window_parts`; where a path goes on, and its weight.
 
-    Returns: light scattered from the sun `towards` [1/sr, cosine included]; the straight beam's
-    transmittance; the direction in which the path goes on, and its weight.
+    It takes the beam, the mirror or the rest in proportion to what each carries.
     """
-    u = mi.Point2f(generator.next_float32(), generator.next_float32())
-    choice, decision = generator.next_float32(), generator.next_float32()
-    scattered, beam, weight_on = mi.Float(0), mi.Float(0), mi.Float(0)
-    direction_on = mi.Vector3f(direction)
-    for g, system in enumerate(room.systems):
-        mine = glazed & (group == g)
-        local = room.inside.to_group(g, direction)
-        straight, mirrored = system.straight(local), system.mirrored(local)
-        beam = dr.select(mine, straight, beam)
-        rest = mi.Float(0)
-        away = mi.Vector3f(direction)
-        if system.bsdf is not None:
-            si, context = _interaction(room, g, direction), mi.BSDFContext()
-            value = system.bsdf.eval(context, si, si.to_local(towards), mine)
-            sunny = mine & (room.inside.to_group(g, towards).z > 0)
-            scattered = dr.select(sunny, value[0], scattered)
-            sample, weight = system.bsdf.sample(context, si, choice, u, mine)
-            rest, away = weight[0], si.to_world(sample.wo)
-        # one of the three, in proportion to what it carries
-        whole = straight + mirrored + rest
-        mark = decision * whole
-        mirror = room.inside.to_world(g, local * mi.Vector3f(1, 1, -1))
-        away = dr.select(mark < straight + mirrored, mirror, away)
-        away = dr.select(mark < straight, direction, away)
-        direction_on = dr.select(mine, away, direction_on)
-        weight_on = dr.select(mine, whole, weight_on)
-    return scattered, beam, direction_on, weight_on
+    scattered, straight, mirrored, mirror, rest, away = window_parts(
+        room, group, direction, towards, generator, glazed
+    )
+    whole = straight + mirrored + rest
+    mark = generator.next_float32() * whole
+    away = dr.select(mark < straight + mirrored, mirror, away)
+    away = dr.select(mark < straight, direction, away)
+    return scattered, away, whole
 
 
 @dr.syntax
-def _paths(
+def add_paths(
     room: Room,
     sky: Sky,
     result: mi.Float64,  # [rows], accumulated in place
     row: mi.UInt32,
     origin: mi.Point3f,
     direction: mi.Vector3f,
-    cosine: mi.Float,  # at the vertex that the path starts on; 0 where it starts at an eye
+    cosine: mi.Float,  # at the room's diffuse vertex that the path starts on; 0 where it is none
     aimed: mi.Bool,  # whether the first direction aims at a window
     beta: mi.Float,
     generator: mi.PCG32,
     max_depth: mi.UInt32,
     active: mi.Bool,
+    outdoors: mi.Bool,  # where the path starts
 ) -> None:
-    """Follow each path and add what it carries from sun, sky and ground to its row."""
-    outdoors = mi.Bool(False)
+    """Follow each path and add what it carries from sun, sky and ground to its row.
+
+    The sun's disc itself is not seen at the end of a path, only where it scatters or shines.
+    """
     diffuse = cosine > 0  # the ray left a diffuse vertex in the room: its density is to be applied
-    camera = cosine <= 0  # the ray comes straight from the eye
     depth = mi.UInt32(0)
     while active:
         # ----- What the ray meets: the sky, a surface, a window -----
@@ -212,18 +239,16 @@ def _paths(
 
         # ----- Windows: the sun scattered in them, and where the path goes on -----
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
-        towards = _on_disc(sky, u_sun)
-        scattered, straight, next_direction, next_beta = _at_window(
+        towards = on_disc(sky, u_sun)
+        scattered, next_direction, next_beta = _at_window(
             room, group, direction, towards, generator, glazed
         )
-        sun_in_view = dr.dot(direction, sky.sun) > float(np.cos(SUN_RADIUS))
-        seen_sun = dr.select(glazed & camera & sun_in_view, straight, 0.0)
-        sunlit = glazed & ((scattered > 0) | (seen_sun > 0)) & (sky.sun_radiance > 0)
+        sunlit = glazed & (scattered > 0) & (sky.sun_radiance > 0)
         before = mi.Point3f(point + room.inside.outward(group, glazed))
-        sun_ray = mi.Ray3f(before, dr.select(seen_sun > 0, direction, towards))
+        sun_ray = mi.Ray3f(before, towards)
         sunlit &= ~room.outside.scene.ray_test(sun_ray, coherent=False, active=sunlit)
-        from_sun = scattered * float(SUN_SOLID_ANGLE) + seen_sun
-        dr.scatter_add(result, mi.Float64(beta * from_sun * sky.sun_radiance), row, sunlit)
+        from_sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
+        dr.scatter_add(result, mi.Float64(beta * from_sun), row, sunlit)
 
         # ----- Surfaces: the sun on them, and a new direction -----
         opaque = active & ~glazed
@@ -236,9 +261,9 @@ def _paths(
         rho_out = dr.gather(mi.Float, room.outside.reflectance, prim, opaque & outdoors)
         beta_face = beta * dr.select(outdoors, rho_out, rho_in) * dr.inv_pi
         vertex = mi.Point3f(point + face * room.inside.epsilon)
-        sun = _sun_at(room, sky, vertex, face, outdoors, u_sun, opaque)
+        sun = sun_at(room, sky, vertex, face, outdoors, u_sun, opaque)
         dr.scatter_add(result, mi.Float64(beta_face * sun), row, opaque)
-        away, aimed = _leave(room, sky, vertex, face, outdoors, generator, opaque)
+        away, aimed = leave(room, sky, vertex, face, outdoors, generator, opaque)
         cosine = dr.select(opaque, dr.dot(away, face), 0.0)
         beta_face *= dr.select(outdoors, dr.pi, 1.0)  # outdoors the cosine cancels at once
 
@@ -253,7 +278,6 @@ def _paths(
         diffuse = opaque & ~outdoors
         active &= ~opaque | (cosine > 0)
         outdoors = dr.select(glazed, outward, outdoors)
-        camera = mi.Bool(False)
         depth += 1
         survival = dr.select(depth > 4, dr.clip(beta * 3.0, 0.05, 0.95), 1.0)
         active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
@@ -296,60 +320,17 @@ def point_in_time(
         generator = path_generator(path, key)
         origin = mi.Point3f(dr.gather(mi.Point3f, place, sensor))
         normal = dr.gather(mi.Vector3f, normals, sensor)
-        indoors = mi.Bool(False)
+        outdoors = mi.Bool(False)
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
-        sun = _sun_at(room, sky, origin, normal, indoors, u, mi.Bool(True))
+        sun = sun_at(room, sky, origin, normal, outdoors, u, mi.Bool(True))
         dr.scatter_add(result, mi.Float64(sun), sensor)
-        away, aimed = _leave(room, sky, origin, normal, indoors, generator, mi.Bool(True))
+        away, aimed = leave(room, sky, origin, normal, outdoors, generator, mi.Bool(True))
         cosine = dr.dot(away, normal)
         depth = dr.opaque(mi.UInt32, max_depth)
-        _paths(
+        add_paths(
             room, sky, result, sensor, origin, away, cosine, aimed, mi.Float(1), generator, depth,
-            cosine > 0,
+            cosine > 0, outdoors,
         )  # fmt: skip
         return result.numpy() / n
 
     return accumulate(batch, stopping=stopping, label="point in time", progress=progress)
-
-
-def point_in_time_picture(
-    room: Room,
-    sky: Sky,
-    view: View,
-    *,
-    samples: int = 64,
-    max_depth: int = 24,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> NDArray[np.float32]:
-    """Luminance (radiance) picture [ny, nx] under one sky; see `point_in_time`.
-
-    Args: samples: paths for each pixel, spread over it.
-    """
-    _, counts = pixel_directions(view)
-    shown = np.flatnonzero(counts.reshape(-1))
-    picture = np.zeros(view.height * view.width, dtype=np.float32)
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - room.inside.centre))
-    rows = max(1, PIXEL_BLOCK // samples)
-    offsets = np.random.default_rng(seed).permuted(pixel_places(samples), axis=0)
-    for start in range(0, len(shown), rows):
-        pixels = np.repeat(shown[start : start + rows], samples)
-        dx, dy = np.tile(offsets, (len(pixels) // samples, 1)).T
-        x = (pixels % view.width + dx) / view.width
-        y = 1.0 - (pixels // view.width + dy) / view.height
-        directions, exists = rays(view, x, y)
-        count = len(pixels) // samples
-        result = dr.zeros(mi.Float64, count)
-        path = dr.arange(mi.UInt32, len(pixels))
-        sample = path % samples
-        number = mi.UInt32(pixels.astype(np.uint32)) * samples + sample
-        generator = path_generator(number, dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-        ray = mi.Vector3f(directions.T.astype(np.float32))
-        depth, aimed = dr.opaque(mi.UInt32, max_depth), mi.Bool(False)
-        _paths(
-            room, sky, result, path // samples, eye, ray, mi.Float(0), aimed, mi.Float(1),
-            generator, depth, mi.Bool(exists),
-        )  # fmt: skip
-        picture[shown[start : start + rows]] = result.numpy() / samples
-        progress("picture", min(1.0, (start + count) / len(shown)))
-    return picture.reshape(view.height, view.width)

@@ -162,7 +162,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
 
     from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
     from mitsuba_cfs.trace.lit_room import AngularBeam, Room, Sky, System
-    from mitsuba_cfs.trace.point_in_time import point_in_time_picture
+    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
     from tests.trace.test_point_in_time import diffuser as diffusing_system
     from tests.trace.test_point_in_time import klems
 

@@ -132,7 +132,7 @@ def test_an_obstacle_before_one_of_two_windows_does_not_bias_the_paths():
 def test_picture_shows_sky_ground_and_the_suns_disc():
     from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
     from mitsuba_cfs.trace.lit_room import Room, Sky
-    from mitsuba_cfs.trace.point_in_time import point_in_time_picture
+    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 
     interior, groups = rooms.test_room()
     room = Room(interior, rooms.NOTHING, groups, [glass(0.5)])

@@ -1,0 +1,37 @@
+"""The sun's disc in a view's pixels, cut into small pieces: right whatever their size."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.images.view import View, rays
+from mitsuba_cfs.sky.sun import SUN_RADIUS
+
+SUBPIXEL = np.radians(0.025)  # places on the sun's disc lie so close: the disc holds 360
+
+
+def disc_reach(pixel_size: float) -> float:
+    """Angle [rad] from the sun's middle within which a pixel's middle lies that shows the disc."""
+    return float(SUN_RADIUS + pixel_size)
+
+
+def disc_rays(
+    view: View, pixels: NDArray[np.int64], suns: NDArray[np.float64], pixel_size: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64], float]:
+    """Rays of pixels [n] that meet the disc of a sun [n, 3] each, and the share of one of them.
+
+    Args: pixel_size: the largest angle [rad] across a pixel of the view.
+
+    Returns: number [m] of the pixel that a ray belongs to; its direction [m, 3]; its share.
+    """
+    count = int(np.clip(np.ceil(pixel_size / SUBPIXEL), 4, 64))
+    inner = (np.arange(count) + 0.5) / count
+    dx, dy = (a.ravel()[None] for a in np.meshgrid(inner, inner))
+    number = pixels[:, None]
+    x = (number % view.width + dx) / view.width
+    y = 1.0 - (number // view.width + dy) / view.height
+    directions, exists = rays(view, x, y)
+    cosine = np.einsum("ijk,ik->ij", directions, suns)
+    pixel, place = np.nonzero(exists & (cosine >= np.cos(SUN_RADIUS)))
+    return pixel, directions[pixel, place], 1 / count**2

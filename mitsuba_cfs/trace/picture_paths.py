@@ -1,0 +1,326 @@
+"""Point-in-time pictures: a view of a room under one sky, path-traced through the real BSDF.
+
+    L[pixel] = sharp part + sum over the faces that it shows, share of the face times shared light
+
+Sharp, from the pixel's own rays: the sun's disc, its beam on surfaces, the sun that a window
+scatters towards the eye, sky and outdoors through the straight beam, what the glass mirrors.
+Shared (`picture_sharing`), as it varies slowly over a face and its noise would make false glare
+sources: light that reaches a surface after one reflection or more or from the windows, and
+the sky that a window scatters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles, rays
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.trace.lit_room import Room, Sky
+from mitsuba_cfs.trace.picture_disc import disc_rays, disc_reach
+from mitsuba_cfs.trace.picture_sharing import SharedLight, Tiles, face_numbers
+from mitsuba_cfs.trace.point_in_time import (
+    add_paths,
+    leave,
+    on_disc,
+    straight_to_sky,
+    sun_at,
+    window_parts,
+)
+from mitsuba_cfs.trace.sampling import path_generator, pixel_places
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+
+BLOCK = 2**19  # paths traced at a time
+TILE = 4  # [px]
+SURFACE_STEPS, WINDOW_STEPS = (1, 2), (1,)  # [tiles] of the smoothing, one after the other
+
+
+def point_in_time_picture(
+    room: Room,
+    sky: Sky,
+    view: View,
+    *,
+    samples: int = 16,
+    tile: int = TILE,
+    max_depth: int = 24,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> NDArray[np.float32]:
+    """Luminance (radiance) picture [ny, nx] under one sky.
+
+    Args:
+        samples: rays and paths for each pixel, spread over it.
+        tile: pixels across of the squares that share slowly varying light; 1: every pixel for
+            itself, without smoothing, for a picture free of any assumption.
+    """
+    shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
+    shifts = np.random.default_rng(seed).random((len(shown), 2))
+    tiles, numbers = Tiles(tile, view.width), _Faces(room)
+    picture = np.zeros(view.height * view.width)
+    kernel = _Kernel(room, sky, view, numbers, samples, max_depth, seed)
+    pairs, rows = [], []
+    size = max(1, BLOCK // samples)
+    for start in range(0, len(shown), size):
+        pixels = shown[start : start + size]
+        sharp, shared = kernel.trace(pixels, shifts[start : start + size])
+        picture[pixels] = sharp
+        for light in shared:
+            pairs.append(light.by_pixel(pixels, samples))
+            rows.append(light.by_tile(pixels, samples, tiles))
+        progress("picture", (start + len(pixels)) / len(shown))
+    _add_shared(picture, tiles, pairs, rows, numbers.windows)
+    _add_disc(picture, shown, room, sky, view)
+    return picture.astype(np.float32).reshape(view.height, view.width)
+
+
+def _add_shared(picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence, windows: int):
+    """Add to each pixel the smoothed light of the faces that it shows."""
+    key, total, count = (np.concatenate(part) for part in zip(*rows, strict=True))
+    if not len(key):
+        return
+    light = SharedLight(tiles, key, total, count)
+    if tiles.size > 1:
+        glass = light.faces < windows
+        for step in SURFACE_STEPS:
+            light = light.smoothed(step, None if step in WINDOW_STEPS else ~glass)
+    pixel, face, weight = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    np.add.at(picture, pixel, weight * light.at(pixel, face))
+
+
+def _add_disc(picture: NDArray, shown: NDArray, room: Room, sky: Sky, view: View) -> None:
+    """Add the sun's disc seen through the straight beam, by its share of each pixel."""
+    sun = sky.sun.numpy().ravel()
+    size = float(np.sqrt(pixel_solid_angles(view).max()))
+    directions = pixel_directions(view)[0].reshape(-1, 3)[shown]
+    near = shown[directions @ sun > np.cos(disc_reach(size))]
+    pixel, way, share = disc_rays(view, near, np.tile(sun, (len(near), 1)), size)
+    if not len(pixel) or not sky.sun_radiance.numpy()[0]:
+        return
+    towards = mi.Vector3f(way.T.astype(np.float32))
+    tau = straight_to_sky(
+        room, _eye(room, view), towards, mi.Bool(False), dr.full(mi.Bool, True, len(pixel))
+    )
+    seen = np.bincount(pixel, tau.numpy(), minlength=len(near))
+    picture[near] += seen * share * sky.sun_radiance.numpy()[0]
+
+
+def _eye(room: Room, view: View) -> mi.Point3f:
+    return mi.Point3f(*map(float, np.asarray(view.position) - room.inside.centre))
+
+
+class _Faces:
+    """Numbers of the faces of a room: windows, both sides of faces indoors, then outdoors."""
+
+    def __init__(self, room: Room) -> None:
+        self.windows = len(room.systems) + 1  # the last: windows seen from outdoors
+        self._inside, count = self._table(room.inside)
+        self._outside, _ = self._table(room.outside)
+        self._first_outside = self.windows + 2 * count
+
+    @staticmethod
+    def _table(scene: TracedScene) -> tuple[mi.UInt32, int]:
+        face = face_numbers(scene.surface.numpy(), scene.normal.numpy().T)
+        return mi.UInt32(face.astype(np.uint32)), int(face.max()) + 1
+
+    def inside(self, prim: mi.UInt32, behind: mi.Bool, active: mi.Bool) -> mi.UInt32:
+        """Number of the side of a triangle in the room."""
+        face = dr.gather(mi.UInt32, self._inside, prim, active)
+        return self.windows + 2 * face + dr.select(behind, mi.UInt32(1), mi.UInt32(0))
+
+    def outside(self, prim: mi.UInt32, behind: mi.Bool, active: mi.Bool) -> mi.UInt32:
+        """Number of the side of a triangle outdoors."""
+        face = dr.gather(mi.UInt32, self._outside, prim, active)
+        return self._first_outside + 2 * face + dr.select(behind, mi.UInt32(1), mi.UInt32(0))
+
+
+@dataclass(frozen=True)
+class _Light:
+    """What the rays [n] of a block share: a face each, its weight in the ray, the path's light."""
+
+    face: NDArray[np.int64]
+    weight: NDArray[np.float64]  # 0 where the ray shows no such face
+    value: NDArray[np.float64]
+
+    def by_pixel(self, pixels: NDArray, samples: int) -> tuple[NDArray, NDArray, NDArray]:
+        """Pixels, faces and the faces' weights in the pixels' means."""
+        ray = np.flatnonzero(self.weight > 0)
+        key = (self.face[ray] << 32) + pixels[ray // samples]
+        found, place = np.unique(key, return_inverse=True)
+        weight = np.bincount(place, self.weight[ray], minlength=len(found)) / samples
+        return found & 0xFFFFFFFF, found >> 32, weight
+
+    def by_tile(
+        self, pixels: NDArray, samples: int, tiles: Tiles
+    ) -> tuple[NDArray, NDArray, NDArray]:
+        """Numbers of faces in tiles, and the sum and number of their paths."""
+        ray = np.flatnonzero(self.weight > 0)
+        key = tiles.of_pixels(pixels[ray // samples], self.face[ray])
+        found, place = np.unique(key, return_inverse=True)
+        total = np.bincount(place, self.value[ray], minlength=len(found))
+        return found, total, np.bincount(place, minlength=len(found)).astype(float)
+
+
+class _Kernel:
+    """Traces blocks of pixels."""
+
+    def __init__(
+        self,
+        room: Room,
+        sky: Sky,
+        view: View,
+        faces: _Faces,
+        samples: int,
+        max_depth: int,
+        seed: int,
+    ) -> None:
+        self._room, self._sky, self._view, self._faces = room, sky, view, faces
+        self._samples, self._places = samples, pixel_places(samples)
+        self._eye = _eye(room, view)
+        self._depth = dr.opaque(mi.UInt32, max_depth)
+        self._key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+        self._beams = any(system.beam is not None for system in room.systems)
+        self._mirrors = any(m is not None for system in room.systems for m in system.mirrors)
+
+    def trace(self, pixels: NDArray, shifts: NDArray) -> tuple[NDArray, list[_Light]]:
+        """The pixels' own light [n], and the light of their rays that is to be shared."""
+        n = self._samples
+        number = np.repeat(pixels, n)
+        places = np.mod(self._places + shifts[:, None], 1.0).reshape(-1, 2)
+        x = (number % self._view.width + places[:, 0]) / self._view.width
+        y = 1.0 - (number // self._view.width + places[:, 1]) / self._view.height
+        directions, exists = rays(self._view, x, y)
+        way = mi.Vector3f(directions.T.astype(np.float32))
+        path = mi.UInt32(number.astype(np.uint32)) * n + dr.arange(mi.UInt32, len(number)) % n
+        generator = path_generator(path, self._key)
+        sharp, shared = self._rays(way, generator, mi.Bool(exists))
+        dr.eval(sharp, *(part for light in shared for part in light))
+        lights = [
+            _Light(face.numpy().astype(np.int64), weight.numpy().astype(float), value.numpy())
+            for face, weight, value in shared
+        ]
+        return sharp.numpy().reshape(-1, n).mean(axis=1), lights
+
+    def _rays(
+        self, direction: mi.Vector3f, generator: mi.PCG32, active: mi.Bool
+    ) -> tuple[mi.Float64, list[tuple[mi.UInt32, mi.Float, mi.Float64]]]:
+        """One ray and its paths for each lane: sharp light; face, weight and light to share."""
+        room, sky = self._room, self._sky
+        inside = room.inside
+        lane = dr.arange(mi.UInt32, dr.width(direction))
+        indoors = mi.Bool(False)
+
+        # ----- What the ray meets -----
+        ray = mi.Ray3f(self._eye, direction)
+        hit = inside.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        active &= hit.is_valid()
+        group = dr.gather(mi.Int32, inside.group, hit.prim_index, active)
+        point = mi.Point3f(self._eye + direction * hit.t)
+        opaque, glazed = active & (group == OPAQUE), active & (group != OPAQUE)
+        glazed &= inside.to_local(group, direction, glazed).z > 1e-4
+        u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
+
+        # ----- A surface: the sun's beam on it, and a path from it -----
+        normal = dr.gather(mi.Vector3f, inside.normal, hit.prim_index, opaque)
+        behind = dr.dot(normal, direction) > 0
+        normal = dr.select(behind, -normal, normal)
+        rho = dr.gather(mi.Float, inside.reflectance, hit.prim_index, opaque) * dr.inv_pi
+        vertex = mi.Point3f(point + normal * inside.epsilon)
+        sharp = mi.Float64(rho * sun_at(room, sky, vertex, normal, indoors, u_sun, opaque))
+        sharp = dr.select(opaque, sharp, 0.0)
+        away, aimed = leave(room, sky, vertex, normal, indoors, generator, opaque)
+        cosine = dr.select(opaque, dr.dot(away, normal), 0.0)
+
+        # ----- A window: the sun scattered in it, and a path through what scatters -----
+        towards = on_disc(sky, u_sun)
+        scattered, straight, mirrored, mirror, rest, onwards = window_parts(
+            room, group, direction, towards, generator, glazed
+        )
+        step = inside.outward(group, glazed)
+        outer, inner = mi.Point3f(point + step), mi.Point3f(point - step)
+        sunlit = glazed & (scattered > 0) & (sky.sun_radiance > 0)
+        sunlit &= ~room.outside.scene.ray_test(mi.Ray3f(outer, towards), False, sunlit)
+        sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
+        sharp += dr.select(sunlit, mi.Float64(sun), 0.0)
+        outward = glazed & (dr.dot(step, onwards) > 0)
+
+        # ----- The paths whose light is shared -----
+        found = dr.zeros(mi.Float64, dr.width(lane))
+        origin = dr.select(opaque, vertex, dr.select(outward, outer, inner))
+        add_paths(
+            room, sky, found, lane, mi.Point3f(origin), dr.select(opaque, away, onwards), cosine,
+            aimed & opaque, dr.select(opaque, 1.0, rest), mi.PCG32(generator), self._depth,
+            (opaque & (cosine > 0)) | (glazed & (rest > 0)), outward,
+        )  # fmt: skip
+        face = self._faces.inside(hit.prim_index, behind, opaque)
+        face = dr.select(opaque, face, mi.UInt32(group))
+        weight = dr.select(opaque, rho, dr.select(glazed & self._scatters(group), 1.0, 0.0))
+        shared = [(face, weight, found)]
+
+        # ----- Straight on, and back by the mirror -----
+        if self._beams:
+            beam, light = self._outdoors(outer, direction, straight, generator, glazed)
+            sharp += beam
+            shared.append(light)
+        if self._mirrors:
+            seen = dr.zeros(mi.Float64, dr.width(lane))
+            add_paths(
+                room, sky, seen, lane, inner, mirror, mi.Float(0), mi.Bool(False), mirrored,
+                mi.PCG32(generator), self._depth, glazed & (mirrored > 0), mi.Bool(False),
+            )  # fmt: skip
+            sharp += seen
+        return sharp, shared
+
+    def _scatters(self, group: mi.Int32) -> mi.Bool:
+        """Which window groups do more than pass a beam."""
+        found = mi.Bool(False)
+        for g, system in enumerate(self._room.systems):
+            found |= (group == g) & (system.bsdf is not None)
+        return found
+
+    def _outdoors(
+        self,
+        origin: mi.Point3f,
+        direction: mi.Vector3f,
+        straight: mi.Float,
+        generator: mi.PCG32,
+        active: mi.Bool,
+    ) -> tuple[mi.Float64, tuple[mi.UInt32, mi.Float, mi.Float64]]:
+        """What rays that go straight on show: sky, and sun on outdoor surfaces; these to share."""
+        room, sky = self._room, self._sky
+        outside = room.outside
+        lane, outdoors = dr.arange(mi.UInt32, dr.width(direction)), mi.Bool(True)
+        active = active & (straight > 0)
+        ray = mi.Ray3f(origin, direction)
+        hit = outside.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        free = active & ~hit.is_valid()
+        radiance = dr.gather(mi.Float, sky.radiance, sky.bins.index(direction), free)
+        sharp = dr.select(free, mi.Float64(straight * radiance), 0.0)
+        active &= hit.is_valid()
+        group = dr.gather(mi.Int32, outside.group, hit.prim_index, active)
+        opaque = active & (group == OPAQUE)
+        normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, opaque)
+        behind = dr.dot(normal, direction) > 0
+        normal = dr.select(behind, -normal, normal)
+        vertex = mi.Point3f(origin + direction * hit.t + normal * room.inside.epsilon)
+        rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, opaque) * dr.inv_pi
+        u = mi.Point2f(generator.next_float32(), generator.next_float32())
+        sun = sun_at(room, sky, vertex, normal, outdoors, u, opaque)
+        sharp += dr.select(opaque, mi.Float64(straight * rho * sun), 0.0)
+        away, _ = leave(room, sky, vertex, normal, outdoors, generator, opaque)
+        # a surface's irradiance is pi times the mean by cosine; another window is looked into
+        found = dr.zeros(mi.Float64, dr.width(lane))
+        add_paths(
+            room, sky, found, lane, dr.select(opaque, vertex, origin),
+            dr.select(opaque, away, direction), mi.Float(0), mi.Bool(False),
+            dr.select(opaque, dr.pi, 1.0), mi.PCG32(generator), self._depth, active, outdoors,
+        )  # fmt: skip
+        face = self._faces.outside(hit.prim_index, behind, opaque)
+        face = dr.select(opaque, face, mi.UInt32(self._faces.windows - 1))
+        weight = dr.select(active, straight * dr.select(opaque, rho, 1.0), 0.0)
+        return sharp, (face, weight, found)

@@ -1,0 +1,106 @@
+"""Light that varies slowly over a face of the scene, shared among the pixels that show the face.
+
+A picture is cut into square tiles.  What paths bring to a face in a tile is one mean, which the
+tiles round it on the same face smooth; a pixel takes it between the tiles' middles.  Neither an
+edge of the scene nor what is sharp (the sun's beam, the sky behind glass) is ever blurred.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+MARGIN = 8  # [tiles] round the picture, so that no tile's neighbour is another row's end
+FACE_STEPS = 8  # normals that differ less than 1/16 in each component are one face
+
+
+def face_numbers(surface: NDArray, normal: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The face [N] that each triangle belongs to: of one surface, in one direction [N, 3]."""
+    steps = np.round(np.asarray(normal) * FACE_STEPS).astype(np.int64)
+    table = np.column_stack([np.asarray(surface).astype(np.int64), steps])
+    return np.unique(table, axis=0, return_inverse=True)[1].reshape(-1)
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Squares of `size` pixels of a picture `width` pixels wide."""
+
+    size: int
+    width: int
+
+    def key(self, column: ArrayLike, row: ArrayLike, face: ArrayLike) -> NDArray[np.int64]:
+        """The number of a face in the tile at a column and row of tiles."""
+        across = -(-self.width // self.size) + 2 * MARGIN
+        column, row = np.asarray(column) + MARGIN, np.asarray(row) + MARGIN
+        return (np.asarray(face, dtype=np.int64) << 40) + row * across + column
+
+    def of_pixels(self, pixel: NDArray[np.int64], face: NDArray) -> NDArray[np.int64]:
+        """The numbers of the faces in the tiles of pixels (row * width + column)."""
+        row, column = np.divmod(pixel, self.width)
+        return self.key(column // self.size, row // self.size, face)
+
+
+class SharedLight:
+    """Means of what paths bring to faces, tile by tile."""
+
+    def __init__(
+        self,
+        tiles: Tiles,
+        key: NDArray[np.int64],
+        total: NDArray[np.float64],
+        count: NDArray[np.float64],
+    ) -> None:
+        """From the numbers [n] of faces in tiles, sums over their paths and how many these are."""
+        self.tiles = tiles
+        self._key, place = np.unique(key, return_inverse=True)
+        self._total = np.bincount(place, total, minlength=len(self._key))
+        self._count = np.bincount(place, count, minlength=len(self._key))
+
+    def smoothed(self, step: int, mine: NDArray[np.bool_] | None = None) -> SharedLight:
+        """Weighted 1 2 1 with the tiles `step` away in both directions, on the same face.
+
+        Args: mine: which tiles [n] (in the order of `faces`) to smooth, all by default.
+        """
+        if step > MARGIN:
+            raise ValueError(f"a step of {step} tiles: at most {MARGIN}")
+        total, count = np.zeros_like(self._total), np.zeros_like(self._count)
+        down = self.tiles.key(0, 1, 0) - self.tiles.key(0, 0, 0)
+        for y in (-1, 0, 1):
+            for x in (-1, 0, 1):
+                place, found = self._find(self._key + step * (y * down + x))
+                weight = found * ((2 - abs(x)) * (2 - abs(y)))
+                if mine is not None and (x or y):
+                    weight = weight * mine
+                total += weight * self._total[place]
+                count += weight * self._count[place]
+        return SharedLight(self.tiles, self._key, total, count)
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """The face [n] of each mean."""
+        return self._key >> 40
+
+    def at(self, pixel: NDArray[np.int64], face: NDArray) -> NDArray[np.float64]:
+        """The light [n] of faces at pixels, between the middles of the tiles that show the face."""
+        mean = self._total / np.maximum(self._count, 1e-300)
+        if self.tiles.size == 1:
+            return mean[self._find(self.tiles.of_pixels(pixel, face))[0]]
+        row, column = np.divmod(pixel, self.tiles.width)
+        x, y = ((a + 0.5) / self.tiles.size - 0.5 for a in (column, row))
+        left, top = np.floor(x), np.floor(y)
+        value, share = np.zeros(len(pixel)), np.zeros(len(pixel))
+        for j in (0, 1):
+            for i in (0, 1):
+                across, along = (left + i).astype(np.int64), (top + j).astype(np.int64)
+                place, found = self._find(self.tiles.key(across, along, face))
+                weight = found * np.abs((1 - i - x + left) * (1 - j - y + top))
+                value += weight * mean[place]
+                share += weight
+        return value / np.maximum(share, 1e-300)
+
+    def _find(self, key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Where in the table each number stands, and whether it does."""
+        place = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
+        return place, self._key[place] == key
