@@ -47,7 +47,7 @@ def test_eval_answers_in_the_frame_of_radiance(blind):
     assert [line.rsplit(" ", 1)[0] for line in answer] == lines
     ours = np.array([float(line.rsplit(" ", 1)[1]) for line in answer])
     theirs = radiance.query(blind, incident, outgoing)
-    np.testing.assert_allclose(ours, theirs, rtol=radiance.COLOUR_NOISE)
+    np.testing.assert_allclose(ours, theirs, rtol=radiance.LARGEST_FACTOR)
     options = ["--in", *angles[0, :2], "--out", *angles[0, 2:]]
     assert float(run("eval", blind, *options).stdout) == pytest.approx(ours[0], rel=1e-6)
 

@@ -105,11 +105,11 @@ def test_values_are_those_of_radiance(real_data, name):
     incident, outgoing = radiance.random_directions(10_000, seed=1)
     theirs = radiance.query(path, incident, outgoing)
     ours = evaluate(
-        read_bsdf_xml(path).band("Visible").filled(),
+        radiance.perturbed(read_bsdf_xml(path).band("Visible")).filled(),
         radiance.to_window(incident),
         radiance.to_window(outgoing),
     )
-    np.testing.assert_allclose(ours, theirs, rtol=radiance.COLOUR_NOISE, atol=1e-9)
+    np.testing.assert_allclose(ours, theirs, rtol=radiance.QUERY_TOLERANCE, atol=1e-9)
 
 
 @pytest.mark.peer
@@ -139,7 +139,7 @@ def hemispherical(system: KlemsBsdf, incident):
 @pytest.mark.peer
 @pytest.mark.parametrize("side", ["front", "back"])
 def test_single_rows_are_those_of_radiance_to_float_precision(tmp_path, side):
-    """One outgoing patch at a time, `direct_hemi` is one matrix entry without colour arithmetic."""
+    """One outgoing patch at a time, `direct_hemi` is one matrix entry without the factor."""
     generator = np.random.default_rng(5)
     incident, _ = radiance.random_directions(200, seed=6)
     for row in generator.integers(0, KLEMS_QUARTER.size, 5):

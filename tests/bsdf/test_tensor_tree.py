@@ -107,6 +107,12 @@ def test_broken_text_is_refused(text, message):
         TensorTree.from_text(text, 4)
 
 
+def share_off(ours, theirs, incident) -> float:
+    """Share of the pairs [N] that differ; Radiance's factor is another one where light grazes."""
+    tolerance = np.where(abs(incident[:, 2]) > 2e-3, radiance.QUERY_TOLERANCE, 2e-4)
+    return float((abs(ours - theirs) > 1e-8 + tolerance * abs(theirs)).mean())
+
+
 @pytest.mark.peer
 @pytest.mark.parametrize("name", FILES)
 def test_values_are_those_of_radiance(real_data, name):
@@ -116,12 +122,12 @@ def test_values_are_those_of_radiance(real_data, name):
         outgoing[::2] = -incident[::2]
     theirs = radiance.query(path, incident, outgoing)
     ours = bsdf_values(
-        read_bsdf_xml(path).band("Visible"),
+        radiance.perturbed(read_bsdf_xml(path).band("Visible")),
         radiance.to_window(incident),
         radiance.to_window(outgoing),
     )
-    off = ~np.isclose(ours, theirs, rtol=radiance.COLOUR_NOISE, atol=1e-7)
-    assert off.mean() <= 2e-4  # pairs on the border of a cell, where rounding decides
+    # pairs on the border of a cell, where rounding decides
+    assert share_off(ours, theirs, incident) <= 2e-4
 
 
 @pytest.mark.peer
@@ -133,9 +139,10 @@ def test_random_trees_on_all_sides_are_those_of_radiance(tmp_path, rank):
     write_bsdf_xml(BsdfFile({"Visible": system}), path, digits=9)
     incident, outgoing = radiance.random_directions(10_000, seed=2)
     theirs = radiance.query(path, incident, outgoing)
-    ours = bsdf_values(system, radiance.to_window(incident), radiance.to_window(outgoing))
-    off = ~np.isclose(ours, theirs, rtol=radiance.COLOUR_NOISE, atol=1e-7)
-    assert off.mean() <= 2e-4
+    ours = bsdf_values(
+        radiance.perturbed(system), radiance.to_window(incident), radiance.to_window(outgoing)
+    )
+    assert share_off(ours, theirs, incident) <= 2e-4
 
 
 @pytest.mark.peer
