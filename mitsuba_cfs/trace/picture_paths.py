@@ -33,7 +33,7 @@ from mitsuba_cfs.trace.point_in_time import (
     sun_at,
     window_parts,
 )
-from mitsuba_cfs.trace.sampling import path_generator, pixel_places
+from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixel_places
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 BLOCK = 2**19  # paths traced at a time
@@ -63,7 +63,7 @@ def point_in_time_picture(
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
     picture = np.zeros(view.height * view.width)
-    kernel = _Kernel(room, sky, view, numbers, samples, max_depth, seed)
+    kernel = _Kernel(room, sky, view, numbers, tiles, samples, max_depth, seed)
     pairs, rows = [], []
     size = max(1, BLOCK // samples)
     for start in range(0, len(shown), size):
@@ -175,11 +175,13 @@ class _Kernel:
         sky: Sky,
         view: View,
         faces: _Faces,
+        tiles: Tiles,
         samples: int,
         max_depth: int,
         seed: int,
     ) -> None:
         self._room, self._sky, self._view, self._faces = room, sky, view, faces
+        self._tiles = tiles
         self._samples, self._places = samples, pixel_places(samples)
         self._eye = _eye(room, view)
         self._depth = dr.opaque(mi.UInt32, max_depth)
@@ -198,7 +200,8 @@ class _Kernel:
         way = mi.Vector3f(directions.T.astype(np.float32))
         path = mi.UInt32(number.astype(np.uint32)) * n + dr.arange(mi.UInt32, len(number)) % n
         generator = path_generator(path, self._key)
-        sharp, shared = self._rays(way, generator, mi.Bool(exists))
+        stream, sample = self._strata(number)
+        sharp, shared = self._rays(way, generator, stream, sample, mi.Bool(exists))
         dr.eval(sharp, *(part for light in shared for part in light))
         lights = [
             _Light(face.numpy().astype(np.int64), weight.numpy().astype(float), value.numpy())
@@ -206,8 +209,21 @@ class _Kernel:
         ]
         return sharp.numpy().reshape(-1, n).mean(axis=1), lights
 
+    def _strata(self, number: NDArray) -> tuple[mi.UInt32, mi.UInt32]:
+        """Tile of each ray of pixels, and its number in the tile: what is shared is stratified."""
+        size, n = self._tiles.size, self._samples
+        row, column = np.divmod(number, self._view.width)
+        tile = self._tiles.of_pixels(number, np.zeros_like(number))
+        place = (row % size * size + column % size) * n + np.arange(len(number)) % n
+        return mi.UInt32(tile.astype(np.uint32)), mi.UInt32(place.astype(np.uint32))
+
     def _rays(
-        self, direction: mi.Vector3f, generator: mi.PCG32, active: mi.Bool
+        self,
+        direction: mi.Vector3f,
+        generator: mi.PCG32,
+        stream: mi.UInt32,
+        sample: mi.UInt32,
+        active: mi.Bool,
     ) -> tuple[mi.Float64, list[tuple[mi.UInt32, mi.Float, mi.Float64]]]:
         """One ray and its paths for each lane: sharp light; face, weight and light to share."""
         room, sky = self._room, self._sky
@@ -224,6 +240,7 @@ class _Kernel:
         opaque, glazed = active & (group == OPAQUE), active & (group != OPAQUE)
         glazed &= inside.to_local(group, direction, glazed).z > 1e-4
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
+        u, choice = lattice_2d(sample, stream, 0), lattice(sample, stream, 2)
 
         # ----- A surface: the sun's beam on it, and a path from it -----
         normal = dr.gather(mi.Vector3f, inside.normal, hit.prim_index, opaque)
@@ -233,13 +250,13 @@ class _Kernel:
         vertex = mi.Point3f(point + normal * inside.epsilon)
         sharp = mi.Float64(rho * sun_at(room, sky, vertex, normal, indoors, u_sun, opaque))
         sharp = dr.select(opaque, sharp, 0.0)
-        away, aimed = leave(room, sky, vertex, normal, indoors, generator, opaque)
+        away, aimed = leave(room, sky, vertex, normal, indoors, u, choice, opaque)
         cosine = dr.select(opaque, dr.dot(away, normal), 0.0)
 
         # ----- A window: the sun scattered in it, and a path through what scatters -----
         towards = on_disc(sky, u_sun)
         scattered, straight, mirrored, mirror, rest, onwards = window_parts(
-            room, group, direction, towards, generator, glazed
+            room, group, direction, towards, u, choice, glazed
         )
         step = inside.outward(group, glazed)
         outer, inner = mi.Point3f(point + step), mi.Point3f(point - step)
@@ -264,7 +281,7 @@ class _Kernel:
 
         # ----- Straight on, and back by the mirror -----
         if self._beams:
-            beam, light = self._outdoors(outer, direction, straight, generator, glazed)
+            beam, light = self._outdoors(outer, direction, straight, u, generator, glazed)
             sharp += beam
             shared.append(light)
         if self._mirrors:
@@ -288,6 +305,7 @@ class _Kernel:
         origin: mi.Point3f,
         direction: mi.Vector3f,
         straight: mi.Float,
+        u: mi.Point2f,
         generator: mi.PCG32,
         active: mi.Bool,
     ) -> tuple[mi.Float64, tuple[mi.UInt32, mi.Float, mi.Float64]]:
@@ -309,10 +327,10 @@ class _Kernel:
         normal = dr.select(behind, -normal, normal)
         vertex = mi.Point3f(origin + direction * hit.t + normal * room.inside.epsilon)
         rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, opaque) * dr.inv_pi
-        u = mi.Point2f(generator.next_float32(), generator.next_float32())
-        sun = sun_at(room, sky, vertex, normal, outdoors, u, opaque)
+        u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
+        sun = sun_at(room, sky, vertex, normal, outdoors, u_sun, opaque)
         sharp += dr.select(opaque, mi.Float64(straight * rho * sun), 0.0)
-        away, _ = leave(room, sky, vertex, normal, outdoors, generator, opaque)
+        away, _ = leave(room, sky, vertex, normal, outdoors, u, mi.Float(1), opaque)
         # a surface's irradiance is pi times the mean by cosine; another window is looked into
         found = dr.zeros(mi.Float64, dr.width(lane))
         add_paths(

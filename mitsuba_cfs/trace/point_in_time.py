@@ -16,7 +16,10 @@ from mitsuba_cfs.trace.sampling import path_generator
 from mitsuba_cfs.trace.scene import OPAQUE
 
 CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
-TO_WINDOW, TO_SUN = 0.5, 0.15  # shares of a room path's directions; the rest follows the cosine
+# Shares of a room path's directions that aim at windows and near the sun; the rest follows the
+# cosine.  After a reflection they must be few: weights grow by 1 / rest each time, and their mean
+# square stays finite only where rest > reflectance^2
+TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
 
 def _interaction(room: Room, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
@@ -87,22 +90,26 @@ def leave(
     position: mi.Point3f,
     normal: mi.Vector3f,
     outdoors: mi.Bool,
-    generator: mi.PCG32,
+    u: mi.Point2f,
+    choice: mi.Float,
     active: mi.Bool,
+    *,
+    later: bool = False,
 ) -> tuple[mi.Vector3f, mi.Bool]:
     """A direction from a diffuse vertex, and whether it aims at a window.
 
     Directions follow the cosine; in the room some aim at the windows and some round the sun.
+    `later`: fewer, as from a path's vertices after its first.
     """
-    u = mi.Point2f(generator.next_float32(), generator.next_float32())
-    choice = dr.select(outdoors, 1.0, generator.next_float32())
+    window_share, sun_share = TO_WINDOW[later], TO_SUN[later]
+    choice = dr.select(outdoors, 1.0, choice)
     cosine = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
     point, _ = room.inside.sample_window(u, active & ~outdoors)
     to_window = dr.normalize(mi.Vector3f(point - position))
     to_sun = mi.Frame3f(sky.sun).to_world(mi.warp.square_to_uniform_cone(u, CONE_COSINE))
-    aimed = choice < TO_WINDOW
+    aimed = choice < window_share
     direction = dr.select(aimed, to_window, cosine)
-    near_sun = ~aimed & (choice < TO_WINDOW + TO_SUN)
+    near_sun = ~aimed & (choice < window_share + sun_share)
     return dr.select(near_sun, to_sun, direction), aimed
 
 
@@ -113,6 +120,7 @@ def _density(
     direction: mi.Vector3f,
     distance: mi.Float,
     glass_cosine: mi.Float,  # of the window that was met, 0 for none
+    later: mi.Bool,
 ) -> mi.Float:
     """Density [1/sr] of the directions that `leave` gives in the room.
 
@@ -127,8 +135,9 @@ def _density(
     cone = dr.select(
         dr.dot(direction, sky.sun) > CONE_COSINE, 1 / (2 * np.pi * (1 - CONE_COSINE)), 0.0
     )
-    rest = 1 - TO_WINDOW - TO_SUN
-    return rest * cosine * dr.inv_pi + TO_WINDOW * window + TO_SUN * cone
+    window_share, sun_share = (dr.select(later, s[1], s[0]) for s in (TO_WINDOW, TO_SUN))
+    rest = 1 - window_share - sun_share
+    return rest * cosine * dr.inv_pi + window_share * window + sun_share * cone
 
 
 def window_parts(
@@ -136,7 +145,8 @@ def window_parts(
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
-    generator: mi.PCG32,
+    u: mi.Point2f,
+    choice: mi.Float,
     glazed: mi.Bool,
 ) -> tuple[mi.Float, mi.Float, mi.Float, mi.Vector3f, mi.Float, mi.Vector3f]:
     """What a window does to a ray along `direction` that meets it, from either side.
@@ -144,8 +154,6 @@ def window_parts(
     Returns: light scattered from the sun `towards` [1/sr, cosine included]; the straight beam's
     transmittance; the mirror's reflectance and direction; weight and direction of what scatters.
     """
-    u = mi.Point2f(generator.next_float32(), generator.next_float32())
-    choice = generator.next_float32()
     scattered, straight, mirrored, rest = (mi.Float(0) for _ in range(4))
     mirror, away = mi.Vector3f(direction), mi.Vector3f(direction)
     for g, system in enumerate(room.systems):
@@ -178,8 +186,9 @@ def _at_window(
 
     It takes the beam, the mirror or the rest in proportion to what each carries.
     """
+    u = mi.Point2f(generator.next_float32(), generator.next_float32())
     scattered, straight, mirrored, mirror, rest, away = window_parts(
-        room, group, direction, towards, generator, glazed
+        room, group, direction, towards, u, generator.next_float32(), glazed
     )
     whole = straight + mirrored + rest
     mark = generator.next_float32() * whole
@@ -233,7 +242,7 @@ def add_paths(
         active &= ~glazed | facing
         glazed &= facing
         glass_cosine = dr.select(glazed & ~outdoors, local.z, 0.0)
-        density = _density(room, sky, cosine, direction, t, glass_cosine)
+        density = _density(room, sky, cosine, direction, t, glass_cosine, depth > 0)
         beta *= dr.select(diffuse & ~outdoors, cosine / dr.maximum(density, 1e-12), 1.0)
         point = mi.Point3f(origin + direction * t)
 
@@ -263,7 +272,10 @@ def add_paths(
         vertex = mi.Point3f(point + face * room.inside.epsilon)
         sun = sun_at(room, sky, vertex, face, outdoors, u_sun, opaque)
         dr.scatter_add(result, mi.Float64(beta_face * sun), row, opaque)
-        away, aimed = leave(room, sky, vertex, face, outdoors, generator, opaque)
+        u_away = mi.Point2f(generator.next_float32(), generator.next_float32())
+        away, aimed = leave(
+            room, sky, vertex, face, outdoors, u_away, generator.next_float32(), opaque, later=True
+        )
         cosine = dr.select(opaque, dr.dot(away, face), 0.0)
         beta_face *= dr.select(outdoors, dr.pi, 1.0)  # outdoors the cosine cancels at once
 
@@ -324,7 +336,10 @@ def point_in_time(
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
         sun = sun_at(room, sky, origin, normal, outdoors, u, mi.Bool(True))
         dr.scatter_add(result, mi.Float64(sun), sensor)
-        away, aimed = leave(room, sky, origin, normal, outdoors, generator, mi.Bool(True))
+        u = mi.Point2f(generator.next_float32(), generator.next_float32())
+        away, aimed = leave(
+            room, sky, origin, normal, outdoors, u, generator.next_float32(), mi.Bool(True)
+        )
         cosine = dr.dot(away, normal)
         depth = dr.opaque(mi.UInt32, max_depth)
         add_paths(
