@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -125,6 +125,7 @@ def annual_glare(
     *,
     geometry: GlareView | None = None,
     options: GlareOptions | None = None,
+    illuminance: ArrayLike | None = None,
     threads: int | None = None,
     keep: Path | None = None,
     progress: Progress = silent,
@@ -133,24 +134,32 @@ def annual_glare(
 
     Args:
         geometry: of the pictures' view, where it is at hand.
+        illuminance: [H] at the eye from its own calculation, for DGP [lx]: with pictures of direct
+            light alone the result is eDGP.
         threads: pictures rated at a time; the processor's cores by default.
         keep: file of the ratings so far: a killed run goes on where it was.  The caller names it
             so that other inputs have another file.
     """
     geometry = geometry or GlareView(pictures.view)
     options = options or GlareOptions()
+    own = None if illuminance is None else np.asarray(illuminance, dtype=float)
+    if own is not None and own.shape != (pictures.hours,):
+        raise ValueError(
+            f"illuminance {own.shape}: expected one for each of {pictures.hours} hours"
+        )
     table = _begin(keep, pictures.hours)
     left = np.flatnonzero(np.isnan(table[:, 0]))
     size = max(1, BATCH_BYTES // (4 * max(1, len(pictures.pixels))))
 
-    def rated(values: NDArray[np.float32]) -> list[float]:
+    def rated(values: NDArray[np.float32], hour: int) -> list[float]:
         picture = full_picture(values, pictures.pixels, pictures.view)
-        return _figures(evaluate(picture, geometry, options=options))
+        known = options if own is None else replace(options, illuminance=float(own[hour]))
+        return _figures(evaluate(picture, geometry, options=known))
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for start in range(0, len(left), size):
             batch = left[start : start + size]
-            table[batch] = list(pool.map(rated, pictures.values(batch)))
+            table[batch] = list(pool.map(rated, pictures.values(batch), batch))
             _save(keep, table)
             progress("glare", (len(table) - len(left) + start + len(batch)) / len(table))
     return AnnualGlare(*table.T)

@@ -1,0 +1,1 @@
+"""What each method and metric costs on this machine."""
