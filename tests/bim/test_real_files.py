@@ -11,7 +11,7 @@ from bim.to_energyplus import write_epjson
 from bim.to_radiance import write_radiance
 from mitsuba_cfs.errors import DataError
 from tests.bim.test_exports import run_energyplus
-from tests.bim.test_to_radiance import SKY_ALL_ROUND, blackened, radiance, run, sky_share
+from tests.bim.test_to_radiance import SKY_ALL_ROUND, TRACE, blackened, radiance, run, sky_share
 
 __all__ = ["radiance"]  # a fixture
 FILES = {  # rooms, windows: counted by eye in the files' own lists of spaces and windows
@@ -91,14 +91,13 @@ def test_exported_rooms_are_dark_but_for_their_windows(real_data, tmp_path, radi
     for path in files.windows.values():
         black = path.read_text().replace("glow", "plastic").replace("4 1 1 1 0", "5 0 0 0 0 0")
         (tmp_path / f"shut_{path.name}").write_text(black)
-    trace = "rtrace -h -I -ab 1 -ad 8000 -lw 1e-9 {0}.oct < sensors.pts"
     shut = run(
-        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + trace.format("shut"),
+        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + TRACE.format("shut"),
         tmp_path, radiance,
     )  # fmt: skip
     assert np.all(np.array(shut.split(), dtype=float) == 0.0)
     lit = run(
-        "oconv materials.rad room.rad white.rad > open.oct && " + trace.format("open"),
+        "oconv materials.rad room.rad white.rad > open.oct && " + TRACE.format("open"),
         tmp_path, radiance,
     )  # fmt: skip
     irradiance = np.array(lit.split(), dtype=float).reshape(-1, 3)[:, 0]

@@ -22,6 +22,8 @@ WINDOWS = (
     WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=0.08),
     WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling"),
 )
+# no sharing of values between sensors; every ray counts, however dim
+TRACE = "rtrace -h -I -ab 1 -aa 0 -ad 50000 -lw 1e-9 {0}.oct < sensors.pts"
 SKY_ALL_ROUND = "void glow white 0 0 4 1 1 1 0\nwhite source all 0 0 4 0 0 1 360\n"
 
 
@@ -59,7 +61,7 @@ def blackened(text: str) -> str:
     return re.sub(r"5 [\d.]+ [\d.]+ [\d.]+ 0 0", "5 0 0 0 0 0", text)
 
 
-def sky_share(shell: np.ndarray, points: np.ndarray, rays: int = 20_000) -> np.ndarray:
+def sky_share(shell: np.ndarray, points: np.ndarray, rays: int = 100_000) -> np.ndarray:
     """Cosine-weighted share of the upper hemisphere [S] that misses the triangles [N, 3, 3]."""
     directions = hemisphere(np.array([0.0, 0.0, 1.0]), rays)
     mesh = ray_mesh(shell)
@@ -80,22 +82,21 @@ def test_room_is_dark_but_for_its_windows(tmp_path, radiance):
     for path in files.windows.values():
         black = path.read_text().replace("glow", "plastic").replace("4 1 1 1 0", "5 0 0 0 0 0")
         (tmp_path / f"shut_{path.name}").write_text(black)
-    trace = "rtrace -h -I -ab 1 -ad 8000 -lw 1e-9 {0}.oct < sensors.pts"
     shut = run(
-        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + trace.format("shut"),
+        "oconv materials.rad room.rad shut_*.rad white.rad > shut.oct && " + TRACE.format("shut"),
         tmp_path, radiance,
     )  # fmt: skip
     assert np.all(np.array(shut.split(), dtype=float) == 0.0)
     lit = run(
-        "oconv materials.rad room.rad white.rad > open.oct && " + trace.format("open"),
+        "oconv materials.rad room.rad white.rad > open.oct && " + TRACE.format("open"),
         tmp_path, radiance,
     )  # fmt: skip
     irradiance = np.array(lit.split(), dtype=float).reshape(-1, 3)[:, 0]
     points = np.loadtxt(files.sensors)[:, :3]
     faces = np.concatenate([face.triangles for face in space.faces])
     ours = np.pi * sky_share(faces, points)
-    # 3 %: 8000 ambient rays that see some 5 % of the hemisphere: sigma = 1 / sqrt(400) = 5 % for a
-    # random sample, a third of it for Radiance's stratified one; two sigma
+    # Radiance seeds by the clock: over 12 runs the darkest sensor spread by 0.7 %; ours is within
+    # 0.3 % of 2 million rays
     np.testing.assert_allclose(irradiance, ours, rtol=0.03, atol=0.002)
 
 
@@ -106,14 +107,15 @@ def test_rfluxmtx_takes_the_files_and_finds_the_form_factor(tmp_path, radiance):
     files.materials.write_text(blackened(files.materials.read_text()))
     points = np.loadtxt(files.sensors)[:, :3]
     view = run(
-        "oconv materials.rad room.rad > room.oct && rfluxmtx -fad -I+ -ab 1 -ad 20000 -lw 1e-9 "
+        "oconv materials.rad room.rad > room.oct && rfluxmtx -fad -I+ -ab 1 -ad 200000 -lw 1e-9 "
         f"-y {len(points)} - windows_S.rad -i room.oct < sensors.pts",
         tmp_path, radiance,
     )  # fmt: skip
     sums = matrix(view).sum(axis=1)
     exact = np.pi * np.array([window_factor(p, 0.58, 3.42, 0.98, 2.32) for p in points])
-    # 3 %: as above, 20000 rays
-    np.testing.assert_allclose(sums, exact, rtol=0.03)
+    # Radiance seeds by the clock: the darker of the two sensors spread by 0.39 % over 12 runs
+    # (1.6 % with 20000 rays): 6 sigma
+    np.testing.assert_allclose(sums, exact, rtol=0.024)
 
 
 def window_factor(point: np.ndarray, x0: float, x1: float, z0: float, z1: float) -> float:
