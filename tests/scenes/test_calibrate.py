@@ -1,0 +1,91 @@
+"""The choice of a method: the dissertation's rules on its own costs, and what a machine says."""
+
+from __future__ import annotations
+
+import pytest
+
+from mitsuba_cfs.errors import DataError
+from scenes.calibration.choice import ERRORS, Demand, choose
+from scenes.calibration.costs import Calibration, Cost, Work
+
+MINUTE, DAY = 60.0, 86400.0
+# Its Tables 5, 8 and 11 [min]; the five-phase sDGP is left out there
+THEIRS = {
+    ("three-phase", "DGP"): (30, 0, 0),
+    ("three-phase", "eDGP"): (4, 0, 0),
+    ("three-phase", "sDGP"): (1 / 3, 0, 0),
+    ("five-phase", "DGP"): (40, 300, 0),
+    ("five-phase", "eDGP"): (14, 305, 0),
+    ("point-in-time", "DGP"): (0, 0, 45),
+    ("point-in-time", "eDGP"): (0, 0, 1),
+    ("point-in-time", "sDGP"): (0, 0, 0.1),
+}
+THEIR_MACHINE = Calibration(
+    "28 cores", "2021", 800, {k: Cost(*(MINUTE * t for t in v)) for k, v in THEIRS.items()}
+)
+
+
+def asked(scenes=1, systems=1, steps=10, *, budget=30 * DAY, error=0.12, fine=True, mirror=False):
+    """The choice for so much work on the dissertation's machine."""
+    work = Work(scenes, systems, steps)
+    return choose(Demand(work, budget, error, fine, mirror), THEIR_MACHINE)
+
+
+@pytest.mark.parametrize(
+    ("work", "expected", "minutes"),
+    [
+        ({}, ("point-in-time", "eDGP"), 10),  # its case 1: few time steps
+        ({"steps": 3650}, ("five-phase", "DGP"), 340),  # case 2: many
+        ({"scenes": 3, "systems": 5}, ("point-in-time", "eDGP"), 150),  # case 3
+        ({"mirror": True}, ("point-in-time", "DGP"), 450),  # specular forces full pictures
+        ({"mirror": True, "budget": 60.0}, ("point-in-time", "DGP"), 450),  # whatever it takes
+        ({"fine": False, "error": 0.3}, ("three-phase", "DGP"), 30),  # no tensor tree
+        ({"error": 0.2, "budget": 120.0}, ("point-in-time", "sDGP"), 1),  # the clock decides
+    ],
+)
+def test_the_dissertations_rules(work, expected, minutes):
+    found = asked(**work)
+    assert (found.method, found.metric) == expected
+    assert found.seconds == pytest.approx(minutes * MINUTE)
+    assert found.error == ERRORS[expected]
+
+
+def test_the_reason_names_error_time_and_work():
+    why = asked(scenes=3, systems=5).why
+    for word in ("10 %", "12 %", "2.5 h", "720 h", "3 room(s) x 5 system(s) x 10 steps"):
+        assert word in why, why
+    assert "OVER" not in why and "NOT" not in why
+
+
+@pytest.mark.parametrize(
+    ("demand", "expected", "word"),
+    [
+        ({"budget": 5.0}, "three-phase", "OVER the time budget"),
+        ({"error": 0.05}, "point-in-time", "NOT the error asked for"),
+        ({"fine": False}, "three-phase", "NOT the error asked for"),
+    ],
+)
+def test_what_cannot_be_met_is_said(demand, expected, word):
+    found = asked(**demand)
+    assert found.method == expected and word in found.why
+
+
+def test_work_counts_each_part_as_often_as_it_comes():
+    assert Work(2, 3, 5).seconds(Cost(100.0, 10.0, 1.0)) == 2 * 100 + 6 * 10 + 30
+
+
+def test_a_calibration_survives_its_file(tmp_path):
+    path = tmp_path / "deep" / "calibration.json"
+    THEIR_MACHINE.write(path)
+    assert Calibration.read(path) == THEIR_MACHINE
+    half = THEIR_MACHINE.scaled(400)
+    assert half.costs["five-phase", "DGP"].system == pytest.approx(300 * MINUTE / 4)
+    assert half.costs["point-in-time", "sDGP"] == THEIR_MACHINE.costs["point-in-time", "sDGP"]
+
+
+def test_no_calibration_is_one_clear_line(tmp_path):
+    with pytest.raises(DataError, match="run `cfs calibrate`"):
+        Calibration.read(tmp_path / "none.json")
+    (tmp_path / "bad.json").write_text('{"machine": 1}')
+    with pytest.raises(DataError, match="is no calibration"):
+        Calibration.read(tmp_path / "bad.json")
