@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ OUTSIDE = {
 }
 THINNEST = 5e-4  # [m] thinner layers (paint, foils) take no part in the heat balance
 OFF_THE_WALL = 0.02  # [m] sensors stand this far before the outer face of a wall
+SAME_AREA = 0.02  # the two faces of a partition differ by this share at most
+OPPOSITE = -0.98  # cosine between their normals
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +35,7 @@ class ThermalRoom:
     outdoor: NDArray[np.int64]  # [N] surfaces that face outdoors
     outdoor_points: NDArray[np.float64]  # [N, 3] before their outer faces [m]
     outdoor_normals: NDArray[np.float64]  # [N, 3]
+    neighbours: tuple[str | None, ...] = ()  # [F] GUID of the room behind each surface
 
 
 def thermal_room(
@@ -49,15 +53,17 @@ def thermal_room(
     """
     groups: dict[tuple, list[int]] = {}
     for i, face in enumerate(space.faces):
-        key = (face.kind, face.adjacency, face.construction, *np.round(face.normal, 2))
+        key = (face.kind, face.adjacency, face.neighbour, face.construction)
+        key += tuple(np.round(face.normal, 2))
         groups.setdefault(key, []).append(i)
     surface_of_face = np.empty(len(space.faces), dtype=np.int64)
-    surfaces, points = [], []
+    surfaces, points, neighbours = [], [], []
     for number, members in enumerate(groups.values()):
         faces = [space.faces[i] for i in members]
         surface_of_face[members] = number
         surfaces.append(_surface(f"{faces[0].kind} {number + 1}", faces, ground_level))
         points.append(_outdoor_point(max(faces, key=lambda face: face.area)))
+        neighbours.append(faces[0].neighbour)
     outdoor = [i for i, surface in enumerate(surfaces) if surface.outside == "outdoor"]
     zone = Zone(
         space.name or space.guid,
@@ -74,7 +80,81 @@ def thermal_room(
         np.array(outdoor, dtype=np.int64),
         np.array([points[i] for i in outdoor]).reshape(-1, 3),
         np.array([surfaces[i].normal for i in outdoor]).reshape(-1, 3),
+        tuple(neighbours),
     )
+
+
+def coupled_rooms(
+    spaces: Sequence[Space], rooms: Sequence[ThermalRoom]
+) -> tuple[list[ThermalRoom], tuple[str, ...]]:
+    """The rooms with their shared walls as partitions that heat flows through.
+
+    A surface is joined to the one that lies opposite in the room behind it, of the same area
+    within 2 % (both then have the mean); the layers are those of the earlier room's side.  What
+    finds no partner, or borders on a room that is not among these, keeps its twin behind it.
+
+    Returns: the rooms, their zones under names that differ, and a sentence for every surface
+        whose other face was not found.
+    """
+    names = _unique([room.zone.name for room in rooms])
+    index = {space.guid: number for number, space in enumerate(spaces)}
+    surfaces = [list(room.zone.surfaces) for room in rooms]
+    notes = []
+    for a, room in enumerate(rooms):
+        for i, guid in enumerate(room.neighbours):
+            b = index.get(guid, -1) if guid else -1
+            one = surfaces[a][i]
+            if b < 0 or one.partner:
+                continue
+            j = _other_side(one, spaces[a].guid, surfaces[b], rooms[b].neighbours)
+            if j < 0:
+                notes.append(
+                    f"{names[a]}: {one.name} ({one.area:.1f} m2) has no other face in {names[b]}: "
+                    "the same room is taken to lie behind it."
+                )
+                continue
+            other = surfaces[b][j]
+            area = 0.5 * (one.area + other.area)
+            surfaces[a][i] = replace(one, area=area, outside=names[b], partner=other.name)
+            surfaces[b][j] = replace(other, area=area, outside=names[a], partner=one.name)
+    found = [
+        replace(room, zone=replace(room.zone, name=name, surfaces=tuple(own)))
+        for room, name, own in zip(rooms, names, surfaces, strict=True)
+    ]
+    return found, tuple(notes)
+
+
+def door_links(spaces: Sequence[Space], flow: float) -> NDArray[np.float64]:
+    """Air exchanged between rooms [Z, Z] [m3/s] through the open doors that join them.
+
+    flow: each way through one door [m3/s]; 0.65/3 w h sqrt(g h dT/T) by buoyancy, 0.1 for 1 K.
+    """
+    index = {space.guid: number for number, space in enumerate(spaces)}
+    doors = np.zeros((len(spaces), len(spaces)))
+    for a, space in enumerate(spaces):
+        joined = {
+            (face.neighbour, face.element)
+            for face in space.faces
+            if face.kind == "door" and face.neighbour in index
+        }
+        for neighbour, _ in joined:
+            doors[a, index[neighbour]] += 1.0
+    return flow * np.maximum(doors, doors.T)
+
+
+def _other_side(
+    one: OpaqueSurface,
+    room: str,
+    others: Sequence[OpaqueSurface],
+    neighbours: Sequence[str | None],
+) -> int:
+    """The surface of the room behind that is the other face, nearest in area; -1 for none."""
+    best, gap = -1, SAME_AREA * one.area
+    for j, (other, guid) in enumerate(zip(others, neighbours, strict=True)):
+        fits = guid == room and not other.partner and one.normal @ other.normal < OPPOSITE
+        if fits and abs(other.area - one.area) <= gap:
+            best, gap = j, abs(other.area - one.area)
+    return best
 
 
 def layers_of(construction: Construction) -> tuple[Layer, ...]:
@@ -115,12 +195,9 @@ def _outdoor_point(face: Face) -> NDArray[np.float64]:
 
 
 def _windows(space: Space, fenestration: Fenestration, ground_level: float) -> list[WindowElement]:
-    names: dict[str, int] = {}
+    labels = _unique([window.name or window.guid for window in space.windows])
     windows = []
-    for window in space.windows:
-        label = window.name or window.guid
-        names[label] = names.get(label, 0) + 1
-        label = label if names[label] == 1 else f"{label} ({names[label]})"
+    for window, label in zip(space.windows, labels, strict=True):
         corners = window.triangles.reshape(-1, 3)
         slope = np.sqrt(max(1.0 - window.normal[2] ** 2, 1e-6))
         rise = float(np.ptp(corners[:, 2])) / slope
@@ -135,3 +212,13 @@ def _windows(space: Space, fenestration: Fenestration, ground_level: float) -> l
             )
         )
     return windows
+
+
+def _unique(labels: Sequence[str]) -> list[str]:
+    """Labels with a number behind those that come again."""
+    seen: dict[str, int] = {}
+    found = []
+    for label in labels:
+        seen[label] = seen.get(label, 0) + 1
+        found.append(label if seen[label] == 1 else f"{label} ({seen[label]})")
+    return found

@@ -53,11 +53,13 @@ def room_light(
     exterior = exterior_surfaces(building, space, "solar")
     groups = window_groups(space)
     options = _options(trace)
-    daylight = daylight_matrix(
-        exterior, groups, subdivision=trace.sky_subdivision,
-        progress=part(progress, 0.0, 0.7, "sun"), **options,
-    )  # fmt: skip
-    incident = phases.window_radiance(daylight.values, skies.solar) * omega[:, None]
+    incident = np.zeros((0, len(omega), skies.solar.shape[1]))
+    if groups:
+        daylight = daylight_matrix(
+            exterior, groups, subdivision=trace.sky_subdivision,
+            progress=part(progress, 0.0, 0.7, "sun"), **options,
+        )  # fmt: skip
+        incident = phases.window_radiance(daylight.values, skies.solar) * omega[:, None]
     facade = np.zeros((skies.hours, len(room.zone.surfaces)))
     if len(room.outdoor):
         matrix = sky_irradiance_matrix(
@@ -81,6 +83,9 @@ def state_solar(
     progress: Progress,
 ) -> Solar:
     """The sun's work in one shading state [H]."""
+    if not light.groups:
+        dark = np.zeros((skies.hours, 0))
+        return Solar(dark, dark, np.zeros((skies.hours, surfaces)), light.facade)
     omega = system.solar.basis_in.projected_solid_angles()
     groups, group = light.groups, light.group_of_window
     back = np.full(len(groups), thermal.back_reflectance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,19 +12,22 @@ from numpy.typing import NDArray
 from bim.model import Building, Construction, MaterialLayer, Space
 from bim.read_ifc import read_ifc
 from bim.shoebox import WindowRectangle, shoebox
-from bim.to_thermal import ThermalRoom, thermal_room
+from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, thermal_room
 from mitsuba_cfs import variants
 from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.matrix import sky_matrix, sun_up
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_solar
-from scenes.heat.study_file import BoxTable, ComfortTable, StudyFile, SystemTable
+from scenes.heat.study_file import BoxTable, StudyFile, SystemTable
+from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.daylight import Skies
 from scenes.job.inputs import System, chosen_spaces, read_system, read_weather
 from scenes.job.thermal import ThermalSystem, climate, thermal_system
-from thermal.balance import ZoneResult, simulate
+from thermal.balance import ZoneResult, simulate_zones
 from thermal.blackbox import (
     Fenestration,
     layer_absorptances,
@@ -31,16 +35,6 @@ from thermal.blackbox import (
     with_realised_films,
 )
 from thermal.climate import Solar
-from thermal.comfort import (
-    ADAPTIVE_BANDS,
-    adaptive_comfort,
-    hours_between,
-    pmv_ppd,
-    running_mean,
-    running_mean_en16798,
-    standard_effective_temperature,
-    summarise,
-)
 from thermal.control import (
     always,
     by_cut_off,
@@ -66,20 +60,81 @@ class RoomYear:
     months: pd.DataFrame  # discomfort in the occupied hours, by band and month
 
 
+@dataclass(frozen=True, slots=True)
+class ReadyRoom:
+    """A room traced and controlled: all that its heat balance needs."""
+
+    space: Space
+    zone: Zone
+    solar: Solar
+    state: NDArray[np.int64]  # [H] shading state
+    daylight: FloatArray | None  # [H] mean on the work plane [lx]
+    radiant: RadiantRoom | None
+
+
 def run_study(study: StudyFile, progress: Progress) -> tuple[list[RoomYear], tuple[str, ...]]:
     """The rooms of a study, and what had to be assumed."""
     weather = read_weather(study.weather)
     systems = [read_system(s.bsdf, u_value=s.u_value, g_value=s.g_value) for s in study.system]
     thermals = [state_of(s, t) for s, t in zip(systems, study.system, strict=True)]
     building, spaces = rooms_of(study)
+    zones = [thermal_room(space, thermals[0].fenestration) for space in spaces]
+    notes = dict.fromkeys(note for t in (*systems, *thermals) for note in t.notes)
+    if study.couple:
+        zones, unpaired = coupled_rooms(spaces, zones)
+        notes |= dict.fromkeys(unpaired)
     variants.activate()
     skies = _skies(weather, study)
-    rooms = []
-    for i, space in enumerate(spaces):
-        share = part(progress, i / len(spaces), (i + 1) / len(spaces))
-        rooms.append(_room_year(study, building, space, systems, thermals, weather, skies, share))
-    notes = {note: None for t in (*systems, *thermals) for note in t.notes}
-    return rooms, tuple(notes)
+    ready = []
+    for i, (space, zone) in enumerate(zip(spaces, zones, strict=True)):
+        share = part(progress, 0.9 * i / len(spaces), 0.9 * (i + 1) / len(spaces))
+        room = ready_room(study, building, space, zone, systems, thermals, weather, skies, share)
+        ready.append(room)
+        if room.radiant is None and study.trace.view_factors:
+            notes[f"{zone.zone.name}: is not closed, its longwave goes through a mean star."] = None
+    results = balances(study, ready, weather, part(progress, 0.9, 1.0))
+    years = [
+        RoomYear(
+            room.zone.name,
+            room.space.floor_area,
+            hourly_table(result, room.state, room.daylight, weather, study.comfort),
+            *year_summary(result, weather, study),
+        )
+        for room, result in zip(ready, results, strict=True)
+    ]
+    return years, tuple(notes)
+
+
+def balances(
+    study: StudyFile, rooms: list[ReadyRoom], weather: Weather, progress: Progress
+) -> list[ZoneResult]:
+    """The rooms' years: together where the study couples them, else one by one."""
+    outdoors, step_s = climate(weather), 60.0 * study.step_minutes
+    if study.couple:
+        progress("heat balance", 0.0)
+        links = door_links([r.space for r in rooms], study.air.door_m3_s)
+        found = list(
+            simulate_zones(
+                [r.zone for r in rooms], outdoors, [r.solar for r in rooms], step_s=step_s,
+                air_links=links,
+            )
+        )  # fmt: skip
+    else:
+        found = []
+        for number, room in enumerate(rooms):
+            progress("heat balance", number / len(rooms))
+            found += simulate_zones([room.zone], outdoors, [room.solar], step_s=step_s)
+    progress("heat balance", 1.0)
+    person = study.comfort
+    return [
+        felt(result, room.radiant, person.mean_radiant, _floor(room.zone), person.air_speed)
+        for room, result in zip(rooms, found, strict=True)
+    ]
+
+
+def _floor(zone: Zone) -> int:
+    """The biggest of the surfaces that face up."""
+    return int(np.argmax([-s.normal[2] * s.area for s in zone.surfaces]))
 
 
 def state_of(system: System, table: SystemTable) -> ThermalSystem:
@@ -118,7 +173,19 @@ def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
         building = box_building(study.box)
         return building, list(building.spaces)
     building = read_ifc(study.building)
+    if study.couple:
+        return building, coupled_spaces(building, study.spaces, study.building)
     return building, chosen_spaces(building, study.spaces, study.building)
+
+
+def coupled_spaces(building: Building, names: tuple[str, ...], path: Path) -> list[Space]:
+    """The rooms of those names or GUIDs, or all: rooms without windows take part too."""
+    if not names:
+        return list(building.spaces)
+    try:
+        return list({s.guid: s for s in map(building.space, names)}.values())
+    except (KeyError, ValueError) as error:
+        raise DataError(str(error.args[0]), file=path, field="spaces") from error
 
 
 def box_building(box: BoxTable) -> Building:
@@ -153,44 +220,41 @@ def _skies(weather: Weather, study: StudyFile) -> Skies:
     return Skies(visible, solar, np.flatnonzero(sun_up(weather)), len(weather.times))
 
 
-def _room_year(
+def ready_room(
     study: StudyFile,
     building: Building,
     space: Space,
+    room: ThermalRoom,
     systems: list[System],
     thermals: list[ThermalSystem],
     weather: Weather,
     skies: Skies,
     progress: Progress,
-) -> RoomYear:
-    label = space.name or space.guid
-    room = thermal_room(space, thermals[0].fenestration)
+) -> ReadyRoom:
+    """Trace a room in all its shading states, choose the state of every hour."""
+    label, trace = room.zone.name, study.trace
     omega = systems[0].solar.basis_in.projected_solid_angles()
-    light = room_light(
-        building, space, room, skies, omega, study.trace, part(progress, 0.0, 0.4, label)
-    )
+    light = room_light(building, space, room, skies, omega, trace, part(progress, 0.0, 0.4, label))
     surfaces = len(room.zone.surfaces)
     suns = []
     for j, (system, thermal) in enumerate(zip(systems, thermals, strict=True)):
         steps = part(progress, 0.4 + 0.4 * j / len(systems), 0.4 + 0.4 * (j + 1) / len(systems))
-        suns.append(state_solar(light, system, thermal, skies, surfaces, study.trace, steps))
+        suns.append(state_solar(light, system, thermal, skies, surfaces, trace, steps))
     plane, eye = None, None
-    if study.control.rule == "glare" or study.gains.lighting_w_m2 > 0:
+    lamps = study.gains.lighting_w_m2 > 0
+    if space.windows and (study.control.rule == "glare" or lamps):
         plane, eye = illuminances(
-            building, space, systems, skies, study.trace, part(progress, 0.8, 1.0, label)
+            building, space, systems, skies, trace, part(progress, 0.8, 1.0, label)
         )
     state = _states(study, space, light, weather, eye)
     daylight = None if plane is None else plane[state, np.arange(len(state))]
-    zone = _zone(study, room, space, thermals, daylight)
-    solar: Solar = switched(suns, state)
-    result = simulate(zone, climate(weather), solar, step_s=60.0 * study.step_minutes)
-    progress(label, 1.0)
-    return RoomYear(
-        label,
-        space.floor_area,
-        _hours(result, solar, state, daylight, weather, study.comfort),
-        *_summary(result, weather, study),
-    )
+    radiant = None
+    if trace.view_factors:
+        radiant = radiant_room(space, room, samples=trace.patch_samples, seed=trace.seed)
+    zone = _zone(study, room, space, thermals, len(state), daylight)
+    if radiant is not None:
+        zone = replace(zone, view_factors=radiant.among)
+    return ReadyRoom(space, zone, switched(suns, state), state, daylight, radiant)
 
 
 def _states(
@@ -198,6 +262,8 @@ def _states(
 ) -> NDArray[np.int64]:
     """The shading state of every hour [H]."""
     control, hours = study.control, len(weather.times)
+    if not space.windows:
+        return always(0, hours)
     if control.rule == "schedule":
         return by_schedule(control.schedule, hours)
     brightest = light.irradiance.max(axis=1)
@@ -220,16 +286,15 @@ def _zone(
     room: ThermalRoom,
     space: Space,
     thermals: list[ThermalSystem],
+    hours: int,
     daylight: FloatArray | None,
 ) -> Zone:
     """The room's zone with the study's states, gains, air and set points."""
     gains, air, loads = study.gains, study.air, study.loads
-    hours = 8760 if daylight is None else len(daylight)
     present = work_hours(*gains.occupied, hours=hours)
     power = gains.equipment_w_m2 * space.floor_area + gains.persons * gains.person_w
-    lamps = np.zeros(hours)
-    if gains.lighting_w_m2 > 0 and daylight is not None:
-        lamps = gains.lighting_w_m2 * space.floor_area * present
+    lamps = gains.lighting_w_m2 * space.floor_area * present
+    if daylight is not None:
         lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
     states = tuple(t.fenestration for t in thermals)
     windows = tuple(
@@ -251,64 +316,3 @@ def _zone(
             loads.cooling_limit_w or infinity,
         ),
     )
-
-
-def _hours(
-    result: ZoneResult,
-    solar: Solar,
-    state: NDArray[np.int64],
-    daylight: FloatArray | None,
-    weather: Weather,
-    person: ComfortTable,
-) -> pd.DataFrame:
-    about = person.model_dump()
-    pmv, ppd = pmv_ppd(result.air_c, result.mrt_c, **about)
-    table = {
-        "outdoor_c": weather.dry_bulb_c,
-        "air_c": result.air_c,
-        "mrt_c": result.mrt_c,
-        "operative_c": result.operative_c,
-        "pmv": pmv,
-        "ppd": ppd,
-        "set_c": standard_effective_temperature(result.air_c, result.mrt_c, **about),
-        "heating_w": result.heating,
-        "cooling_w": result.cooling,
-        "shading_state": state,
-    }
-    if daylight is not None:
-        table["daylight_lx"] = daylight
-    for i in range(result.window_inner_c.shape[1]):
-        table[f"window_{i + 1}_inside_c"] = result.window_inner_c[:, i]
-        table[f"window_{i + 1}_outside_c"] = result.window_outer_c[:, i]
-    for name, flow in result.heat_flow.items():
-        table[f"{name.replace(' ', '_')}_w"] = flow
-    return pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
-
-
-def _summary(
-    result: ZoneResult, weather: Weather, study: StudyFile
-) -> tuple[dict[str, float], pd.DataFrame]:
-    occupied = hours_between(*study.gains.occupied, hours=len(result.air_c))
-    month = weather.midpoints.month.to_numpy()
-    found = {
-        "heating_kwh": result.heating.sum() / 1e3,
-        "cooling_kwh": result.cooling.sum() / 1e3,
-        "peak_heating_w": result.heating.max(),
-        "peak_cooling_w": result.cooling.max(),
-        "operative_min_c": result.operative_c.min(),
-        "operative_max_c": result.operative_c.max(),
-    }
-    means = {
-        "ASHRAE": running_mean(weather.dry_bulb_c),
-        "EN": running_mean_en16798(weather.dry_bulb_c),
-    }
-    months = {}
-    for band in ADAPTIVE_BANDS:
-        comfort = adaptive_comfort(result.operative_c, means[band.split()[0]], band)
-        counted = summarise(comfort, occupied, month)
-        found[f"comfortable_h {band}"] = counted.comfortable
-        months[f"{band} [h]"] = counted.discomfort_by_month
-        found[f"degree_hours_warm {band}"] = counted.degree_hours_warm
-        found[f"degree_hours_cold {band}"] = counted.degree_hours_cold
-    table = pd.DataFrame(months, index=pd.RangeIndex(1, 13, name="month"))
-    return {key: float(value) for key, value in found.items()}, table

@@ -97,6 +97,8 @@ class AirTable(_Table):
     infiltration_ach: Annotated[float, Field(ge=0)] = 0.5
     night_ach: Annotated[float, Field(ge=0)] = 0.0  # more of it in these hours
     night: Hours = (0, 7)
+    # each way through every open door between coupled rooms [m3/s]; 0: the doors are shut
+    door_m3_s: Annotated[float, Field(ge=0)] = 0.0
 
 
 class LoadsTable(_Table):
@@ -115,6 +117,7 @@ class ComfortTable(_Table):
     clothing: Annotated[float, Field(ge=0, le=2)] = 0.7  # [clo]
     air_speed: Annotated[float, Field(ge=0, le=2)] = 0.1  # [m/s]
     humidity: Annotated[float, Field(ge=0, le=100)] = 50.0  # relative, indoors [%]
+    mean_radiant: Literal["view factors", "room centre", "area"] = "view factors"
 
 
 class TraceTable(_Table):
@@ -124,6 +127,7 @@ class TraceTable(_Table):
     sensor_samples: Annotated[int, Field(ge=64)] = 16384
     sky_subdivision: Literal[1, 2, 4, 6] = 1
     seed: int = 0
+    view_factors: bool = True  # of the room's surfaces, for longwave and the person
 
 
 class StudyFile(_Table):
@@ -132,6 +136,7 @@ class StudyFile(_Table):
     weather: Path
     building: Path | None = None
     spaces: tuple[str, ...] = ()
+    couple: bool = False  # heat flows through the walls between the rooms
     box: BoxTable | None = None
     system: Annotated[tuple[SystemTable, ...], Field(min_length=1)]
     control: ControlTable = ControlTable()

@@ -49,13 +49,39 @@ def room_model(system: str, orientation: str, *, steps: int = 6, hourly: bool = 
     model = _control(ORIENTATIONS[orientation] - 180.0, steps)
     model |= _constructions() | _surfaces() | _gains()
     model |= _shading(system)
-    if hourly:
-        names = sorted({key.split(":", 1)[1] for key in OUTPUTS})
-        model["Output:Variable"] = {
+    return model | hourly_outputs(OUTPUTS) if hourly else model
+
+
+def hourly_outputs(outputs: dict[str, str]) -> Model:
+    """The request for some outputs of every hour."""
+    names = sorted({key.split(":", 1)[1] for key in outputs})
+    return {
+        "Output:Variable": {
             f"out {i}": {"key_value": "*", "variable_name": name, "reporting_frequency": "Hourly"}
             for i, name in enumerate(names)
         }
-    return model
+    }
+
+
+def detailed_surface(
+    kind: str, construction: str, zone: str, outside: str, vertices: list, partner: str = ""
+) -> dict[str, Any]:
+    """A surface; `outside` is "Outdoors", "Adiabatic" or "Surface" (then `partner` is its name)."""
+    outdoors = outside == "Outdoors"
+    surface = {
+        "surface_type": kind,
+        "construction_name": construction,
+        "zone_name": zone,
+        "outside_boundary_condition": outside,
+        "sun_exposure": "SunExposed" if outdoors else "NoSun",
+        "wind_exposure": "WindExposed" if outdoors else "NoWind",
+        "view_factor_to_ground": "Autocalculate",
+        "vertices": [
+            {f"vertex_{axis}_coordinate": c for axis, c in zip("xyz", v, strict=True)}
+            for v in vertices
+        ],
+    }
+    return surface | ({"outside_boundary_condition_object": partner} if partner else {})
 
 
 def _control(north_axis: float, steps: int) -> Model:
@@ -196,20 +222,9 @@ def _construction(layers: list[str]) -> dict[str, Any]:
 def _surfaces() -> Model:
     walls: dict[str, dict[str, Any]] = {}
     for name, (kind, vertices) in _BOX.items():
-        facade = name == "FACADE"
-        walls[name] = {
-            "surface_type": kind,
-            "construction_name": name if name in ("FACADE", "FLOOR", "CEILING") else "WALL",
-            "zone_name": "ROOM",
-            "outside_boundary_condition": "Outdoors" if facade else "Adiabatic",
-            "sun_exposure": "SunExposed" if facade else "NoSun",
-            "wind_exposure": "WindExposed" if facade else "NoWind",
-            "view_factor_to_ground": "Autocalculate",
-            "vertices": [
-                {f"vertex_{axis}_coordinate": c for axis, c in zip("xyz", v, strict=True)}
-                for v in vertices
-            ],
-        }
+        construction = name if name in ("FACADE", "FLOOR", "CEILING") else "WALL"
+        outside = "Outdoors" if name == "FACADE" else "Adiabatic"
+        walls[name] = detailed_surface(kind, construction, "ROOM", outside, vertices)
     window = {
         "surface_type": "Window",
         "construction_name": "GLAZING",
@@ -341,8 +356,13 @@ def _blind() -> dict[str, Any]:
     return slat | {f"blind_{s}_side_opening_multiplier": 1.0 for s in ("left", "right")}
 
 
-def run_energyplus(model: Model, epw: Path, folder: Path | None = None) -> pd.DataFrame:
-    """Hourly results [H rows] of EnergyPlus' own run, columns as in the reference set."""
+def run_energyplus(
+    model: Model, epw: Path, folder: Path | None = None, *, outputs: dict[str, str] | None = None
+) -> pd.DataFrame:
+    """Hourly results [H rows] of EnergyPlus' own run, columns as in the reference set.
+
+    outputs: columns by EnergyPlus' name of an output ("KEY:Variable"); the reference set's without.
+    """
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary) if folder is None else folder
         place.mkdir(parents=True, exist_ok=True)
@@ -364,17 +384,17 @@ def run_energyplus(model: Model, epw: Path, folder: Path | None = None) -> pd.Da
         if done.returncode != 0:
             text = report.read_text() if report.exists() else done.stderr
             raise RuntimeError(f"EnergyPlus stopped: {text[-1500:]}")
-        return _read(place / "eplusout.csv")
+        return _read(place / "eplusout.csv", OUTPUTS if outputs is None else outputs)
 
 
-def _read(path: Path) -> pd.DataFrame:
+def _read(path: Path, outputs: dict[str, str]) -> pd.DataFrame:
     table = pd.read_csv(path)
     columns = {}
     for column in table.columns:
         bare = column.split(" [")[0].strip()
-        if bare in OUTPUTS:
-            columns[OUTPUTS[bare]] = table[column].to_numpy(dtype=float)
-    missing = sorted(set(OUTPUTS.values()) - set(columns))
+        if bare in outputs:
+            columns[outputs[bare]] = table[column].to_numpy(dtype=float)
+    missing = sorted(set(outputs.values()) - set(columns))
     if missing:
         raise RuntimeError(f"EnergyPlus wrote no {', '.join(missing)}")
     return pd.DataFrame(columns)

@@ -1,0 +1,85 @@
+"""The year of a room as tables: every hour, sums and comfort, discomfort by month."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mitsuba_cfs.sky.weather import Weather
+from scenes.heat.study_file import ComfortTable, StudyFile
+from thermal.balance import ZoneResult
+from thermal.comfort import (
+    ADAPTIVE_BANDS,
+    adaptive_comfort,
+    hours_between,
+    pmv_ppd,
+    running_mean,
+    running_mean_en16798,
+    standard_effective_temperature,
+    summarise,
+)
+
+FloatArray = NDArray[np.float64]
+
+
+def hourly_table(
+    result: ZoneResult,
+    state: NDArray[np.int64],
+    daylight: FloatArray | None,
+    weather: Weather,
+    person: ComfortTable,
+) -> pd.DataFrame:
+    """Temperatures, votes, loads, state and heat flows by hour."""
+    about = person.model_dump(exclude={"mean_radiant"})
+    pmv, ppd = pmv_ppd(result.air_c, result.mrt_c, **about)
+    table = {
+        "outdoor_c": weather.dry_bulb_c,
+        "air_c": result.air_c,
+        "mrt_c": result.mrt_c,
+        "operative_c": result.operative_c,
+        "pmv": pmv,
+        "ppd": ppd,
+        "set_c": standard_effective_temperature(result.air_c, result.mrt_c, **about),
+        "heating_w": result.heating,
+        "cooling_w": result.cooling,
+        "shading_state": state,
+    }
+    if daylight is not None:
+        table["daylight_lx"] = daylight
+    for i in range(result.window_inner_c.shape[1]):
+        table[f"window_{i + 1}_inside_c"] = result.window_inner_c[:, i]
+        table[f"window_{i + 1}_outside_c"] = result.window_outer_c[:, i]
+    for name, flow in result.heat_flow.items():
+        table[f"{name.replace(' ', '_')}_w"] = flow
+    return pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
+
+
+def year_summary(
+    result: ZoneResult, weather: Weather, study: StudyFile
+) -> tuple[dict[str, float], pd.DataFrame]:
+    """Energy, peaks and comfort of the occupied hours, and their discomfort by month."""
+    occupied = hours_between(*study.gains.occupied, hours=len(result.air_c))
+    month = weather.midpoints.month.to_numpy()
+    found = {
+        "heating_kwh": result.heating.sum() / 1e3,
+        "cooling_kwh": result.cooling.sum() / 1e3,
+        "peak_heating_w": result.heating.max(),
+        "peak_cooling_w": result.cooling.max(),
+        "operative_min_c": result.operative_c.min(),
+        "operative_max_c": result.operative_c.max(),
+    }
+    means = {
+        "ASHRAE": running_mean(weather.dry_bulb_c),
+        "EN": running_mean_en16798(weather.dry_bulb_c),
+    }
+    months = {}
+    for band in ADAPTIVE_BANDS:
+        comfort = adaptive_comfort(result.operative_c, means[band.split()[0]], band)
+        counted = summarise(comfort, occupied, month)
+        found[f"comfortable_h {band}"] = counted.comfortable
+        months[f"{band} [h]"] = counted.discomfort_by_month
+        found[f"degree_hours_warm {band}"] = counted.degree_hours_warm
+        found[f"degree_hours_cold {band}"] = counted.degree_hours_cold
+    table = pd.DataFrame(months, index=pd.RangeIndex(1, 13, name="month"))
+    return {key: float(value) for key, value in found.items()}, table
