@@ -185,6 +185,13 @@ def through_beams(
     return result
 
 
+def patch_beams(scattering: Sequence[Scattering | None], basis: KlemsBasis) -> NDArray[np.float64]:
+    """Transmittance of each group's straight beam at the middles of the basis' patches [G, K]."""
+    middles = mi.Vector3f(basis.incident_directions().T.astype(np.float32))
+    beams = [0.0 if way is None else way.through(middles).numpy() for way in scattering]
+    return np.stack([np.broadcast_to(beam, basis.size) for beam in beams]).astype(float)
+
+
 def _window_points(
     inside: TracedScene,
     outside: TracedScene,
