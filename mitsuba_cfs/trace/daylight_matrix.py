@@ -15,6 +15,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
@@ -135,6 +136,7 @@ def sky_irradiance_matrix(
     directions: ArrayLike,
     *,
     subdivision: int = 4,
+    acceptance: ArrayLike | None = None,
     samples: int = 16384,
     max_depth: int = 16,
     stopping: Stopping | None = None,
@@ -150,12 +152,16 @@ def sky_irradiance_matrix(
 
     Args:
         points, directions: [S, 3] sensor positions [m] and normals.
+        acceptance: what the sensor takes up of light at even steps from normal to grazing
+            incidence, 0 to 90 degrees; all of it by default.
+        max_depth: 1 leaves the sky that the sensor sees itself.
         samples: paths for each sensor in each batch.
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
     tracer = TracedScene(surfaces, centre=points.mean(axis=0))
     sky = SkyBins(ReinhartSky(subdivision))
+    accepted = AcceptedDirections(acceptance)
     S, P, n = len(points), sky.size, int(samples)
     place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
     normal = mi.Vector3f(directions.T.astype(np.float32))
@@ -167,7 +173,7 @@ def sky_irradiance_matrix(
         sensor = path // count
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
         stream = mi.sample_tea_32(sensor, key)[0]
-        local = mi.warp.square_to_cosine_hemisphere(lattice_2d(path - sensor * count, stream, 0))
+        local = accepted.sample(lattice_2d(path - sensor * count, stream, 0))
         _daylight_kernel(
             tracer,
             sky,
@@ -179,7 +185,7 @@ def sky_irradiance_matrix(
             dr.opaque(mi.UInt32, max_depth),
             mi.Bool(True),
         )
-        return matrix.numpy().reshape(S, P) * (np.pi / n)
+        return matrix.numpy().reshape(S, P) * (accepted.total / n)
 
     return accumulate(
         batch,
@@ -187,7 +193,8 @@ def sky_irradiance_matrix(
         label="sky irradiance",
         progress=progress,
         entry=cache_entry(
-            cache, "sky irradiance", surfaces, points, directions, subdivision, n, max_depth,
+            cache, "sky irradiance", surfaces, points, directions, subdivision,
+            () if acceptance is None else np.asarray(acceptance, dtype=float), n, max_depth,
             seed, stopping=stopping,
         ),
     )  # fmt: skip
