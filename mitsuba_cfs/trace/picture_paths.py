@@ -336,7 +336,8 @@ class _Kernel:
         add_paths(
             room, sky, found, lane, dr.select(opaque, vertex, origin),
             dr.select(opaque, away, direction), mi.Float(0), mi.Bool(False),
-            dr.select(opaque, dr.pi, 1.0), mi.PCG32(generator), self._depth, active, outdoors,
+            dr.select(opaque, dr.pi, 1.0), mi.PCG32(generator), self._depth,
+            mi.Bool(active), outdoors,  # a copy: the loop changes what it is given
         )  # fmt: skip
         face = self._faces.outside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(self._faces.windows - 1))

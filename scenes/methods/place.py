@@ -54,7 +54,7 @@ class Fenestration:
 
 
 def fenestration(coarse: KlemsBsdf, fine: Bsdf | None = None) -> Fenestration:
-    """A system known by Klems matrices, and by a tensor tree for sun and paths where there is one."""
+    """A system by Klems matrices, and by a tensor tree for sun and paths where there is one."""
     from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 
     fine = fine or coarse
