@@ -23,7 +23,12 @@ def interior_surfaces(space: Space, band: str = "visible") -> Surfaces:
 def exterior_surfaces(building: Building, space: Space, band: str = "visible") -> Surfaces:
     """What stands outdoors before a room's windows: every element but those windows themselves."""
     own = {window.guid for window in space.windows}
-    return _surfaces((e for e in building.elements if e.guid not in own), band)
+    return element_surfaces((e for e in building.elements if e.guid not in own), band)
+
+
+def element_surfaces(elements: Iterable[Element], band: str = "visible") -> Surfaces:
+    """What stands outdoors; surface i is element i."""
+    return _surfaces(elements, band)
 
 
 def _surfaces(parts: Iterable[Face | Element], band: str) -> Surfaces:

@@ -54,11 +54,11 @@ class Corrections:
         """STEP ids of the products that are not to be read."""
         gone: set[int] = set()
         for query in self.leave_out:
-            gone |= self._chosen(model, query)
+            gone |= chosen(model, query, self.file)
         if self.only:
             kept: set[int] = set()
             for query in self.only:
-                kept |= self._chosen(model, query)
+                kept |= chosen(model, query, self.file)
             openings = {one.id() for one in model.by_type("IfcOpeningElement")}
             gone |= {one.id() for one in model.by_type("IfcProduct")} - kept - openings
         return gone
@@ -67,17 +67,19 @@ class Corrections:
         """Visible and solar reflectance by STEP id; later entries win."""
         result: dict[int, tuple[float, float]] = {}
         for paint in self.paints:
-            for step_id in self._chosen(model, paint.select):
+            for step_id in chosen(model, paint.select, self.file):
                 result[step_id] = (paint.visible, paint.solar)
         return result
 
-    def _chosen(self, model: ifcopenshell.file, query: str) -> set[int]:
-        try:
-            found = ifcopenshell.util.selector.filter_elements(model, query)
-        except Exception as error:  # the selector's parser raises many types
-            reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
-            raise DataError(reason, file=self.file or None, field=query) from None
-        return {element.id() for element in found}
+
+def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[int]:
+    """STEP ids of the elements that a selector chooses; `DataError` where it is none."""
+    try:
+        found = ifcopenshell.util.selector.filter_elements(model, query)
+    except Exception as error:  # the selector's parser raises many types
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
+        raise DataError(reason, file=file or None, field=query) from None
+    return {element.id() for element in found}
 
 
 def corrections_beside(model_path: str | Path) -> Corrections:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from pathlib import Path
 
 import click
@@ -24,7 +22,7 @@ def command(study: Path, out: Path) -> None:
     from scenes.commands.progress_bar import ProgressBar
     from scenes.heat.study import run_study
     from scenes.heat.study_file import read_study
-    from scenes.job.outputs import check_folder
+    from scenes.result_folder import check_folder
 
     parsed = read_study(study)
     check_folder(out)
@@ -45,29 +43,20 @@ def command(study: Path, out: Path) -> None:
 
 
 def _write(rooms, notes: tuple[str, ...], study, out: Path) -> None:
-    """All files, to a temporary folder that takes its name when all is there."""
+    """All files of a study."""
     import pandas as pd
 
-    from scenes.job.outputs import MARK
+    from scenes.result_folder import MARK, result_folder
 
-    target = out.absolute()
-    temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        temporary.chmod(0o755)
+    with result_folder(out) as folder:
         for number, room in enumerate(rooms, 1):
             name = "hours.csv" if len(rooms) == 1 else f"hours_{number}.csv"
-            room.hours.round(4).to_csv(temporary / name)
+            room.hours.round(4).to_csv(folder / name)
         table = pd.DataFrame(
             [{"room": r.name, "floor_m2": r.floor_area} | r.summary for r in rooms]
         )
-        table.round(4).to_csv(temporary / "summary.csv", index=False)
+        table.round(4).to_csv(folder / "summary.csv", index=False)
         months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
-        months.to_csv(temporary / "discomfort_by_month.csv")
+        months.to_csv(folder / "discomfort_by_month.csv")
         record = {"study": study.model_dump(mode="json"), "notes": list(notes)}
-        (temporary / MARK).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
-        if target.exists():
-            shutil.rmtree(target)
-        temporary.replace(target)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
+        (folder / MARK).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")

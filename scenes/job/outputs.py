@@ -1,39 +1,19 @@
-"""The files of a run: written to a temporary folder, which takes its name when all is there."""
+"""The files of a run."""
 
 from __future__ import annotations
 
 import json
 import re
-import shutil
-import tempfile
 from pathlib import Path
 
 import pandas as pd
 
-from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.hdr import write_hdr
 from scenes.job.daylight import illuminance_table
 from scenes.job.glare import glare_table
 from scenes.pictures import write_falsecolour
+from scenes.result_folder import MARK, result_folder
 from scenes.results import RunResult, SpaceResult
-
-MARK = "run.json"  # a folder that holds it is an earlier result and may be replaced
-
-
-def check_folder(folder: Path) -> None:
-    """Raise `DataError` where results could not be put at the end of a run."""
-    if folder.exists() and not folder.is_dir():
-        raise DataError("is a file; results need a folder", file=folder, field="--out")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
-        raise DataError(
-            f"holds other files (and no {MARK} of an earlier run)", file=folder, field="--out"
-        )
-    try:
-        folder.absolute().parent.mkdir(parents=True, exist_ok=True)
-        Path(tempfile.mkdtemp(prefix=".cfs-", dir=folder.absolute().parent)).rmdir()
-    except OSError as error:
-        message = f"cannot be written: {error.strerror or error}"
-        raise DataError(message, file=folder, field="--out") from error
 
 
 def write_results(result: RunResult, folder: Path, write_report=None) -> None:
@@ -41,11 +21,7 @@ def write_results(result: RunResult, folder: Path, write_report=None) -> None:
 
     Args: write_report: `scenes.report.write_report`, or None for no report.
     """
-    check_folder(folder)
-    target = folder.absolute()
-    temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        temporary.chmod(0o755)
+    with result_folder(folder) as temporary:
         several = len(result.spaces) > 1
         for room, name in zip(result.spaces, room_names(result), strict=True):
             place = temporary / name if several else temporary
@@ -56,26 +32,6 @@ def write_results(result: RunResult, folder: Path, write_report=None) -> None:
             write_report(result, temporary / "report.html")
         text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
         (temporary / MARK).write_text(text + "\n", encoding="utf-8")
-        _take_place(temporary, target)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
-
-
-def _take_place(temporary: Path, target: Path) -> None:
-    """Rename the finished folder, keeping the earlier one until that is done."""
-    old = None
-    if target.exists():
-        old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.parent))
-        target.replace(old)
-    try:
-        temporary.replace(target)
-    except OSError:
-        if old is not None:
-            old.replace(target)
-        raise
-    if old is not None:
-        shutil.rmtree(old, ignore_errors=True)
 
 
 def room_names(result: RunResult) -> list[str]:

@@ -1,0 +1,51 @@
+"""What stands outdoors in an IFC file, and which of it a selector chooses, without its rooms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bim.ifc.corrections import Corrections, chosen, corrections_beside
+from bim.ifc.elements import outdoor_elements
+from bim.ifc.source import Progress, read_source
+from bim.model import Element, Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Every element and terrain of a model, in world axes."""
+
+    elements: tuple[Element, ...]
+    chosen: tuple[frozenset[str], ...]  # GUIDs that each selector chose, in their order
+    problems: tuple[Problem, ...]
+    name: str
+
+
+def read_standing(
+    path: str | Path,
+    select: Sequence[str] = (),
+    *,
+    corrections: Corrections | None = None,
+    progress: Progress | None = None,
+) -> Standing:
+    """All elements of an IFC file, and those that selectors choose by GUID, type, material, name.
+
+    Args:
+        select: ifcopenshell selectors, as in `bim.ifc.corrections`.
+        corrections: by default those of `<model>.corrections.toml` beside the model.
+    Raises: `DataError` where the file cannot be read or a selector is none.
+    """
+    corrections = corrections_beside(path) if corrections is None else corrections
+    source = read_source(path, corrections, progress or (lambda stage, fraction: None))
+    elements = outdoor_elements(source.model, source.elements)
+    value = corrections.surroundings
+    if value is not None:
+        elements = [
+            replace(one, reflectance_visible=value, reflectance_solar=value) for one in elements
+        ]
+    found = tuple(
+        frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, path))
+        for query in select
+    )
+    return Standing(tuple(elements), found, source.problems, source.name)
