@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from bim.defaults import (
@@ -184,9 +183,3 @@ def floor_area(faces: Sequence[Face]) -> float:
     """Area [m2] of the room's floor seen from above, its window sills left out."""
     floors = [face for face in faces if face.kind == "floor"]
     return float(sum(face.area * -face.normal[2] for face in floors))
-
-
-def footprint_area(triangles: NDArray[np.float64]) -> float:
-    """Area [m2] of the outline of a solid [N, 3, 3] seen from above."""
-    polygons = shapely.make_valid(shapely.polygons(triangles[..., :2]))
-    return float(shapely.union_all(polygons).area)

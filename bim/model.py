@@ -142,6 +142,12 @@ class Space:
     stated_area: float | None = None  # the file's own floor area [m2]
     stated_volume: float | None = None  # the file's own volume [m3]
     long_name: str = ""
+    area_to_middles: float | None = None  # floor to the middle of the walls, if that is stated [m2]
+
+    @property
+    def area_as_stated(self) -> float:
+        """Floor area measured as the file measures its own: between or to the middle of walls."""
+        return self.floor_area if self.area_to_middles is None else self.area_to_middles
 
     @property
     def shell(self) -> NDArray[np.float64]:

@@ -30,6 +30,9 @@ from bim.rooms import Attachment, attachments_of, room_pieces
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import triangles_of
 from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
+from bim.wall_middles import area_to_wall_middles
+
+AGREES = 0.02  # drawn and stated quantities may differ by this share before it is reported
 
 
 def read_ifc(
@@ -176,11 +179,21 @@ def _space(
         for piece in pieces
     ]
     faces, windows, assumed = faces_and_windows(pieces, beyond, elements, reflectances)
+    area = floor_area(faces)
+    middles = None
+    if record.stated_area is not None and not _agree(area, record.stated_area):
+        body = triangles_of(record.solid.manifold)[0]
+        middles = area_to_wall_middles(body, pieces, beyond, elements)
+        middles = middles if _agree(middles, record.stated_area) else None
     space = Space(
-        record.solid.guid, record.name, record.storey, volume, floor_area(faces), tuple(faces),
-        tuple(windows), record.volume, record.stated_area, record.stated_volume, record.long_name,
+        record.solid.guid, record.name, record.storey, volume, area, tuple(faces), tuple(windows),
+        record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
     )  # fmt: skip
     return space, problems + _assumptions(record, assumed) + _soundness(space)
+
+
+def _agree(drawn: float, stated: float) -> bool:
+    return abs(drawn - stated) <= AGREES * stated
 
 
 def _assumptions(record: SpaceRecord, assumed: Counter) -> list[Problem]:
@@ -206,11 +219,18 @@ def _soundness(space: Space) -> list[Problem]:
         what = f"room {space.name}: {leaks} open edges are left"
         problems.append(Problem(space.guid, what, "light may leak there"))
     enclosed = enclosed_volume(space.shell)
+    if space.area_to_middles is not None:
+        what = (
+            f"room {space.name}: states {space.stated_area:.2f} m2 floor area, which is that to the"
+            f" middle of its walls ({space.area_to_middles:.2f} m2 drawn)"
+        )
+        done = f"the {space.floor_area:.2f} m2 between the walls are used"
+        problems.append(Problem(space.guid, what, done))
     for what, stated, drawn, unit in (
-        ("floor area", space.stated_area, space.floor_area, "m2"),
+        ("floor area", space.stated_area, space.area_as_stated, "m2"),
         ("volume", space.stated_volume, space.room_volume, "m3"),
     ):
-        if stated is not None and abs(drawn - stated) > 0.02 * stated:
+        if stated is not None and not _agree(drawn, stated):
             text = f"room {space.name}: states {stated:.2f} {unit} {what}, drawn {drawn:.2f} {unit}"
             problems.append(Problem(space.guid, text, "the drawn one is used"))
     if abs(enclosed - space.volume) > 1e-3 * space.volume + SMALLEST_AREA:
