@@ -60,6 +60,39 @@ def uncoated_pane(incidence: ArrayLike, tau_normal: float, rho_normal: float) ->
     return PaneOptics(tau, rho, rho)
 
 
+# Polynomials in cos(theta) of WINDOW 4 for clear and bronze glass (tau above and below 0.645)
+_CLEAR = ((-0.0015, 3.355, -3.840, 1.460, 0.0288), (0.999, -0.563, 2.043, -2.532, 1.054))
+_BRONZE = ((-0.002, 2.813, -2.341, -0.05725, 0.599), (0.997, -1.868, 6.513, -7.862, 3.225))
+
+
+def coated_pane(
+    incidence: ArrayLike, tau_normal: float, rho_front: float, rho_back: float
+) -> PaneOptics:
+    """A pane with a coating, at angles of incidence [...] [rad], from its values at the normal.
+
+    tau = tau_n t(theta) and rho = rho_n (1 - r) + r, with t and r of uncoated glass.
+
+    Source: Finlayson, Arasteh, Huizenga, Rubin, Reilly 1993, WINDOW 4.0 (LBL-33943); EnergyPlus
+    Engineering Reference, "Angular properties for coated glass".
+    """
+    require_range(tau_normal, 0.0, 1.0, "pane transmittance")
+    most = max(rho_front, rho_back)
+    require(min(rho_front, rho_back) >= 0, "pane reflectance", "is negative")
+    require(tau_normal + most <= 1.0, "pane", "tau + rho exceeds 1")
+    through, sum_ = _CLEAR if tau_normal > 0.645 else _BRONZE
+    c = np.cos(np.minimum(np.abs(np.asarray(incidence, dtype=float)), np.pi / 2))
+    t = np.clip(np.polynomial.polynomial.polyval(c, through), 0.0, 1.0)
+    r = np.clip(np.polynomial.polynomial.polyval(c, sum_) - t, 0.0, 1.0)
+    tau = tau_normal * t
+    front, back = (np.minimum(n * (1 - r) + r, 1.0 - tau) for n in (rho_front, rho_back))
+    return PaneOptics(tau, front, back)
+
+
+def turned(pane: PaneOptics) -> PaneOptics:
+    """The pane seen from its other side."""
+    return PaneOptics(pane.tau, pane.rho_back, pane.rho_front)
+
+
 def _index_and_inner(tau: float, rho: float) -> tuple[float, float]:
     """Refractive index and internal transmittance of a pane from its normal tau and rho."""
     beta = tau**2 - rho**2 + 2 * rho + 1

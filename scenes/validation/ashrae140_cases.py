@@ -44,6 +44,15 @@ HEAVY = {
     "floor": (Layer(1.007, 0.04, 0.0, 0.0), Layer(0.080, 1.13, 1400.0, 1000.0)),
     "roof": LIGHT["roof"],
 }
+# increased insulation (680, 980): 0.25 and 0.40 m of quilt, 0.2452 m of foam
+LIGHT_INSULATED = LIGHT | {
+    "wall": (SIDING, Layer(0.250, 0.04, 12.0, 840.0), LIGHT["wall"][2]),
+    "roof": (LIGHT["roof"][0], Layer(0.400, 0.04, 12.0, 840.0), LIGHT["roof"][2]),
+}
+HEAVY_INSULATED = HEAVY | {
+    "wall": (SIDING, Layer(0.2452, 0.04, 10.0, 1400.0), HEAVY["wall"][2]),
+    "roof": LIGHT_INSULATED["roof"],
+}
 COMMON_WALL = (Layer(0.20, 0.51, 1400.0, 1000.0),)
 GROUND_C = 10.0
 
@@ -97,7 +106,7 @@ _FAN = tuple(1703.16 / 129.6 if h < 7 or h >= 18 else 0.0 for h in range(24))
 def cases() -> dict[str, TestCase]:
     """The single-zone cases by number (960 is built apart)."""
     found: dict[str, TestCase] = {}
-    for first, mass in (("6", LIGHT), ("9", HEAVY)):
+    for first, mass, warm in (("6", LIGHT, LIGHT_INSULATED), ("9", HEAVY, HEAVY_INSULATED)):
         base = TestCase(f"{first}00", mass, (_SOUTH,))
         night = replace(base, heating=_NO_HEATING, cooling=_DAY_COOLING, fan_ach=_FAN)
         variants = (
@@ -107,11 +116,15 @@ def cases() -> dict[str, TestCase]:
             replace(base, name=f"{first}30", openings=_SIDES_SHADED),
             replace(base, name=f"{first}40", heating=_SETBACK),
             replace(night, name=f"{first}50"),
+            replace(base, name=f"{first}80", mass=warm),
             replace(base, name=f"{first}85", cooling=(20.0,) * 24),
+            replace(base, name=f"{first}95", mass=warm, cooling=(20.0,) * 24),
+            replace(base, name=f"{first}80FF", mass=warm, heating=None, cooling=None),
             replace(base, name=f"{first}00FF", heating=None, cooling=None),
             replace(night, name=f"{first}50FF", heating=None, cooling=None),
         )
         found |= {case.name: case for case in variants}
+    found["660"] = replace(found["600"], name="660", glazing="low-e")
     found["670"] = replace(found["600"], name="670", glazing="single")
     return dict(sorted(found.items()))
 

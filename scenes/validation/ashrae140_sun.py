@@ -15,13 +15,16 @@ from scenes.validation.sunlit_room import BeamTable, diffuse_hits
 from thermal.blackbox import R_INNER, R_OUTER, Fenestration, layer_absorptances
 from thermal.climate import Solar
 from thermal.glazing import Gap, double_glazing_resistance, en410_g_value, en673_u_value
-from thermal.panes import hemispherical, stack, uncoated_pane
+from thermal.panes import coated_pane, hemispherical, stack, turned, uncoated_pane
 from thermal.shortwave import spread_evenly
 from thermal.zone import Zone
 
 FloatArray = NDArray[np.float64]
 ANGLES = np.radians(np.linspace(0.0, 90.0, 91))
 PANE = (0.003048, 0.834, 0.075)  # thickness [m], tau and rho at normal incidence
+LOW_E = (0.452, 0.359, 0.397)  # tau, rho outside and inside; the coating faces the gap
+LOW_E_THICKNESS = 0.00318
+ARGON_GAP = Gap(0.012, (("argon", 1.0),), (0.047, 0.84))
 AIR_GAP = Gap(0.012, (("air", 1.0),), (0.84, 0.84))
 
 
@@ -38,30 +41,40 @@ class Glass:
 
 
 def glass(kind: str) -> Glass:
-    """The double (600) or single (670) clear glazing, through U, g and the Blackbox."""
+    """The double (600), low-e (660) or single (670) glazing, through U, g and the Blackbox."""
     thickness, tau, rho = PANE
-    pane = uncoated_pane(ANGLES, tau, rho)
-    panes = [pane, pane] if kind == "double" else [pane]
-    optics = stack(panes)
-    if kind == "double":
-        u = en673_u_value([thickness, thickness], [AIR_GAP], emissivity_in=0.84)
-        resistance = double_glazing_resistance((thickness, thickness), AIR_GAP)
+    clear = uncoated_pane(ANGLES, tau, rho)
+    panes = {"single": [clear], "double": [clear, clear]}.get(kind, [coated_pane(ANGLES, *LOW_E)])
+    thick = [thickness] * len(panes)
+    gap = AIR_GAP
+    if kind == "low-e":
+        panes, thick, gap = [*panes, clear], [LOW_E_THICKNESS, thickness], ARGON_GAP
+    optics, behind = stack(panes), stack([turned(p) for p in panes[::-1]])
+    if len(panes) == 2:
+        u = en673_u_value(thick, [gap], emissivity_in=0.84)
+        resistance = double_glazing_resistance((thick[0], thick[1]), gap)
     else:
         u, resistance = 1.0 / (R_OUTER + R_INNER + thickness), None
     between = [1.0 / u - R_OUTER - R_INNER]
     films = {"outer_film": 1.0 / R_OUTER, "inner_film": 1.0 / R_INNER}
-    share = optics.absorptance if kind == "double" else np.repeat(optics.absorptance / 2, 2, axis=1)
+    share, back = (_in_two(o.absorptance) for o in (optics, behind))
     g = en410_g_value(optics.tau, share, between, **films)
     layers = layer_absorptances(optics.tau, optics.rho, g, u, item=f"{kind} glazing")
     mean = {k: float(hemispherical(v, ANGLES)) for k, v in (
         ("tau", optics.tau), ("outer", layers.outer), ("inner", layers.inner),
-        ("back", optics.rho_back))}  # fmt: skip
+        ("back", optics.rho_back), ("back outer", back[:, 1]), ("back inner", back[:, 0]),
+    )}  # fmt: skip
     fenestration = Fenestration(f"{kind} glazing", u, resistance=resistance)
     return Glass(
         fenestration, optics.tau, layers.outer, layers.inner,
         (mean["tau"], mean["outer"], mean["inner"]),
-        (mean["back"], mean["inner"], mean["outer"]),  # the same panes from the other side
+        (mean["back"], mean["back outer"], mean["back inner"]),
     )  # fmt: skip
+
+
+def _in_two(absorptance: FloatArray) -> FloatArray:
+    """Absorptances [91, 2] of two layers: one pane is halved."""
+    return absorptance if absorptance.shape[1] == 2 else np.repeat(absorptance / 2, 2, axis=1)
 
 
 @dataclass(frozen=True, slots=True)

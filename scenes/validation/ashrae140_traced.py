@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from bim.model import Element
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_tracer import exterior_surfaces, window_groups
-from mitsuba_cfs import phases, variants
+from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.sky.matrix import sky_matrix
 from mitsuba_cfs.sky.weather import Weather, read_epw
@@ -38,10 +38,10 @@ TITLES = {"600": "B8-14", "610": "B8-15", "620": "B8-14", "630": "B8-15"}
 SUBDIVISION = 4
 
 
-def traced_transmission(
-    opening: Opening, weather: Weather, pane: Glass, *, samples: int = 4096, seed: int = 0
-) -> float:
-    """Annual sun through the windows of a facade [kWh/m2]."""
+def traced_light(
+    opening: Opening, weather: Weather, *, samples: int = 4096, seed: int = 0
+) -> dict[str, NDArray[np.float64]]:
+    """Annual radiance [K] on the windows of a facade from sun, sky and ground [kWh/(m2 sr)]."""
     width = 8.0 if opening.facade == "south" else 6.0
     building = shoebox(
         width, 6.0 if opening.facade == "south" else 8.0, HEIGHT,
@@ -57,11 +57,26 @@ def traced_transmission(
         exterior, groups, subdivision=SUBDIVISION, samples=samples // 8,
         stopping=Stopping(batches=8), seed=seed,
     )  # fmt: skip
-    sky = sky_matrix(weather, SUBDIVISION, "solar", sun_up_only=True)
     area = np.array([g.area for g in groups])
-    radiance = phases.window_radiance(daylight.values, sky)  # [G, K, L]
-    energy = radiance.sum(axis=2).T @ (area / area.sum()) * weather.step_h / 1e3  # [K] kWh/m2/sr
-    return float(energy @ (KLEMS_FULL.projected_solid_angles() * patch_transmittance(pane)))
+    seen = np.einsum("g,gkp->kp", area / area.sum(), daylight.values)
+    sun, sky = (
+        sky_matrix(weather, SUBDIVISION, "solar", parts, sun_up_only=True).sum(axis=1)
+        * (weather.step_h / 1e3)
+        for parts in ("sun", "sky")
+    )
+    return {
+        "sun": seen[:, 1:] @ sun[1:],
+        "sky": seen[:, 1:] @ sky[1:],
+        "ground": seen[:, 0] * (sun[0] + sky[0]),
+    }
+
+
+def traced_transmission(
+    opening: Opening, weather: Weather, pane: Glass, *, samples: int = 4096, seed: int = 0
+) -> float:
+    """Annual sun through the windows of a facade [kWh/m2]."""
+    light = sum(traced_light(opening, weather, samples=samples, seed=seed).values())
+    return float(light @ (KLEMS_FULL.projected_solid_angles() * patch_transmittance(pane)))
 
 
 def patch_transmittance(pane: Glass) -> NDArray[np.float64]:
