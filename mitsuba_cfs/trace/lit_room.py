@@ -73,7 +73,9 @@ class System:
 
 
 class Sky:
-    """A sky without its sun on Reinhart patches, and the sun as a disc."""
+    """A sky without its sun on Reinhart patches, and the sun as a disc: one value for each row."""
+
+    columns = 1
 
     def __init__(self, patches: ArrayLike, sun: ArrayLike, sun_radiance: float) -> None:
         """From patch radiances [P] (the ground first), sun direction [3] and disc radiance."""
@@ -88,6 +90,32 @@ class Sky:
         self.radiance = mi.Float(patches)
         self.sun = mi.Vector3f(*(dr.opaque(mi.Float, float(v)) for v in towards))
         self.sun_radiance = dr.opaque(mi.Float, float(sun_radiance) if towards[2] > 0 else 0.0)
+
+    def add(
+        self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float,
+        active: mi.Bool,
+    ) -> None:  # fmt: skip
+        """Add what paths that leave to the sky bring to their rows of `result`."""
+        light = dr.gather(mi.Float, self.radiance, self.bins.index(direction), active)
+        dr.scatter_add(result, mi.Float64(beta * light), row, active)
+
+
+class PatchSky:
+    """A sky of unit radiance without a sun, told apart by its patches: P values for each row."""
+
+    def __init__(self, subdivision: int) -> None:
+        """From Reinhart's MF."""
+        self.bins = SkyBins(ReinhartSky(subdivision))
+        self.columns = self.bins.size
+        self.sun, self.sun_radiance = mi.Vector3f(0, 0, 1), mi.Float(0)
+
+    def add(
+        self, result: mi.Float64, row: mi.UInt32, direction: mi.Vector3f, beta: mi.Float,
+        active: mi.Bool,
+    ) -> None:  # fmt: skip
+        """Add what paths bring to the patch of their row that they leave to."""
+        slot = row * self.columns + self.bins.index(direction)
+        dr.scatter_add(result, mi.Float64(beta), slot, active)
 
 
 class Room:

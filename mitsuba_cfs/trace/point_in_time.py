@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -11,7 +13,7 @@ from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.lit_room import Room, Sky
+from mitsuba_cfs.trace.lit_room import PatchSky, Room, Sky
 from mitsuba_cfs.trace.sampling import path_generator
 from mitsuba_cfs.trace.scene import OPAQUE
 
@@ -200,8 +202,8 @@ def _at_window(
 @dr.syntax
 def add_paths(
     room: Room,
-    sky: Sky,
-    result: mi.Float64,  # [rows], accumulated in place
+    sky: Sky | PatchSky,
+    result: mi.Float64,  # [rows], or [rows * P] of a `PatchSky`, accumulated in place
     row: mi.UInt32,
     origin: mi.Point3f,
     direction: mi.Vector3f,
@@ -227,8 +229,7 @@ def add_paths(
         beyond = active & outdoors
         hit_out = room.outside.scene.ray_intersect_preliminary(ray, coherent=False, active=beyond)
         to_sky = beyond & ~hit_out.is_valid()
-        light = dr.gather(mi.Float, sky.radiance, sky.bins.index(direction), to_sky)
-        dr.scatter_add(result, mi.Float64(beta * light), row, to_sky)
+        sky.add(result, row, direction, beta, to_sky)
         active &= dr.select(outdoors, hit_out.is_valid(), hit_in.is_valid())
         t = dr.select(outdoors, hit_out.t, hit_in.t)
 
@@ -317,6 +318,25 @@ def point_in_time(
         points, directions: [S, 3] sensor positions [m] and normals.
         samples: paths for each sensor in each batch.
     """
+    batch = sensor_batches(room, sky, points, directions, samples, max_depth, seed)
+    return accumulate(
+        lambda number: batch(number)[:, 0],
+        stopping=stopping,
+        label="point in time",
+        progress=progress,
+    )
+
+
+def sensor_batches(
+    room: Room,
+    sky: Sky | PatchSky,
+    points: ArrayLike,
+    directions: ArrayLike,
+    samples: int,
+    max_depth: int,
+    seed: int,
+) -> Callable[[int], NDArray[np.float64]]:
+    """Batches [S, columns of the sky] of paths from sensors."""
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
     S, n = len(points), int(samples)
@@ -324,7 +344,7 @@ def point_in_time(
     normals = mi.Vector3f(directions.T.astype(np.float32))
 
     def batch(number: int) -> NDArray[np.float64]:
-        result = dr.zeros(mi.Float64, S)
+        result = dr.zeros(mi.Float64, S * sky.columns)
         count = dr.opaque(mi.UInt32, n)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
@@ -346,6 +366,6 @@ def point_in_time(
             room, sky, result, sensor, origin, away, cosine, aimed, mi.Float(1), generator, depth,
             cosine > 0, outdoors,
         )  # fmt: skip
-        return result.numpy() / n
+        return result.numpy().reshape(S, sky.columns) / n
 
-    return accumulate(batch, stopping=stopping, label="point in time", progress=progress)
+    return batch
