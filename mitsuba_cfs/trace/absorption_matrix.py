@@ -7,15 +7,16 @@ from collections.abc import Sequence
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 
 @dr.syntax
@@ -71,6 +72,7 @@ def absorption_matrix(
     stopping: Stopping | None = None,
     seed: int = 0,
     progress: Progress = silent,
+    cache: MatrixCache | None = None,
 ) -> Estimate:
     """Absorption matrices [G, K, F + G]: where a unit of flux of each window patch is absorbed.
 
@@ -84,38 +86,30 @@ def absorption_matrix(
         surfaces: the room in the solar band; `surfaces.surface` names the F surfaces.
         window_reflectance: [G] diffuse solar reflectance of the windows from the room, 0 if none.
         samples: paths for each window patch in each batch.
+        cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
     """
-    tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
+    reflectance = np.zeros(len(groups)) if window_reflectance is None else window_reflectance
+    reflectance = np.asarray(reflectance, dtype=float)
+    tracer = TracedScene(surfaces, groups, window_reflectance=reflectance)
     bins = DirectionBins(basis)
-    K, n = bins.size, int(samples)
+    n = int(samples)
     width = tracer.surface_count + len(groups)
 
-    def one_group(group: int, key: int) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, K * width)
-        count = dr.opaque(mi.UInt32, n)
-        path = dr.arange(mi.UInt32, K * n)
-        patch = path // count
-        sample = path - patch * count
-        opaque_key = dr.opaque(mi.UInt32, key & 0xFFFFFFFF)
-        stream = mi.sample_tea_32(patch, opaque_key)[0]
-        inward = -tracer.to_world(group, bins.sample(patch, lattice_2d(sample, stream, 0)))
-        normal = mi.Vector3f(*map(float, groups[group].frame[2]))
+    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+        normal = mi.Vector3f(*map(float, groups[paths.group].frame[2]))
+        position = mi.Point3f(paths.position - normal * tracer.epsilon)
         _absorption_kernel(
-            tracer,
-            matrix,
-            patch,
-            mi.Point3f(
-                tracer.sample_group(group, lattice_2d(sample, stream, 2)) - normal * tracer.epsilon
-            ),
-            inward,
-            path_generator(path, opaque_key),
-            dr.opaque(mi.UInt32, max_depth),
-            mi.Bool(True),
-        )
-        return matrix.numpy().reshape(K, width) / n
+            tracer, matrix, paths.patch, position, -paths.outward,
+            paths.generator, dr.opaque(mi.UInt32, max_depth), mi.Bool(True),
+        )  # fmt: skip
 
-    def batch(number: int) -> NDArray[np.float64]:
-        first = (seed * 1_000_003 + number) * len(groups)
-        return np.stack([one_group(g, first + g) for g in range(len(groups))])
-
-    return accumulate(batch, stopping=stopping, label="absorption matrix", progress=progress)
+    return accumulate(
+        window_batches(tracer, bins, width, n, seed, follow),
+        stopping=stopping,
+        label="absorption matrix",
+        progress=progress,
+        entry=cache_entry(
+            cache, "absorption matrix", surfaces, groups, reflectance, basis, n,
+            max_depth, seed, stopping=stopping,
+        ),
+    )  # fmt: skip

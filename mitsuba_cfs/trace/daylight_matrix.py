@@ -20,10 +20,11 @@ from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 
 @dr.syntax
-def _daylight_kernel(
+def add_daylight_paths(
     tracer: TracedScene,
     sky: SkyBins,
     matrix: mi.Float64,  # [rows * P], accumulated in place
@@ -90,36 +91,16 @@ def daylight_matrix(
     """
     tracer = TracedScene(surfaces, groups, windows_block=False)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
-    K, P, n = bins.size, sky.size, int(samples)
+    n = int(samples)
 
-    def one_group(group: int, key: int) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, K * P)
-        count = dr.opaque(mi.UInt32, n)
-        path = dr.arange(mi.UInt32, K * n)
-        patch = path // count
-        sample = path - patch * count
-        opaque_key = dr.opaque(mi.UInt32, key & 0xFFFFFFFF)
-        stream = mi.sample_tea_32(patch, opaque_key)[0]
-        local = bins.sample(patch, lattice_2d(sample, stream, 0))
-        _daylight_kernel(
-            tracer,
-            sky,
-            matrix,
-            patch,
-            tracer.sample_group(group, lattice_2d(sample, stream, 2)),
-            tracer.to_world(group, local),
-            path_generator(path, opaque_key),
-            dr.opaque(mi.UInt32, max_depth),
-            mi.Bool(True),
-        )
-        return matrix.numpy().reshape(K, P) / n
-
-    def batch(number: int) -> NDArray[np.float64]:
-        first = (seed * 1_000_003 + number) * len(groups)
-        return np.stack([one_group(g, first + g) for g in range(len(groups))])
+    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+        add_daylight_paths(
+            tracer, sky, matrix, paths.patch, paths.position, paths.outward, paths.generator,
+            dr.opaque(mi.UInt32, max_depth), mi.Bool(True),
+        )  # fmt: skip
 
     return accumulate(
-        batch,
+        window_batches(tracer, bins, sky.size, n, seed, follow),
         stopping=stopping,
         label="daylight matrix",
         progress=progress,
@@ -174,7 +155,7 @@ def sky_irradiance_matrix(
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
         stream = mi.sample_tea_32(sensor, key)[0]
         local = accepted.sample(lattice_2d(path - sensor * count, stream, 0))
-        _daylight_kernel(
+        add_daylight_paths(
             tracer,
             sky,
             matrix,

@@ -20,7 +20,7 @@ from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.daylight_matrix import _daylight_kernel
+from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, pixel_places
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
@@ -114,7 +114,7 @@ def _rows(inside, outside, sky, lanes, count, samples, depth, seed) -> sparse.cs
     used, place = np.unique(row, return_inverse=True)
     matrix = dr.zeros(mi.Float64, len(used) * sky.size)
     origin, direction = way[:3].astype(np.float32), way[3:].astype(np.float32)
-    _daylight_kernel(
+    add_daylight_paths(
         outside, sky, matrix, mi.UInt32(place.astype(np.uint32)), mi.Point3f(origin),
         mi.Vector3f(direction),
         path_generator(mi.UInt32(keys.astype(np.uint32)), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)),
