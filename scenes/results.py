@@ -50,7 +50,8 @@ class ThermalResult:
     gains: pd.DataFrame  # [H] index time: incident_w, transmitted_w, absorbed_outer_w, ...
     comfort: pd.DataFrame  # [H] index time: occupied, comfort_c, within_80, within_90, ... (bool)
     comfort_summary: dict[str, float]  # by name; percentages as 0..100
-    fenestration: dict[str, float]  # u_value, g_value, transmittance, ... at normal incidence
+    # one entry a system: its name; u_value, g_value, transmittances, ... at normal incidence
+    fenestration: tuple[dict[str, float | str], ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from scenes.job.options import JobOptions
+from scenes.job.options import METHODS, JobOptions
 
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 _DEFAULT = JobOptions(Path(), Path(), Path())
@@ -17,6 +17,10 @@ _DEFAULT = JobOptions(Path(), Path(), Path())
 @click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
 @click.option("--cfs", "system", required=True, type=FILE, help="BSDF XML file, Klems full.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+@click.option(
+    "--method", type=click.Choice(METHODS), default=_DEFAULT.method, show_default=True,
+    help="How light is computed: see docs/daylight.md.",
+)  # fmt: skip
 @click.option("--space", "spaces", multiple=True, help="Name or GUID; default: all with a window.")
 @click.option("--u", "u_value", type=float, help="U-value of the system [W/(m2 K)].")
 @click.option("--g", "g_value", type=float, help="g-value of the system at normal incidence.")
@@ -41,12 +45,14 @@ _DEFAULT = JobOptions(Path(), Path(), Path())
     show_default=True, help="Outdoor air changes [1/h].",
 )  # fmt: skip
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
+@click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
 @click.option("--quick", is_flag=True, help="A tenth of the rays, for a first look.")
 def command(
     building: Path,
     weather: Path,
     system: Path,
     out: Path,
+    method: str,
     spaces: tuple[str, ...],
     u_value: float | None,
     g_value: float | None,
@@ -56,6 +62,7 @@ def command(
     height: float,
     ach: float,
     seed: int,
+    no_cache: bool,
     quick: bool,
 ) -> None:
     """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
@@ -65,6 +72,7 @@ def command(
             building,
             weather,
             system,
+            method=method,
             spaces=spaces,
             u_value=u_value,
             g_value=g_value,
@@ -75,7 +83,10 @@ def command(
             sensor_height=height,
             sensor_samples=_DEFAULT.sensor_samples // share,
             patch_samples=_DEFAULT.patch_samples // share,
+            sun_points=_DEFAULT.sun_points // (4 if quick else 1),
+            path_samples=_DEFAULT.path_samples // share,
             infiltration_ach=ach,
+            cache=not no_cache,
             seed=seed,
         ),
         out,
@@ -85,9 +96,10 @@ def command(
 def run_to_folder(options: JobOptions, out: Path) -> None:
     """Run the job with a progress bar, write its files and say what came out."""
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.job.outputs import check_folder, write_results
+    from scenes.job.outputs import write_results
     from scenes.job.run import run_job
     from scenes.report import write_report
+    from scenes.result_folder import check_folder
 
     check_folder(out)
     with ProgressBar() as progress:

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from mitsuba_cfs.errors import CfsError
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
-from mitsuba_cfs.progress import Progress, part
-from mitsuba_cfs.trace.image import luminance_pictures
-from scenes.job.daylight import RoomScene, Skies
-from scenes.job.options import JobOptions
+from mitsuba_cfs.progress import Progress
+from scenes.job.pictures import PictureMaker
 from scenes.results import GlareResults, LuminancePicture
 
 DEFAULT_DAYS = ("03-21", "06-21", "12-21")
@@ -68,29 +66,12 @@ def _find(text: str, times: pd.DatetimeIndex) -> int | None:
     return int(found[0]) if len(found) else None
 
 
-def room_glare(
-    scene: RoomScene,
-    window_luminance: NDArray[np.float32],
-    skies: Skies,
-    hours: list[int],
-    options: JobOptions,
-    progress: Progress,
-) -> GlareResults:
-    """Pictures of the chosen hours and their glare.
-
-    Args: window_luminance: [G, K, L] of the lit hours, from `room_daylight`.
-    """
-    columns = np.searchsorted(skies.lit, hours)
-    pictures = luminance_pictures(
-        scene.interior,
-        scene.groups,
-        scene.view,
-        window_luminance[:, :, columns],
-        samples=options.picture_samples,
-        seed=options.seed,
-        progress=part(progress, 0.0, 0.9, "pictures"),
-    )
-    geometry = GlareView(scene.view)
+def room_glare(maker: PictureMaker, hours: list[int], progress: Progress) -> GlareResults:
+    """Pictures of the chosen hours of the year and their glare."""
+    columns = np.searchsorted(maker.skies.lit, hours)
+    view = maker.scene.view
+    pictures = maker.of_hours(columns, progress)
+    geometry = GlareView(view)
     rated = []
     for hour, luminance in zip(hours, pictures, strict=True):
         result = evaluate(luminance, geometry)
@@ -107,7 +88,7 @@ def room_glare(
         }
         rated.append(LuminancePicture(hour, luminance, glare, result.labels > 0))
     progress("pictures", 1.0)
-    return GlareResults(scene.view, tuple(rated))
+    return GlareResults(view, tuple(rated))
 
 
 def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:

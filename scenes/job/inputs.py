@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 from bim.model import Building, Space
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather, read_epw
@@ -23,12 +26,18 @@ class System:
     """A fenestration system: glazing and shade as one, in both bands."""
 
     name: str
-    visible: KlemsBsdf
+    visible: KlemsBsdf  # Klems full, all blocks
     solar: KlemsBsdf
-    u_value: float | None  # [W/(m2 K)]
-    g_value: float | None  # at normal incidence
-    g_by_patch: NDArray[np.float64] | None  # [K] by incident patch, before g_value
-    notes: tuple[str, ...]
+    u_value: float | None = None  # [W/(m2 K)]
+    g_value: float | None = None  # at normal incidence
+    g_by_patch: NDArray[np.float64] | None = None  # [K] by incident patch, before g_value
+    notes: tuple[str, ...] = ()
+    tree: TensorTreeBsdf | None = None  # visible, where the data are a tree: for sun and pictures
+
+    @property
+    def fine(self) -> Bsdf:
+        """The visible band as finely as the data have it."""
+        return self.visible if self.tree is None else self.tree
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,38 +87,59 @@ def read_system(
     normal incidence) and `g_value_by_patch` (for each incident patch of the Klems full basis).
     """
     file = read_bsdf_xml(path)
-    notes = list(file.notes)
-    if "Visible" not in file.bands and "Solar" not in file.bands:
+    beside = ThermalFile.read(path.with_suffix(".toml"))
+    return system_of(
+        file.bands,
+        file.name or path.stem,
+        path=path,
+        u_value=beside.u_value if u_value is None else u_value,
+        g_value=beside.g_value if g_value is None else g_value,
+        g_by_patch=beside.g_value_by_patch if g_value is None else None,
+        notes=file.notes,
+    )
+
+
+def system_of(
+    bands: Mapping[str, Bsdf],
+    name: str,
+    *,
+    path: Path,
+    notes: Sequence[str] = (),
+    **thermal: float | NDArray[np.float64] | None,
+) -> System:
+    """The system of BSDF data by band, Klems full or tensor trees.
+
+    Args: path: the file that the data come from; thermal: `u_value`, `g_value`, `g_by_patch`.
+    """
+    notes = list(notes)
+    if "Visible" not in bands and "Solar" not in bands:
         raise DataError("has neither a Visible nor a Solar band", file=path, field="WavelengthData")
     for band, other in (("Visible", "Solar"), ("Solar", "Visible")):
-        if band not in file.bands:
-            notes.append(f"{path.name} has no {band} band: its {other} band stands in for it.")
-    visible = file.bands.get("Visible") or file.bands["Solar"]
-    solar = file.bands.get("Solar") or file.bands["Visible"]
-    beside = ThermalFile.read(path.with_suffix(".toml"))
+        if band not in bands:
+            notes.append(f"{name} has no {band} band: its {other} band stands in for it.")
+    visible = bands.get("Visible") or bands["Solar"]
+    solar = bands.get("Solar") or bands["Visible"]
+    klems = _klems(visible, path, "Visible")
     return System(
-        file.name or path.stem,
-        _klems(visible, path, "Visible"),
-        _klems(solar, path, "Solar"),
-        beside.u_value if u_value is None else u_value,
-        beside.g_value if g_value is None else g_value,
-        beside.g_value_by_patch if g_value is None else None,
-        tuple(notes),
+        name,
+        klems,
+        klems if solar is visible else _klems(solar, path, "Solar"),
+        notes=tuple(notes),
+        tree=visible if isinstance(visible, TensorTreeBsdf) else None,
+        **thermal,
     )
 
 
 def _klems(bsdf: Bsdf, path: Path, band: str) -> KlemsBsdf:
     """The band as Klems full matrices with all blocks."""
-    if not isinstance(bsdf, KlemsBsdf):
-        raise DataError("is a tensor tree; the three-phase run needs Klems", file=path, field=band)
-    if bsdf.basis_in != KLEMS_FULL or bsdf.basis_out != KLEMS_FULL:
+    if isinstance(bsdf, KlemsBsdf) and {bsdf.basis_in, bsdf.basis_out} != {KLEMS_FULL}:
         raise DataError(
             f"has {bsdf.basis_out.size}x{bsdf.basis_in.size} patches; "
             f"the run needs the Klems full basis of 145x145",
             file=path,
             field=band,
         )
-    return bsdf.filled()
+    return klems_of(bsdf)
 
 
 def read_weather(path: Path) -> Weather:

@@ -31,20 +31,26 @@ def daylight_metrics(
     illuminance: NDArray[np.float32],
     daylight_factor: NDArray[np.float64],
     weather: Weather,
+    direct: NDArray[np.float32] | None = None,
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Metrics by sensor (a table with the positions) and of the room, shares in per cent.
 
     Args:
         points: [S, 3]; illuminance: [H, S] [lx]; daylight_factor: [S] 0 to 1.
+        direct: [H, S] [lx] straight from the sun, for annual sunlight exposure.
     """
-    metrics = room_metrics(illuminance, weather)
+    metrics = room_metrics(illuminance, weather, direct_illuminance=direct)
     found = metrics.by_sensor()
     table = pd.DataFrame(points, columns=["x", "y", "z"]).rename_axis("sensor")
     for column, (source, factor) in SENSOR_COLUMNS.items():
         table[column] = factor * found[source].to_numpy()
+    if metrics.sunlit_hours is not None:
+        table["sunlit_hours"] = metrics.sunlit_hours
     table["daylight_factor"] = 100.0 * daylight_factor
     of_room = metrics.of_room()
     room = {column: factor * of_room[source] for column, (source, factor) in ROOM_COLUMNS.items()}
+    if metrics.annual_sunlight_exposure is not None:
+        room["ase1000_250"] = 100.0 * metrics.annual_sunlight_exposure
     room["daylight_factor"] = 100.0 * float(np.mean(daylight_factor))
     room["en17037_level"] = float(metrics.daylight_provision.level)
     return table, room

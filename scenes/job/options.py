@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+METHODS = ("three-phase", "five-phase", "point-in-time")
 
-@dataclass(frozen=True, slots=True)
-class JobOptions:
-    """Inputs and choices of a run."""
 
-    building: Path
-    weather: Path
-    system: Path
-    spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
-    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
-    g_value: float | None = None  # at normal incidence
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoomOptions:
+    """How a room is computed."""
+
+    method: str = "five-phase"  # one of METHODS
     picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.job.glare.default_hours`
     picture_size: int = 600  # pixels of a side of the fisheye picture
     picture_samples: int = 32  # paths for each pixel
@@ -25,9 +22,28 @@ class JobOptions:
     sensor_margin: float = 0.5  # from the walls [m]
     sensor_samples: int = 32_768  # paths for each sensor
     patch_samples: int = 16_384  # paths for each window patch
+    sun_points: int = 1024  # places on each window group that the direct sun is taken at
+    path_samples: int = 2_048  # point-in-time: paths for each sensor and hour
     infiltration_ach: float = 0.5  # [1/h]
     equipment_w_m2: float = 8.0  # while occupied, half of it radiant
     person_w: float = 75.0  # sensible heat of a person
     floor_per_person: float = 15.0  # [m2]
     occupied: tuple[int, int] = (8, 18)  # clock hours, every day
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise ValueError(f"method: expected one of {METHODS}, got {self.method!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class JobOptions(RoomOptions):
+    """Inputs and choices of a run."""
+
+    building: Path
+    weather: Path
+    system: Path
+    spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
+    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
+    g_value: float | None = None  # at normal incidence
+    cache: bool = True  # keep traced matrices and find them again

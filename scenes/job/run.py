@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
@@ -15,15 +14,16 @@ from bim.model import Building, Problem, Space
 from bim.read_ifc import read_ifc
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import CfsError, DataError
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part, silent
-from mitsuba_cfs.sky.matrix import sky_matrix, sun_up
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.daylight import Skies, room_daylight, room_scene
-from scenes.job.glare import default_hours, room_glare, wanted_hours
+from scenes.job.glare import wanted_hours
 from scenes.job.inputs import System, chosen_spaces, read_system, read_weather, sha256
 from scenes.job.options import JobOptions
-from scenes.job.thermal import ThermalSystem, room_thermal, thermal_system
+from scenes.job.room import compute_room, skies_for
+from scenes.job.thermal import thermal_system
+from scenes.job.windows import everywhere
 from scenes.results import RunResult, SpaceResult
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
@@ -37,30 +37,23 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
     start = time.monotonic()
     building, weather, system, spaces = _read(options, progress)
     thermal = thermal_system(system)
+    cache = MatrixCache.of_user() if options.cache else None
     sun = sun_directions(weather)
-    hours = wanted_hours(options.picture_hours, weather.midpoints, np.flatnonzero(is_up(sun)))
+    wanted_hours(options.picture_hours, weather.midpoints, np.flatnonzero(is_up(sun)))
     variant = variants.activate()
     progress("sky", 0.0)
-    skies = year_of_skies(weather, options)
+    skies = skies_for(weather, options)
     progress("sky", 1.0)
     results, problems = [], list(building.problems)
     for space in spaces:
         label = f"{space.name or space.guid}: "
         try:
             results.append(
-                _room(
-                    building,
-                    space,
-                    system,
-                    thermal,
-                    skies,
-                    weather,
-                    hours,
-                    options,
-                    progress,
-                    label,
+                compute_room(
+                    building, space, everywhere(space, system), weather, options,
+                    skies=skies, cache=cache, progress=_labelled(progress, label),
                 )
-            )
+            )  # fmt: skip
         except (CfsError, ValueError) as error:
             if isinstance(error, DataError):
                 raise
@@ -89,52 +82,9 @@ def _read(options: JobOptions, progress: Progress) -> tuple[Building, Weather, S
     return building, weather, system, spaces
 
 
-def year_of_skies(weather: Weather, options: JobOptions) -> Skies:
-    """Sky matrices of the hours with the sun up."""
-    visible, solar = (
-        sky_matrix(weather, options.sky_subdivision, band, sun_up_only=True, dtype=np.float32)
-        for band in ("visible", "solar")
-    )
-    return Skies(visible, solar, np.flatnonzero(sun_up(weather)), len(weather.times))
-
-
-def _room(
-    building: Building,
-    space: Space,
-    system: System,
-    thermal: ThermalSystem,
-    skies: Skies,
-    weather: Weather,
-    hours: list[int],
-    options: JobOptions,
-    progress: Progress,
-    label: str,
-) -> SpaceResult:
-    """All results of one room."""
-    seconds: dict[str, float] = {}
-
-    def staged(stage: str, fraction: float) -> None:
-        progress(label + stage, fraction)
-
-    def timed(stage: str, work: Callable):
-        start = time.monotonic()
-        result = work()
-        seconds[stage] = round(time.monotonic() - start, 2)
-        return result
-
-    scene = room_scene(building, space, options)
-    daylight, luminance, eye = timed(
-        "daylight", lambda: room_daylight(scene, system, skies, weather, options, staged)
-    )
-    hours = hours or default_hours(weather.midpoints, skies.lit, eye)
-    glare = timed("glare", lambda: room_glare(scene, luminance, skies, hours, options, staged))
-    heat = timed(
-        "thermal",
-        lambda: room_thermal(
-            building, space, scene, system, thermal, skies, weather, options, staged
-        ),
-    )
-    return SpaceResult(space, daylight, glare, heat, seconds)
+def _labelled(progress: Progress, label: str) -> Progress:
+    """Progress with the room's name before each stage."""
+    return lambda stage, fraction: progress(label + stage, fraction)
 
 
 def _manifest(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -12,23 +13,26 @@ from bim.model import Building, Space
 from bim.to_thermal import ThermalRoom, thermal_room
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs import phases
-from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
-from mitsuba_cfs.trace.estimate import Stopping
-from scenes.job.daylight import BATCHES, RoomScene, Skies
+from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from scenes.job.daylight import BATCHES, RoomScene
 from scenes.job.inputs import System
-from scenes.job.options import JobOptions
+from scenes.job.options import RoomOptions
+from scenes.job.skies import Skies
 from scenes.results import ThermalResult
 from thermal.balance import ZoneResult, simulate
 from thermal.blackbox import Fenestration, LayerAbsorptances, layer_absorptances
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.comfort import adaptive_comfort, hours_between, running_mean, summarise
+from thermal.control import switched
 from thermal.gvalue import thermal_data
-from thermal.zone import Gains, work_hours
+from thermal.zone import Gains, Zone, work_hours
 
 BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
 RADIANT_SHARE = 0.5  # of the heat of people and equipment
@@ -82,24 +86,39 @@ def room_thermal(
     building: Building,
     space: Space,
     scene: RoomScene,
-    system: System,
-    thermal: ThermalSystem,
+    daylight: Estimate,
+    state: NDArray[np.int64],
     skies: Skies,
     weather: Weather,
-    options: JobOptions,
+    options: RoomOptions,
+    cache: MatrixCache | None,
     progress: Progress,
 ) -> ThermalResult:
-    """Free-floating temperatures of a year and adaptive comfort."""
+    """Temperatures of a year and adaptive comfort.
+
+    Args:
+        daylight: D of the visible band, used again where the solar reflectances are the same.
+        state: [H] shading state of the room's windows.
+    """
+    windows = scene.windows
+    thermals = [[thermal_system(s) for s in states] for states in windows.systems]
+    first = thermals[windows.group[0]][0]
     room = thermal_room(
         space,
-        thermal.fenestration,
+        first.fenestration,
         infiltration_ach=options.infiltration_ach,
         gains=internal_gains(space, skies.hours, options),
     )
-    solar, gains = _sun(
-        building, space, scene, system, thermal, room, skies, options, part(progress, 0.0, 0.7)
-    )
-    result = simulate(room.zone, climate(weather), solar, step_s=STEP_S)
+    zone = with_states(room.zone, [thermals[g] for g in windows.group])
+    sun = room_sun(building, space, scene, daylight, skies, options, cache,
+                   room, part(progress, 0.0, 0.8, "heat"))  # fmt: skip
+    suns = [solar_of_state(sun, scene, thermals, j, skies) for j in range(windows.states)]
+    solar = switched([s for s, _ in suns], state)
+    gains = {
+        name: np.stack([sums[name] for _, sums in suns])[state, np.arange(len(state))]
+        for name in suns[0][1]
+    }
+    result = simulate(zone, climate(weather), per_window(solar, zone), step_s=STEP_S)
     progress("heat", 1.0)
     times = weather.midpoints
     comfort, summary = _comfort(result, weather, options)
@@ -108,19 +127,49 @@ def room_thermal(
         pd.DataFrame(gains, index=times).rename_axis("time"),
         comfort,
         summary,
-        {
-            "u_value": thermal.fenestration.u_value,
-            "g_value": float(thermal.g_value[0]),
-            "solar_transmittance": float(thermal.transmittance[0]),
-            "solar_reflectance": float(thermal.reflectance[0]),
-            "visible_transmittance": float(
-                system.visible.direct_hemispherical(system.visible.transmission_front)[0]
-            ),
-        },
+        tuple(fenestration_table(scene, thermals)),
     )
 
 
-def internal_gains(space: Space, hours: int, options: JobOptions) -> Gains:
+def with_states(zone: Zone, thermals: Sequence[Sequence[ThermalSystem]]) -> Zone:
+    """The zone whose windows W have their fenestration in every state."""
+    windows = tuple(
+        replace(window, states=tuple(t.fenestration for t in states))
+        for window, states in zip(zone.windows, thermals, strict=True)
+    )
+    return replace(zone, windows=windows)
+
+
+def per_window(solar: Solar, zone: Zone) -> Solar:
+    """The sun with the state of each window: one with fewer states ends with its last."""
+    most = np.array([len(window.states) - 1 for window in zone.windows])
+    return replace(solar, state=np.minimum(solar.state, most))
+
+
+def fenestration_table(
+    scene: RoomScene, thermals: Sequence[Sequence[ThermalSystem]]
+) -> Iterator[dict[str, float | str]]:
+    """What the windows are, group by group and state by state, at normal incidence."""
+    seen = set()
+    for states, heats in zip(scene.windows.systems, thermals, strict=True):
+        for system, heat in zip(states, heats, strict=True):
+            if id(system) in seen:
+                continue
+            seen.add(id(system))
+            visible = system.visible
+            yield {
+                "system": system.name,
+                "u_value": heat.fenestration.u_value,
+                "g_value": float(heat.g_value[0]),
+                "solar_transmittance": float(heat.transmittance[0]),
+                "solar_reflectance": float(heat.reflectance[0]),
+                "visible_transmittance": float(
+                    visible.direct_hemispherical(visible.transmission_front)[0]
+                ),
+            }
+
+
+def internal_gains(space: Space, hours: int, options: RoomOptions) -> Gains:
     """Heat of people and equipment during the occupied hours."""
     power = space.floor_area * (
         options.equipment_w_m2 + options.person_w / options.floor_per_person
@@ -141,52 +190,98 @@ def climate(weather: Weather) -> Climate:
     )
 
 
-def _sun(
+@dataclass(frozen=True, slots=True)
+class RoomSun:
+    """The sun outside a room and what its surfaces do with it, whatever fills the windows."""
+
+    incident: NDArray[np.float64]  # [G, K, L] irradiance by direction [W/m2]
+    facade: NDArray[np.float64]  # [H, F] on the outside of the zone's surfaces [W/m2]
+    absorbed: Callable[[NDArray[np.float64]], NDArray[np.float64]]  # see `room_sun`
+
+
+def room_sun(
     building: Building,
     space: Space,
     scene: RoomScene,
-    system: System,
-    thermal: ThermalSystem,
-    room: ThermalRoom,
+    daylight: Estimate,
     skies: Skies,
-    options: JobOptions,
+    options: RoomOptions,
+    cache: MatrixCache | None,
+    room: ThermalRoom,
     progress: Progress,
-) -> tuple[Solar, dict[str, NDArray[np.float64]]]:
-    """Sun absorbed by window layers, room surfaces and facades, and its sums for the report."""
-    exterior = exterior_surfaces(building, space, "solar")
-    tracing = {"stopping": Stopping(batches=BATCHES), "seed": options.seed}
-    samples = max(options.patch_samples // BATCHES, 1)
-    daylight = daylight_matrix(
-        exterior,
-        scene.groups,
-        subdivision=options.sky_subdivision,
-        samples=samples,
-        progress=part(progress, 0.0, 0.4, "heat"),
-        **tracing,
-    )
-    absorbed = absorption_matrix(
-        _gathered(interior_surfaces(space, "solar"), room.surface_of_face),
-        scene.groups,
-        window_reflectance=np.full(len(scene.groups), thermal.back_reflectance),
-        samples=samples,
-        progress=part(progress, 0.4, 0.7, "heat"),
-        **tracing,
-    ).values
-    omega = system.solar.basis_in.projected_solid_angles()
-    incident = phases.window_radiance(daylight.values, skies.solar)  # [G, K, L]
-    incident *= omega[:, None]  # now irradiance by direction
-    transmission = [system.solar.transmission_matrix() / omega] * len(scene.groups)
-    entering = np.stack([t @ i for t, i in zip(transmission, incident, strict=True)])
-    area = np.array([group.area for group in scene.groups])
-    entering *= omega[:, None] * area[:, None, None]  # [G, K, L] flux into the room [W]
-    taken = np.einsum("gkf,gkl->lf", absorbed, entering, optimize=True)  # [L, F + G]
+) -> RoomSun:
+    """Trace what the solar gains of a room need.
 
-    group = _group_of_window(space, scene)
-    F = len(room.zone.surfaces)
-    outer = np.einsum("k,gkl->lg", thermal.absorptances.outer, incident, optimize=True)
-    inner = np.einsum("k,gkl->lg", thermal.absorptances.inner, incident, optimize=True)
-    kept = thermal.back_absorptance / max(1.0 - thermal.back_reflectance, 1e-9)
-    facade = _facade(exterior, room, skies, options, part(progress, 0.7, 1.0, "heat"))
+    `absorbed` of the result gives for the windows' diffuse reflectance from the room [G] where a
+    unit of flux of each window patch is absorbed [G, K, F + G].
+    """
+    exterior = exterior_surfaces(building, space, "solar")
+    samples = max(options.patch_samples // BATCHES, 1)
+    tracing = {"samples": samples, "stopping": Stopping(batches=BATCHES), "seed": options.seed}
+    if not np.array_equal(exterior.reflectance, scene.exterior.reflectance):
+        daylight = daylight_matrix(
+            exterior,
+            scene.groups,
+            subdivision=options.sky_subdivision,
+            progress=part(progress, 0.0, 0.4),
+            cache=cache,
+            **tracing,
+        )
+    omega = KLEMS_FULL.projected_solid_angles()
+    incident = phases.window_radiance(daylight.values, skies.solar) * omega[:, None]
+    facade = np.zeros((skies.hours, len(room.zone.surfaces)))
+    if len(room.outdoor):
+        matrix = sky_irradiance_matrix(
+            exterior,
+            room.outdoor_points,
+            room.outdoor_normals,
+            subdivision=options.sky_subdivision,
+            progress=part(progress, 0.4, 0.6),
+            cache=cache,
+            **tracing,
+        )
+        facade[:, room.outdoor] = skies.whole_year(matrix.values @ skies.solar).T
+    interior = _gathered(interior_surfaces(space, "solar"), room.surface_of_face)
+    known: dict[bytes, NDArray[np.float64]] = {}
+
+    def absorbed(reflectance: NDArray[np.float64]) -> NDArray[np.float64]:
+        key = reflectance.tobytes()
+        if key not in known:
+            known[key] = absorption_matrix(
+                interior,
+                scene.groups,
+                window_reflectance=reflectance,
+                progress=part(progress, 0.6, 1.0),
+                **tracing,
+            ).values
+        return known[key]
+
+    return RoomSun(incident, facade, absorbed)
+
+
+def solar_of_state(
+    sun: RoomSun,
+    scene: RoomScene,
+    thermals: Sequence[Sequence[ThermalSystem]],
+    state: int,
+    skies: Skies,
+) -> tuple[Solar, dict[str, NDArray[np.float64]]]:
+    """Sun absorbed by window layers, room surfaces and facades in one state, and its sums [H]."""
+    windows, group = scene.windows, scene.windows.group
+    heats = [states[min(state, len(states) - 1)] for states in thermals]
+    omega = KLEMS_FULL.projected_solid_angles()
+    T = windows.of_state(state, lambda system: system.solar.transmission_matrix() / omega)
+    entering = np.stack([t @ i for t, i in zip(T, sun.incident, strict=True)])
+    area = np.array([g.area for g in scene.groups])
+    entering *= omega[:, None] * area[:, None, None]  # [G, K, L] flux into the room [W]
+    back = np.array([heat.back_reflectance for heat in heats])
+    taken = np.einsum("gkf,gkl->lf", sun.absorbed(back), entering, optimize=True)  # [L, F + G]
+    F = sun.facade.shape[1]
+    outer, inner = (
+        np.einsum("gk,gkl->lg", np.stack([part(h) for h in heats]), sun.incident, optimize=True)
+        for part in (lambda h: h.absorptances.outer, lambda h: h.absorptances.inner)
+    )
+    kept = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
 
     def year(values: NDArray) -> NDArray:
         return skies.whole_year(np.ascontiguousarray(values.T)).T
@@ -195,11 +290,11 @@ def _sun(
         absorbed_outer=year(outer[:, group]),
         absorbed_inner=year(inner[:, group]),
         inside=year(taken[:, :F]),
-        facade=facade,
-        window_inside=year(kept * (taken[:, F:] / area)[:, group]),
+        facade=sun.facade,
+        window_inside=year((kept * taken[:, F:] / area)[:, group]),
     )
     sums = {
-        "incident_w": year((incident.sum(axis=1).T @ area)[:, None])[:, 0],
+        "incident_w": year((sun.incident.sum(axis=1).T @ area)[:, None])[:, 0],
         "transmitted_w": year(entering.sum(axis=(0, 1))[:, None])[:, 0],
         "absorbed_outer_w": year((outer @ area)[:, None])[:, 0],
         "absorbed_inner_w": year((inner @ area)[:, None])[:, 0],
@@ -211,40 +306,6 @@ def _sun(
 def _gathered(surfaces: Surfaces, surface_of_face: NDArray[np.int64]) -> Surfaces:
     """The room's triangles numbered by the surfaces of the zone."""
     return Surfaces(surfaces.triangles, surfaces.reflectance, surface_of_face[surfaces.surface])
-
-
-def _group_of_window(space: Space, scene: RoomScene) -> NDArray[np.int64]:
-    """Group of each window of the space [W]."""
-    return np.array(
-        [
-            next(
-                g
-                for g, group in enumerate(scene.groups)
-                if any(np.array_equal(w.triangles, window.triangles) for w in group.windows)
-            )
-            for window in space.windows
-        ]
-    )
-
-
-def _facade(
-    exterior: Surfaces, room: ThermalRoom, skies: Skies, options: JobOptions, progress: Progress
-) -> NDArray[np.float64]:
-    """Irradiance on the outside of the room's surfaces [H, F] [W/m2], 0 of those indoors."""
-    facade = np.zeros((skies.hours, len(room.zone.surfaces)))
-    if len(room.outdoor):
-        matrix = sky_irradiance_matrix(
-            exterior,
-            room.outdoor_points,
-            room.outdoor_normals,
-            subdivision=options.sky_subdivision,
-            samples=max(options.patch_samples // BATCHES, 1),
-            stopping=Stopping(batches=BATCHES),
-            seed=options.seed,
-            progress=progress,
-        )
-        facade[:, room.outdoor] = skies.whole_year(matrix.values @ skies.solar).T
-    return facade
 
 
 def _temperatures(result: ZoneResult, room: ThermalRoom, weather: Weather) -> pd.DataFrame:
@@ -264,7 +325,7 @@ def _temperatures(result: ZoneResult, room: ThermalRoom, weather: Weather) -> pd
 
 
 def _comfort(
-    result: ZoneResult, weather: Weather, options: JobOptions
+    result: ZoneResult, weather: Weather, options: RoomOptions
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Adaptive comfort (ASHRAE 55) of every hour, and its shares of the occupied ones."""
     mean = running_mean(weather.dry_bulb_c)

@@ -39,7 +39,7 @@ class RoomPage:
     gains: Chart | None
     gains_table: tables.Table
     comfort_table: tables.Table
-    fenestration: tables.Table
+    fenestration: tuple[tables.Table, ...]
 
 
 def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
@@ -68,7 +68,13 @@ def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
         gains=thermal_figures.gains_chart(monthly),
         gains_table=tables.gains_table(monthly),
         comfort_table=tables.values_table("Comfort", room.thermal.comfort_summary),
-        fenestration=tables.values_table("The window with its shade", room.thermal.fenestration),
+        fenestration=tuple(
+            tables.values_table(
+                str(values.get("system", "The window with its shade")),
+                {key: value for key, value in values.items() if key != "system"},
+            )
+            for values in room.thermal.fenestration
+        ),
     )
 
 

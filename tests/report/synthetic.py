@@ -203,9 +203,10 @@ def thermal_result(space: Space, times, beam, cloud, rng) -> ThermalResult:
     used = comfort[occupied]
     summary = {"within_80": 100 * used.within_80.mean(), "within_90": 100 * used.within_90.mean(),
                "too_warm_hours": 210.0, "outside_the_model_hours": 1092.0}  # fmt: skip
-    fenestration = {"u_value": 1.27, "g_value": 0.314, "visible_transmittance": 0.187,
+    fenestration = {"system": "Venetian blind <45>", "u_value": 1.27, "g_value": 0.314,
+                    "visible_transmittance": 0.187,
                     "solar_transmittance": 0.121, "solar_reflectance": 0.402}  # fmt: skip
-    return ThermalResult(temperatures, gains, comfort, summary, fenestration)
+    return ThermalResult(temperatures, gains, comfort, summary, (fenestration,))
 
 
 def problems() -> tuple[Problem, ...]:

@@ -57,23 +57,20 @@ def radiance_illuminance(space, building, folder: Path) -> np.ndarray:
 @pytest.mark.parametrize("name", ["A", "B"])
 def test_year_of_illuminance(name, tmp_path):
     from bim.read_ifc import read_ifc
-    from scenes.job.daylight import room_daylight, room_scene
+    from mitsuba_cfs import variants
     from scenes.job.inputs import read_system, read_weather
-    from scenes.job.options import JobOptions
-    from scenes.job.run import year_of_skies
+    from scenes.job.options import RoomOptions
+    from scenes.job.room import compute_room
+    from scenes.job.windows import everywhere
 
+    variants.activate()
     building = read_ifc(DEMO / "office.ifc")
     space = building.space(name)
-    options = JobOptions(DEMO / "office.ifc", WEATHER, SYSTEM, sensor_spacing=SPACING)
-    weather = read_weather(WEATHER)
-    ours, _, _ = room_daylight(
-        room_scene(building, space, options),
-        read_system(SYSTEM),
-        year_of_skies(weather, options),
-        weather,
-        options,
-        lambda stage, fraction: None,
-    )
+    options = RoomOptions(method="three-phase", sensor_spacing=SPACING)
+    systems = everywhere(space, read_system(SYSTEM))
+    ours = compute_room(
+        building, space, systems, read_weather(WEATHER), options, pictures=False
+    ).daylight
     theirs = radiance_illuminance(space, building, tmp_path).T
     assert theirs.shape == ours.illuminance.shape
     lit = theirs.mean(axis=1) > 1.0  # daylit hours

@@ -1,0 +1,55 @@
+"""Klems matrices of any BSDF: what the matrix methods use of a tensor tree."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
+
+BLOCKS = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
+
+
+def klems_of(bsdf: Bsdf, basis: KlemsBasis = KLEMS_FULL, *, samples: int = 64) -> KlemsBsdf:
+    """The BSDF on a Klems basis, all four blocks: means over pairs of patches.
+
+        f[o, i] = mean of f(omega_o, omega_i) over both patches, weighted by their cosines
+
+    Each column is scaled to the share of light that the block sends on from its patch, which is
+    known better than the mean of so many pairs.
+
+    Args: samples: pairs of directions for each pair of patches.
+    """
+    if isinstance(bsdf, KlemsBsdf) and bsdf.basis_in == bsdf.basis_out == basis:
+        return bsdf.filled()
+    return KlemsBsdf(basis, basis, **{name: _block(bsdf, name, basis, samples) for name in BLOCKS})
+
+
+def _block(bsdf: Bsdf, name: str, basis: KlemsBasis, samples: int) -> NDArray[np.float64]:
+    """One block [K out, K in] [1/sr]."""
+    transmits, front = name.startswith("transmission"), name.endswith("front")
+    K, patches = basis.size, np.arange(basis.size)
+    total, towards = np.zeros((K, K)), []
+    for u_in, v_in, u_out, v_out in qmc.Sobol(4, seed=0).random(samples):
+        incident = _directions(basis, patches, u_in, v_in) * [1, -1, 1 if front else -1]
+        outgoing = _directions(basis, patches, u_out, v_out) * [-1, 1, -1]
+        if front != transmits:  # it leaves outdoors
+            outgoing[:, 2] *= -1
+        values = bsdf_values(bsdf, np.tile(incident, (K, 1)), np.repeat(outgoing, K, axis=0))
+        total += values.reshape(K, K)
+        towards.append(incident)
+    share = direct_hemispherical(bsdf, name, np.concatenate(towards)).reshape(samples, K).sum(0)
+    sampled = basis.projected_solid_angles() @ total
+    return total / samples * np.divide(share, sampled, out=np.ones(K), where=sampled > 0)
+
+
+def _directions(
+    basis: KlemsBasis, patches: NDArray[np.int64], u: float, v: float
+) -> NDArray[np.float64]:
+    """Components [K, 3] of a point of each patch, z upwards; see `KlemsBasis`."""
+    theta, phi = basis.angles_within(patches, u, v)
+    sine = np.sin(theta)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)

@@ -1,0 +1,83 @@
+"""A fenestration system's BSDF as the kernels take it: for the direct sun, and for paths."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import drjit as dr
+import mitsuba as mi
+
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.plugin import klems_plugin
+from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
+from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering, Scattering
+from mitsuba_cfs.trace.lit_room import PatchBeam, System
+
+WINDOW_UP = (0, 1, 0)  # of a plugin that is asked in the window's own frame
+
+
+def sun_scattering(bsdf: Bsdf) -> Scattering:
+    """How a system passes the sun, its through beam kept apart."""
+    if isinstance(bsdf, TensorTreeBsdf):
+        return TreeScattering(bsdf)
+    peak = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
+    return KlemsScattering(bsdf.basis_in, peak.scattered, peak.transmittance)
+
+
+def lit_system(bsdf: Bsdf) -> System:
+    """A system for paths that cross it either way, its through beam kept apart.
+
+    The beam towards the room stands for that of the other direction too.
+    """
+    if isinstance(bsdf, TensorTreeBsdf):
+        scattering, beam = _without_beam(bsdf), TreeBeam(bsdf) if _has_beams(bsdf) else None
+        return System(mi.load_dict(tensor_tree_plugin(scattering)), beam)
+    full = bsdf.filled()
+    front = through_peak(full.transmission_front, bsdf.basis_in)
+    back = through_peak(full.transmission_back, bsdf.basis_in)
+    rest = replace(full, transmission_front=front.scattered, transmission_back=back.scattered)
+    return System(mi.load_dict(klems_plugin(rest)), PatchBeam(bsdf.basis_in, front.transmittance))
+
+
+class TreeBeam:
+    """The share of light that keeps its beam in a tensor tree of rank 4."""
+
+    def __init__(self, tree: TensorTreeBsdf) -> None:
+        self._bsdf = mi.load_dict(tensor_tree_plugin(tree, up=WINDOW_UP, peak=True))
+
+    def at(self, local: mi.Vector3f) -> mi.Float:
+        """Share at local directions of light that passes along the line of `local`."""
+        into_room = -dr.mulsign(local, local.z)
+        return self._bsdf.through(mi.BSDFContext(), into_room, mi.Bool(True))
+
+
+class TreeScattering(PluginScattering):
+    """A tensor tree in window axes, with the through beam of rank 4 kept apart."""
+
+    def __init__(self, tree: TensorTreeBsdf) -> None:
+        self._beam = TreeBeam(tree) if _has_beams(tree) else None
+        plugin = tensor_tree_plugin(tree, up=WINDOW_UP, peak=self._beam is not None)
+        super().__init__(mi.load_dict(plugin), key=tree)
+
+    def through(self, sun: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return mi.Float(0) if self._beam is None else self._beam.at(sun)
+
+
+def _has_beams(tree: TensorTreeBsdf) -> bool:
+    """Only trees of rank 4 tell a beam from scattering."""
+    return next(iter(tree.blocks().values())).rank == 4
+
+
+def _without_beam(bsdf: TensorTreeBsdf) -> TensorTreeBsdf:
+    """The trees without what goes straight on."""
+    if not _has_beams(bsdf):
+        return bsdf
+    trees = {
+        name: tree_peak(tree)[0] if name.startswith("transmission") else tree
+        for name, tree in bsdf.blocks().items()
+    }
+    return TensorTreeBsdf(**trees)
