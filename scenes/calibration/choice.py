@@ -60,11 +60,7 @@ def choose(demand: Demand, calibration: Calibration) -> Choice:
     Where nothing meets both the error and the time, the nearest that the time allows is taken, or
     else the quickest; the reason says so.
     """
-    seconds = {
-        pair: demand.work.seconds(cost)
-        for pair, cost in calibration.costs.items()
-        if pair in ERRORS
-    }
+    seconds = {pair: calibration.seconds(*pair, demand.work) for pair in calibration.pairs()}
     if demand.specular:
         return _choice(SPECULAR, seconds, demand, "a surface of the room mirrors, which eDGP, sDGP "
                        "and the phase methods do not cover: full pictures by paths")  # fmt: skip

@@ -6,27 +6,16 @@ import json
 import os
 import platform
 import tempfile
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import default_folder
+from scenes.cost.measure import Cost
 
 FILE = "calibration.json"
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """Seconds of one method for one metric."""
-
-    scene: float  # once for each room [s]
-    system: float  # once for each fenestration system in a room [s]
-    step: float  # for each time step of a system in a room [s]
-
-    def __post_init__(self) -> None:
-        if min(self.scene, self.system, self.step) < 0:
-            raise ValueError(f"a cost must not be negative: {self}")
+GLARE, PICTURED = ("DGP", "eDGP", "sDGP"), ("DGP", "eDGP")
+HEAT = ("any method", "heat")  # gains, temperatures and comfort of a room
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +24,8 @@ class Work:
 
     scenes: int  # rooms
     systems: int  # in each of them
-    steps: int  # time steps for each system in a room, orientations and climates among them
-
-    def seconds(self, cost: Cost) -> float:
-        """Predicted time: scene + systems + steps, each as often as it comes [s]."""
-        pairs = self.scenes * self.systems
-        return self.scenes * cost.scene + pairs * cost.system + pairs * self.steps * cost.step
+    steps: int  # whose glare is rated, for each system in a room; orientations, climates among them
+    lit: int = 0  # whose illuminance is computed: all with the sun up
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,30 +35,44 @@ class Calibration:
     machine: str
     made: str  # date and time
     picture_size: int  # pixels of a side of the pictures that were rated
-    costs: Mapping[tuple[str, str], Cost]  # by method and metric
+    costs: tuple[Cost, ...]  # of methods and metrics; of a room's heat as `HEAT`
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """Methods and glare metrics that were measured."""
+        return [(c.method, c.metric) for c in self.costs if c.metric in GLARE]
+
+    def seconds(self, method: str, metric: str, work: Work) -> float:
+        """Predicted time of a study: glare, illuminance by the same method, and heat [s]."""
+        total = 0.0
+        parts = ((method, metric, work.steps), (method, "illuminance", work.lit), (*HEAT, work.lit))
+        for name, what, steps in parts:
+            cost = self._cost(name, what)
+            if cost is not None:
+                total += cost.seconds(steps, systems=work.systems, scenes=work.scenes)
+        return total
+
+    def _cost(self, method: str, metric: str) -> Cost | None:
+        return next((c for c in self.costs if (c.method, c.metric) == (method, metric)), None)
 
     def scaled(self, pixels: int) -> Calibration:
         """The costs for another picture size: those of pictures grow with the pixels."""
         factor = (pixels / self.picture_size) ** 2
-        costs = {
-            (method, metric): Cost(factor * c.scene, factor * c.system, factor * c.step)
-            if metric in ("DGP", "eDGP")
+        costs = tuple(
+            replace(
+                c,
+                per_scene=factor * c.per_scene,
+                per_system=factor * c.per_system,
+                per_step=factor * c.per_step,
+            )
+            if c.metric in PICTURED
             else c
-            for (method, metric), c in self.costs.items()
-        }
-        return Calibration(self.machine, self.made, pixels, costs)
+            for c in self.costs
+        )
+        return replace(self, picture_size=pixels, costs=costs)
 
     def write(self, path: Path) -> None:
         """Keep it; the file is the old one or the new one at any time."""
-        table = {
-            "machine": self.machine,
-            "made": self.made,
-            "picture_size": self.picture_size,
-            "costs": [
-                {"method": method, "metric": metric, **asdict(cost)}
-                for (method, metric), cost in self.costs.items()
-            ],
-        }
+        table = asdict(self)
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, part = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".json")
         with open(handle, "w", encoding="utf-8") as file:
@@ -89,17 +88,13 @@ class Calibration:
         """
         try:
             table = json.loads(path.read_text(encoding="utf-8"))
-            costs = {
-                (c["method"], c["metric"]): Cost(c["scene"], c["system"], c["step"])
-                for c in table["costs"]
-            }
-            return cls(table["machine"], table["made"], int(table["picture_size"]), costs)
+            costs = tuple(Cost(**record) for record in table.pop("costs"))
+            return cls(**table, costs=costs)
         except FileNotFoundError:
             raise DataError("is not there: run `cfs calibrate` first", file=path) from None
         except (ValueError, KeyError, TypeError) as error:
-            raise DataError(
-                f"is no calibration ({error}): run `cfs calibrate`", file=path
-            ) from error
+            message = f"is no calibration ({error}): run `cfs calibrate`"
+            raise DataError(message, file=path) from error
 
 
 def calibration_file() -> Path:

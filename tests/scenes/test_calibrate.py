@@ -6,7 +6,8 @@ import pytest
 
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.choice import ERRORS, Demand, choose
-from scenes.calibration.costs import Calibration, Cost, Work
+from scenes.calibration.costs import HEAT, Calibration, Work
+from scenes.cost.measure import Cost
 
 MINUTE, DAY = 60.0, 86400.0
 # Its Tables 5, 8 and 11 [min]; the five-phase sDGP is left out there
@@ -21,7 +22,7 @@ THEIRS = {
     ("point-in-time", "sDGP"): (0, 0, 0.1),
 }
 THEIR_MACHINE = Calibration(
-    "28 cores", "2021", 800, {k: Cost(*(MINUTE * t for t in v)) for k, v in THEIRS.items()}
+    "28 cores", "2021", 800, tuple(Cost(*k, *(MINUTE * t for t in v)) for k, v in THEIRS.items())
 )
 
 
@@ -70,17 +71,24 @@ def test_what_cannot_be_met_is_said(demand, expected, word):
     assert found.method == expected and word in found.why
 
 
-def test_work_counts_each_part_as_often_as_it_comes():
-    assert Work(2, 3, 5).seconds(Cost(100.0, 10.0, 1.0)) == 2 * 100 + 6 * 10 + 30
+def test_a_prediction_counts_each_part_as_often_as_it_comes():
+    costs = (
+        Cost("five-phase", "DGP", 100.0, 10.0, 1.0),
+        Cost("five-phase", "illuminance", 1000.0, 0.0, 0.5),
+        Cost(*HEAT, 10_000.0, 0.0, 0.25),
+    )
+    found = Calibration("m", "now", 400, costs).seconds("five-phase", "DGP", Work(2, 3, 5, 8))
+    assert found == 2 * (100 + 3 * (10 + 5)) + 2 * (1000 + 3 * 4) + 2 * (10_000 + 3 * 2)
 
 
 def test_a_calibration_survives_its_file(tmp_path):
     path = tmp_path / "deep" / "calibration.json"
     THEIR_MACHINE.write(path)
     assert Calibration.read(path) == THEIR_MACHINE
+    one = Work(1, 1, 1)
     half = THEIR_MACHINE.scaled(400)
-    assert half.costs["five-phase", "DGP"].system == pytest.approx(300 * MINUTE / 4)
-    assert half.costs["point-in-time", "sDGP"] == THEIR_MACHINE.costs["point-in-time", "sDGP"]
+    assert half.seconds("five-phase", "DGP", one) == pytest.approx(340 * MINUTE / 4)
+    assert half.seconds("point-in-time", "sDGP", one) == pytest.approx(0.1 * MINUTE)
 
 
 def test_no_calibration_is_one_clear_line(tmp_path):

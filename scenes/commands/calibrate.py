@@ -1,0 +1,40 @@
+"""`cfs calibrate`: what each method costs on this machine, for `cfs study --method auto`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.option(
+    "--size", type=click.IntRange(64, 2000), default=300, show_default=True,
+    help="Pixels of a side of the pictures; costs are scaled to those of a study.",
+)  # fmt: skip
+@click.option(
+    "--out", type=click.Path(path_type=Path, dir_okay=False),
+    help="Where to keep it; default: where `cfs study` looks.",
+)  # fmt: skip
+def command(size: int, out: Path | None) -> None:
+    """Time every method and glare metric on this machine.
+
+    A room of 3.65 x 4.60 x 3.00 m behind the demo's blind: seconds for each scene, each system in
+    it and each time step.  Let nothing else run meanwhile.
+    """
+    from scenes.calibration.costs import calibration_file
+    from scenes.calibration.measure import calibrated
+    from scenes.commands.progress_bar import ProgressBar
+
+    with ProgressBar() as progress:
+        found = calibrated(size, progress=progress)
+    click.echo(f"{found.machine}; pictures of {found.picture_size} x {found.picture_size} pixels")
+    click.echo(f"{'method':14} {'metric':12} {'scene [s]':>10} {'system [s]':>11} {'step [s]':>10}")
+    for c in found.costs:
+        click.echo(
+            f"{c.method:14} {c.metric:12} {c.per_scene:10.2f} {c.per_system:11.2f} "
+            f"{c.per_step:10.4f}"
+        )
+    target = out or calibration_file()
+    found.write(target)
+    click.echo(f"kept: {target}")
