@@ -1,0 +1,1 @@
+"""Studies: rooms x fenestration systems x orientations x climates x methods, case by case."""

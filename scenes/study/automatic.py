@@ -1,0 +1,74 @@
+"""The methods of the cases that leave theirs open, chosen by this machine's costs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.sky.sun import is_up, sun_directions
+from scenes.calibration.choice import Choice, Demand, choose
+from scenes.calibration.costs import Calibration, Work, calibration_file
+from scenes.job.inputs import System, read_system, read_weather
+from scenes.study.case import AUTO, Case, with_method
+from scenes.study.plan import Plan
+from scenes.study.study_file import StudyFile
+from thermal.comfort import hours_between
+
+
+def settled(study: StudyFile, plan: Plan, calibration: Calibration | None = None) -> Plan:
+    """The plan with a method for every case; those of rooms with mirrors have their own.
+
+    Args: calibration: this machine's by default.
+
+    Raises: `DataError` where there is none.
+    """
+    open_cases = [case for case in plan.cases if case.chosen == AUTO]
+    if not open_cases:
+        return plan
+    calibration = calibration or Calibration.read(calibration_file())
+    calibration = calibration.scaled(study.options.picture_size)
+    chosen: dict[bool, Choice] = {}
+    for specular in {case.specular for case in open_cases}:
+        cases = [case for case in open_cases if case.specular == specular]
+        budget = study.auto.time_budget * len(cases) / len(open_cases)
+        demand = Demand(work_of(cases), budget, study.auto.dgp_error, _fine(cases), specular)
+        chosen[specular] = choose(demand, calibration)
+    cases = []
+    for case in plan.cases:
+        if case.chosen == AUTO:
+            choice = chosen[case.specular]
+            metric = "none" if case.glare == "none" else choice.metric
+            case = with_method(case, choice.method, metric, choice.why)
+        cases.append(case)
+    return replace(plan, cases=tuple(cases))
+
+
+def work_of(cases: list[Case]) -> Work:
+    """Rooms, systems, and for each pair the rated hours of all orientations and climates."""
+    scenes = len({case.scene for case in cases})
+    systems = len({case.system for case in cases})
+    hours = {}
+    for case in cases:
+        if case.weather not in hours:
+            weather = read_weather(case.weather.path)
+            used = hours_between(*case.options.occupied, hours=len(weather.times))
+            up = is_up(sun_directions(weather))
+            hours[case.weather] = np.array([np.count_nonzero(used & up), np.count_nonzero(up)])
+    rated, lit = sum(hours[case.weather] for case in cases) / (scenes * systems)
+    return Work(scenes, systems, round(rated), round(lit))
+
+
+def _fine(cases: list[Case]) -> bool:
+    """Whether every system is known finely enough for the sun's disc."""
+    paths = {case.bsdf: case.bsdf.path for case in cases}
+    return all(keeps_the_sun(read_system(path)) for path in paths.values())
+
+
+def keeps_the_sun(system: System) -> bool:
+    """A tensor tree, or a Klems matrix that has the straight beam on its diagonal."""
+    if system.tree is not None:
+        return True
+    matrix = system.visible
+    return bool(through_peak(matrix.transmission_front, matrix.basis_in).transmittance.max() > 0)

@@ -1,0 +1,96 @@
+"""One case of a study: one room, system, orientation, climate and method."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mitsuba_cfs.matrices.cache import digest
+from scenes.job.options import RoomOptions
+
+if TYPE_CHECKING:
+    from scenes.heat.study_file import BoxTable
+
+AUTO = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """An input file as it was when the study was planned."""
+
+    path: Path
+    sha256: str
+
+    @classmethod
+    def of(cls, path: Path) -> Source:
+        """The file with the hash of its bytes."""
+        with open(path, "rb") as file:
+            return cls(path, hashlib.file_digest(file, "sha256").hexdigest())
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """Everything that one result depends on; can be sent to another process."""
+
+    room: str  # name of the [[room]] entry
+    space: str  # GUID
+    space_name: str
+    building: Source | BoxTable
+    specular: bool
+    system: str
+    bsdf: Source
+    thermal: Source | None  # the .toml file beside the BSDF
+    u_value: float | None
+    g_value: float | None
+    climate: str
+    weather: Source
+    orientation_deg: float  # the model is turned clockwise by it
+    options: RoomOptions  # the method with them
+    program: str  # `program_version()` of the plan
+    glare: str  # DGP, eDGP, sDGP or none
+    chosen: str = ""  # why this method, where `auto` chose it
+
+    @property
+    def key(self) -> str:
+        """A hash of what the numbers depend on: not of names, paths or reasons."""
+        files = [s.sha256 for s in (self.bsdf, self.thermal, self.weather) if s is not None]
+        return digest(
+            self.program,
+            self.scene,
+            files,
+            self.u_value,
+            self.g_value,
+            self.orientation_deg % 360.0,
+            _plain(asdict(self.options)),
+            self.glare,
+        )[:32]
+
+    @property
+    def scene(self) -> str:
+        """A hash of the room alone: cases that have it share traced matrices."""
+        building = self.building
+        source = building.sha256 if isinstance(building, Source) else building.model_dump_json()
+        return digest(source, self.space)[:32]
+
+
+def _plain(table: dict) -> list:
+    return [[name, list(v) if isinstance(v, tuple) else v] for name, v in sorted(table.items())]
+
+
+def with_method(case: Case, method: str, metric: str, why: str) -> Case:
+    """The case with the method and the glare metric that `auto` chose for it."""
+    return replace(case, options=replace(case.options, method=method), glare=metric, chosen=why)
+
+
+@cache
+def program_version() -> str:
+    """A hash of the source that computes a case, and of what it is built on."""
+    root = Path(__file__).parents[2]
+    folders = ("mitsuba_cfs", "bim", "thermal", "scenes/job", "scenes/study")
+    sources = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
+    versions = [metadata.version(name) for name in ("mitsuba", "drjit", "numpy", "ifcopenshell")]
+    return digest(*versions, *(source.read_bytes() for source in sources))

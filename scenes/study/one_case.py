@@ -1,0 +1,179 @@
+"""One case of a study, from its files to its figures."""
+
+from __future__ import annotations
+
+import threading
+import time
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bim.model import Building, Space
+from bim.read_ifc import read_ifc
+from mitsuba_cfs import variants
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.sky.sun import is_up, sun_directions
+from mitsuba_cfs.sky.weather import Weather
+from scenes.heat.study import box_building
+from scenes.job.inputs import System, read_system, read_weather
+from scenes.job.room import compute_room, skies_for
+from scenes.job.skies import Skies
+from scenes.job.windows import everywhere
+from scenes.results import SpaceResult
+from scenes.study.case import Case, Source, program_version
+from scenes.study.glare import occupied_glare
+from scenes.study.store import CaseResult
+from thermal.comfort import hours_between
+
+WARM_C = 26.0  # operative temperature above which hours are counted
+KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
+ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have several threads
+
+
+def compute_case(case: Case) -> CaseResult:
+    """Figures and arrays of a case.
+
+    Raises: `DataError` for a file that has changed or cannot be used, `ValueError` for a room that
+    cannot be computed.
+    """
+    with ALONE:
+        return _computed(case)
+
+
+def _computed(case: Case) -> CaseResult:
+    start = time.monotonic()
+    if case.program != program_version():
+        raise DataError("this process runs another version of the program than the study's")
+    for source in (case.bsdf, case.thermal, case.weather, case.building):
+        if isinstance(source, Source) and Source.of(source.path) != source:
+            raise DataError("is not the file that it was when the study began", file=source.path)
+    variants.activate()
+    building, space = _room(case)
+    system = _system(case)
+    weather = _weather(case.weather, case.orientation_deg)
+    skies = _skies(case.weather, case.orientation_deg, case.options)
+    cache = MatrixCache.of_user()
+    room = compute_room(
+        building, space, everywhere(space, system), weather, case.options,
+        skies=skies, cache=cache, pictures=False,
+    )  # fmt: skip
+    figures, arrays = _figures(room, case)
+    arrays["times"] = weather.midpoints.to_numpy().astype("datetime64[s]").astype(np.int64)
+    if case.glare != "none":
+        begin = time.monotonic()
+        hours = _rated_hours(weather, case.options.occupied)
+        dgp = occupied_glare(building, space, system, weather, hours, case)
+        figures |= glare_figures(dgp, weather, case.options.occupied)
+        figures["glare_s"] = round(time.monotonic() - begin, 3)
+        arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
+        arrays["dgp"][hours] = dgp
+    figures["seconds"] = round(time.monotonic() - start, 3)
+    return CaseResult(case.key, figures, arrays)
+
+
+@lru_cache(maxsize=4)
+def _building(source: Source) -> Building:
+    return read_ifc(source.path)
+
+
+def _room(case: Case) -> tuple[Building, Space]:
+    if isinstance(case.building, Source):
+        building = _building(case.building)
+    else:
+        building = box_building(case.building)
+    return building, building.space(case.space)
+
+
+@lru_cache(maxsize=4)
+def _read_weather(source: Source) -> Weather:
+    return read_weather(source.path)
+
+
+def _weather(source: Source, angle: float) -> Weather:
+    return _read_weather(source).turned(angle)
+
+
+@lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
+def _skies_of(source: Source, angle: float, subdivision: int, options) -> Skies:
+    return skies_for(_weather(source, angle), options)
+
+
+def _skies(source: Source, angle: float, options) -> Skies:
+    return _skies_of(source, angle, options.sky_subdivision, options)
+
+
+def _system(case: Case) -> System:
+    return read_system(case.bsdf.path, u_value=case.u_value, g_value=case.g_value)
+
+
+def _rated_hours(weather: Weather, occupied: tuple[int, int]) -> NDArray[np.int64]:
+    """Hours of the year whose glare counts: occupied, and the sun up."""
+    used = hours_between(*occupied, hours=len(weather.times))
+    return np.flatnonzero(used & is_up(sun_directions(weather)))
+
+
+def glare_figures(
+    dgp: NDArray[np.float64], weather: Weather, occupied: tuple[int, int]
+) -> dict[str, float | str]:
+    """Hours by class, the worst, what 5 % of the hours exceed; occupied hours in the dark count as
+    imperceptible.
+
+    Args: dgp: [h] of the occupied hours with the sun up.
+    """
+    used = int(np.count_nonzero(hours_between(*occupied, hours=len(weather.times))))
+    every = np.concatenate([dgp, np.zeros(used - len(dgp))])
+    hours = class_hours(every) * weather.step_h
+    found: dict[str, float | str] = {
+        f"glare_{name}_h": float(count) for name, count in zip(CLASSES, hours, strict=True)
+    }
+    found["dgp_max"] = float(np.max(dgp, initial=0.0))
+    found["dgp_mean"] = float(np.mean(dgp)) if len(dgp) else 0.0
+    found["dgp_5_percent"] = hour_not_exceeded(every)
+    found["glare_protection"] = protection_level(every)
+    return found
+
+
+def _figures(room: SpaceResult, case: Case) -> tuple[dict[str, float | str], dict[str, NDArray]]:
+    """Daylight, temperatures and comfort as figures of the table and arrays of the report."""
+    daylight, heat = room.daylight, room.thermal
+    figures: dict[str, float | str] = {k: float(v) for k, v in daylight.room_metrics.items()}
+    figures["illuminance_error_mean"] = 100.0 * float(daylight.relative_error.mean())
+    figures["illuminance_error_max"] = 100.0 * float(daylight.relative_error.max())
+    figures |= heat_figures(heat.temperatures, heat.comfort)
+    figures |= {k: float(v) for k, v in heat.comfort_summary.items()}
+    window = heat.fenestration[0]
+    figures |= {k: float(v) for k, v in window.items() if not isinstance(v, str)}
+    figures |= {f"{stage}_s": seconds for stage, seconds in room.seconds.items()}
+    arrays: dict[str, NDArray] = {
+        "points": daylight.points,
+        "relative_error": daylight.relative_error,
+        "mean_illuminance": daylight.illuminance.mean(axis=0),
+        "median_illuminance": np.median(daylight.illuminance, axis=1).astype(np.float32),
+    }
+    arrays |= {f"sensor/{k}": v.to_numpy() for k, v in daylight.sensor_metrics.items()}
+    arrays |= {
+        f"temperature/{k}": heat.temperatures[k].to_numpy(np.float32) for k in KEPT_TEMPERATURES
+    }
+    for name, column in heat.comfort.items():
+        flag = column.dtype == bool
+        arrays[f"comfort/{name}"] = column.to_numpy(bool if flag else np.float32)
+    return figures, arrays
+
+
+def heat_figures(temperatures: pd.DataFrame, comfort: pd.DataFrame) -> dict[str, float]:
+    """Operative temperatures of the occupied hours, and how many are warm or comfortable [h]."""
+    used = comfort["occupied"].to_numpy(bool)
+    operative = temperatures["operative_c"].to_numpy()[used]
+    found = {
+        "operative_min_c": float(operative.min()),
+        "operative_mean_c": float(operative.mean()),
+        "operative_max_c": float(operative.max()),
+        "warm_h": float(np.count_nonzero(operative > WARM_C)),
+    }
+    for band in ("within_90", "within_80"):
+        found[f"comfortable_{band[-2:]}_h"] = float(comfort.loc[used, band].sum())
+    return found

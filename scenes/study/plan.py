@@ -1,0 +1,91 @@
+"""The grid of a study: every room with every system, orientation, climate and method."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bim.model import Building, Space
+from bim.read_ifc import read_ifc
+from scenes.heat.study import box_building
+from scenes.job.inputs import chosen_spaces
+from scenes.job.options import RoomOptions
+from scenes.study.case import AUTO, Case, Source, program_version
+from scenes.study.study_file import RoomTable, StudyFile
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A study's grid, and the rooms in it."""
+
+    cases: tuple[Case, ...]
+    rooms: dict[str, tuple[Building, Space]]  # by `Case.scene`
+
+
+def plan_of(study: StudyFile) -> Plan:
+    """The grid of a study, ordered so that neighbours share most.
+
+    Raises: `DataError` for a file that cannot be read or has no such room.
+    """
+    systems = []
+    for system in study.system:
+        beside = system.bsdf.with_suffix(".toml")
+        systems.append(
+            {
+                "system": system.name,
+                "bsdf": Source.of(system.bsdf),
+                "thermal": Source.of(beside) if beside.is_file() else None,
+                "u_value": system.u_value,
+                "g_value": system.g_value,
+            }
+        )
+    climates = [{"climate": c.name, "weather": Source.of(c.weather)} for c in study.climate]
+    found: list[Case] = []
+    rooms = {}
+    for room in study.room:
+        building, spaces = rooms_of(room)
+        source = room.box if room.box is not None else Source.of(room.building)
+        for space in spaces:
+            about = {
+                "room": room.name,
+                "space": space.guid,
+                "space_name": space.name or space.guid,
+                "building": source,
+                "specular": room.specular,
+            }
+            of_space = list(_of_space(study, about, systems, climates))
+            rooms[of_space[0].scene] = building, space
+            found += of_space
+    return Plan(tuple(found), rooms)
+
+
+def _of_space(
+    study: StudyFile, room: dict, systems: list[dict], climates: list[dict]
+) -> Iterator[Case]:
+    """Every case of one room."""
+    for climate in climates:
+        for angle in study.orientations_deg:
+            for method in study.methods:
+                # an open method keeps the default's place until `auto` is settled
+                options = {} if method == AUTO else {"method": method}
+                options |= study.options.model_dump()
+                for system in systems:
+                    yield Case(
+                        **room,
+                        **system,
+                        **climate,
+                        orientation_deg=angle,
+                        options=RoomOptions(**options),
+                        program=program_version(),
+                        glare=study.glare,
+                        chosen=AUTO if method == AUTO else "",
+                    )
+
+
+def rooms_of(room: RoomTable) -> tuple[Building, list[Space]]:
+    """The building of an entry and the rooms asked for."""
+    if room.box is not None:
+        building = box_building(room.box)
+        return building, list(building.spaces)
+    building = read_ifc(room.building)
+    return building, chosen_spaces(building, room.spaces, room.building)

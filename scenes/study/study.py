@@ -1,0 +1,138 @@
+"""A whole study: what is planned, what is computed, and the table that comes of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bim.model import Problem, Space
+from mitsuba_cfs.progress import Progress, silent
+from scenes.report.glare_figures import compass
+from scenes.study.case import Case
+from scenes.study.one_case import compute_case
+from scenes.study.plan import Plan, plan_of
+from scenes.study.schedule import Compute, computed
+from scenes.study.store import CaseResult, Store
+from scenes.study.study_file import StudyFile
+
+
+@dataclass(frozen=True, slots=True)
+class StudyResult:
+    """The cases of a study with their results, in the grid's order."""
+
+    title: str
+    plan: Plan
+    results: tuple[CaseResult, ...]  # of each case of the plan
+    reused: int  # cases that an earlier run had finished
+    seconds: float
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def failed(self) -> int:
+        """How many cases have no result."""
+        return sum(bool(result.error) for result in self.results)
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """The faults of all building models, each once."""
+        found = {}
+        for building, _ in self.plan.rooms.values():
+            found |= {(p.where, p.what): p for p in building.problems}
+        return tuple(found.values())
+
+    def rows(self) -> list[dict]:
+        """One row a case: what it is, whether it was computed, and every figure of it."""
+        columns = dict.fromkeys(name for r in self.results for name in r.figures)
+        rows = []
+        for case, result in zip(self.plan.cases, self.results, strict=True):
+            _, space = self.plan.rooms[case.scene]
+            empty = dict.fromkeys(columns)
+            rows.append(described(case, space) | {"status": _status(result), "error": result.error}
+                        | empty | result.figures | {"key": case.key})  # fmt: skip
+        return rows
+
+
+def run_study(
+    study: StudyFile,
+    store: Store,
+    *,
+    plan: Plan | None = None,
+    processes: int = 1,
+    scheduler: str | None = None,
+    compute: Compute = compute_case,
+    progress: Progress = silent,
+    told: Callable[[Case, CaseResult, int, int], None] | None = None,
+) -> StudyResult:
+    """Compute what the folder does not have yet, and write the table.
+
+    Finished cases are kept one by one: a run that is cut off goes on where it was.
+
+    Args:
+        plan: of the study, with the methods that `auto` chose.
+        processes, scheduler: see `scenes.study.schedule.computed`.
+        told: called with each case that is ready, how many are, and of how many.
+    """
+    start = time.monotonic()
+    plan = plan or plan_of(study)
+    store.write_mark(manifest(study, plan))
+    cases = {case.key: case for case in plan.cases}
+    found = {key: result for key in cases if (result := store.load(key)) is not None}
+    reused, total = len(found), len(cases)
+    progress("cases", len(found) / total)
+    left = [case for key, case in cases.items() if key not in found]
+    for result in computed(left, compute, processes=processes, scheduler=scheduler):
+        if not result.error:
+            store.save(result)
+        found[result.key] = result
+        progress("cases", len(found) / total)
+        if told is not None:
+            told(cases[result.key], result, len(found), total)
+    results = tuple(found[case.key] for case in plan.cases)
+    finished = StudyResult(study.title, plan, results, reused, round(time.monotonic() - start, 3))
+    store.write_tables(finished.rows())
+    return finished
+
+
+def described(case: Case, space: Space) -> dict:
+    """What a case is, in the columns that come first."""
+    return {
+        "room": case.room,
+        "space": case.space_name,
+        "system": case.system,
+        "climate": case.climate,
+        "orientation_deg": case.orientation_deg,
+        "facing": facing(space, case.orientation_deg),
+        "method": case.options.method,
+        "glare": case.glare,
+        "why": case.chosen,
+    }
+
+
+def facing(space: Space, orientation_deg: float) -> str:
+    """Where the biggest window of a turned room looks."""
+    normal = max(space.windows, key=lambda window: window.area).normal
+    if normal[2] > 0.7:
+        return "up"
+    azimuth = np.arctan2(normal[0], normal[1]) + np.radians(orientation_deg)
+    return compass([np.sin(azimuth), np.cos(azimuth)])
+
+
+def _status(result: CaseResult) -> str:
+    return "failed" if result.error else "done"
+
+
+def manifest(study: StudyFile, plan: Plan) -> dict:
+    """What makes the same table again: the study, and the hashes of its files."""
+    files = {}
+    for case in plan.cases:
+        for source in (case.bsdf, case.thermal, case.weather, case.building):
+            if path := getattr(source, "path", None):
+                files[str(path)] = source.sha256
+    return {
+        "study": study.model_dump(mode="json"),
+        "sha256": files,
+        "cases": [case.key for case in plan.cases],
+    }

@@ -1,0 +1,180 @@
+"""The study file of `cfs study`: rooms, systems, climates, orientations, methods and options."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    create_model,
+    model_validator,
+)
+
+from mitsuba_cfs.errors import DataError
+from scenes.calibration.durations import seconds_of, share_of
+from scenes.heat.study_file import BoxTable
+from scenes.job.options import RoomOptions
+
+Name = Annotated[str, Field(min_length=1)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+class RoomTable(_Table):
+    """Rooms of a building file, or one box."""
+
+    name: str = ""
+    building: Path | None = None
+    spaces: tuple[Name, ...] = ()  # names or GUIDs; none: every space with a window
+    box: BoxTable | None = None
+    specular: bool = False  # something in the room mirrors: glare then needs full pictures
+
+    @model_validator(mode="after")
+    def _one_source(self) -> RoomTable:
+        if (self.building is None) == (self.box is None):
+            raise ValueError("give either `building` or `box`")
+        if self.box is not None and self.spaces:
+            raise ValueError("`spaces` belong to a `building`; a box is one room")
+        return self
+
+
+class SystemTable(_Table):
+    """A fenestration system: its BSDF file, and U and g where that has none beside it."""
+
+    name: str = ""
+    bsdf: Path
+    u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None  # [W/(m2 K)]
+    g_value: Annotated[float, Field(ge=0, le=1)] | None = None
+
+
+class ClimateTable(_Table):
+    """A weather file."""
+
+    name: str = ""
+    weather: Path
+
+
+class AutoTable(_Table):
+    """What `auto` in the methods may take, and how good its DGP must be."""
+
+    time_budget: Annotated[float, BeforeValidator(seconds_of)] = "1h"  # of the whole study
+    dgp_error: Annotated[float, BeforeValidator(share_of)] = "25%"  # relative, root mean square
+
+
+def _options_table() -> type[BaseModel]:
+    """The options of a room without its method, which the grid has; no number is negative."""
+    hints = get_type_hints(RoomOptions)
+    columns: dict[str, Any] = {}
+    for field in fields(RoomOptions):
+        if field.name != "method":
+            kind = hints[field.name]
+            if kind in (int, float):
+                kind = Annotated[kind, Field(ge=0)]
+            columns[field.name] = (kind, field.default)
+    return create_model("options", __base__=_Table, **columns)
+
+
+OptionsTable = _options_table()
+
+
+class StudyFile(_Table):
+    """A whole study; paths are relative to the file."""
+
+    title: str = ""
+    room: Annotated[tuple[RoomTable, ...], Field(min_length=1)]
+    system: Annotated[tuple[SystemTable, ...], Field(min_length=1)]
+    climate: Annotated[tuple[ClimateTable, ...], Field(min_length=1)]
+    orientations_deg: Annotated[tuple[float, ...], Field(min_length=1)] = (0.0,)  # clockwise
+    methods: Annotated[
+        tuple[Literal["three-phase", "five-phase", "point-in-time", "auto"], ...],
+        Field(min_length=1),
+    ] = (RoomOptions().method,)
+    glare: Literal["DGP", "eDGP", "sDGP", "none"] = "DGP"  # of every occupied hour with sun
+    auto: AutoTable = AutoTable()
+    options: OptionsTable = OptionsTable()
+
+    @model_validator(mode="after")
+    def _no_twins(self) -> StudyFile:
+        for key in ("room", "system", "climate"):
+            _unique(key, [entry.name for entry in getattr(self, key)])
+        turned = [angle % 360.0 for angle in self.orientations_deg]
+        _unique("orientations_deg", turned)
+        _unique("methods", self.methods)
+        return self
+
+
+def _unique(key: str, values) -> None:
+    seen = set()
+    for value in values:
+        if value in seen:
+            raise ValueError(f"{key}: {value!r} comes twice")
+        seen.add(value)
+
+
+def read_study(path: Path, *, automatic: bool = False, **auto: str) -> StudyFile:
+    """The study of a TOML file, its paths made absolute and every entry named.
+
+    Args:
+        automatic: `auto` in place of the file's methods.
+        auto: `time_budget`, `dgp_error` in place of those in the file's `[auto]`.
+
+    Raises: `DataError` naming the file and the key.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"is not TOML: {error}", file=path) from error
+    _name_entries(table)
+    if automatic:
+        table["methods"] = ["auto"]
+    if auto:
+        table["auto"] = table.get("auto", {}) | auto
+    try:
+        study = StudyFile.model_validate(table)
+    except ValidationError as error:
+        first, *others = error.errors(include_url=False)
+        field = ".".join(str(part) for part in first["loc"])
+        more = f" (and {len(others)} more)" if others else ""
+        message = first["msg"].removeprefix("Value error, ") + more
+        raise DataError(message, file=path, field=field or None) from error
+    return _with_places(study, path)
+
+
+def _name_entries(table: dict) -> None:
+    """Give rooms, systems and climates without a name that of their file."""
+    for key, file in (("room", "building"), ("system", "bsdf"), ("climate", "weather")):
+        entries = table.get(key)
+        for number, entry in enumerate(entries if isinstance(entries, list) else [], 1):
+            if isinstance(entry, dict) and "name" not in entry:
+                source = entry.get(file)
+                named = Path(source).stem if isinstance(source, str) else f"{key} {number}"
+                entry["name"] = named
+
+
+def _with_places(study: StudyFile, path: Path) -> StudyFile:
+    """The study with absolute paths of files that are there."""
+
+    def there(name: Path, key: str) -> Path:
+        place = (path.parent / name).absolute()
+        if not place.is_file():
+            raise DataError(f"no such file: {name}", file=path, field=key)
+        return place
+
+    found = {}
+    for key, file in (("room", "building"), ("system", "bsdf"), ("climate", "weather")):
+        entries = []
+        for number, entry in enumerate(getattr(study, key)):
+            name = getattr(entry, file)
+            update = {} if name is None else {file: there(name, f"{key}.{number}.{file}")}
+            entries.append(entry.model_copy(update=update))
+        found[key] = tuple(entries)
+    return study.model_copy(update=found)

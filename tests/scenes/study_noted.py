@@ -1,0 +1,25 @@
+"""A case that takes its time and leaves its traces; a module that workers import quickly."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from mitsuba_cfs.errors import DataError
+from scenes.study.case import Case
+from scenes.study.store import CaseResult
+
+SECONDS = 0.25  # of a case of these tests
+
+
+def noted(case: Case) -> CaseResult:
+    """A case that takes its time and leaves a line when it is begun and when it is done."""
+    log = Path(case.room)  # the tests put the log's path there
+    with log.open("a") as file:
+        file.write(f"begin {case.orientation_deg:g}\n")
+    time.sleep(SECONDS)
+    if case.orientation_deg == 13:
+        raise DataError("this one fails")
+    with log.open("a") as file:
+        file.write(f"end {case.orientation_deg:g}\n")
+    return CaseResult(case.key, {"angle": case.orientation_deg})
