@@ -12,6 +12,7 @@ import ifcopenshell.guid
 from bim.fenestration import ShadingState
 from bim.ifc.fenestration_write import attach_state
 from bim.ifc.project import open_ifc
+from bim.ifc.property_sets import owner_of, save
 from mitsuba_cfs.errors import DataError
 
 GLAZED = ("IfcWindow", "IfcDoor", "IfcPlate", "IfcCurtainWall")
@@ -41,12 +42,7 @@ def attach(
         attach_state(model, targets, state)
     if bsdf_reference is not None:
         refer(model, targets, os.path.relpath(bsdf_reference, Path(out).resolve().parent))
-    part = Path(out).with_name(Path(out).name + ".part")
-    try:
-        model.write(str(part))
-        part.replace(out)
-    except (OSError, RuntimeError) as error:
-        raise DataError(f"cannot be written: {error}", file=out) from None
+    save(model, out)
     return len(targets)
 
 
@@ -87,14 +83,13 @@ def refer(
     model: ifcopenshell.file, targets: Sequence[ifcopenshell.entity_instance], location: str
 ) -> None:
     """Associate a BSDF file with windows or types by an IfcDocumentReference."""
-    histories = model.by_type("IfcOwnerHistory")
     reference = model.create_entity(
         "IfcDocumentReference", Location=location.replace(os.sep, "/"), Name="BSDF"
     )
     model.create_entity(
         "IfcRelAssociatesDocument",
         GlobalId=ifcopenshell.guid.new(),
-        OwnerHistory=histories[0] if histories else None,
+        OwnerHistory=owner_of(model),
         Name="BSDF",
         RelatedObjects=list(targets),
         RelatingDocument=reference,

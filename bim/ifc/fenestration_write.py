@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import ifcopenshell
-import ifcopenshell.guid
 import numpy as np
 
 from bim.fenestration import AngularGValue, ShadingState
+from bim.ifc.property_sets import Entity, give_set
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 
@@ -29,7 +29,6 @@ BLOCKS = {
 }
 WAVELENGTHS = {"Visible": (380.0, 780.0), "Solar": (300.0, 2500.0)}  # of the bands [nm]
 KLEMS, TREE = "BSDF matrix", "BSDF tensor tree"
-Entity = ifcopenshell.entity_instance
 
 
 def attach_state(model: ifcopenshell.file, targets: Sequence[Entity], state: ShadingState) -> None:
@@ -42,22 +41,8 @@ def attach_state(model: ifcopenshell.file, targets: Sequence[Entity], state: Sha
         properties.append(writer.single("U-value", "IfcThermalTransmittanceMeasure", state.u_value))
     if not properties:
         raise ValueError("a shading state needs a BSDF, g-values or a U-value")
-    name = set_name(state.name)
-    for target in targets:
-        _detach(model, target, name)
-    pset = writer.create(
-        "IfcPropertySet", ifcopenshell.guid.new(), writer.owner, name,
-        "Optical and thermal properties of a fenestration system by direction", properties,
-    )  # fmt: skip
-    types = [target for target in targets if target.is_a("IfcTypeObject")]
-    for target in types:
-        target.HasPropertySets = [*(target.HasPropertySets or ()), pset]
-    objects = [target for target in targets if not target.is_a("IfcTypeObject")]
-    if objects:
-        writer.create(
-            "IfcRelDefinesByProperties", ifcopenshell.guid.new(), writer.owner, None, None,
-            objects, pset,
-        )  # fmt: skip
+    what = "Optical and thermal properties of a fenestration system by direction"
+    give_set(model, targets, set_name(state.name), what, properties)
 
 
 def set_name(state: str) -> str:
@@ -65,30 +50,11 @@ def set_name(state: str) -> str:
     return f"{SET_NAME}: {state}" if state else SET_NAME
 
 
-def _detach(model: ifcopenshell.file, target: Entity, name: str) -> None:
-    """Take the property set of that name off a window or type."""
-    if target.is_a("IfcTypeObject"):
-        kept = [one for one in target.HasPropertySets or () if one.Name != name]
-        target.HasPropertySets = kept or None
-        return
-    for relation in list(target.IsDefinedBy or ()):
-        pset = getattr(relation, "RelatingPropertyDefinition", None)
-        if pset is None or pset.Name != name:
-            continue
-        others = [one for one in relation.RelatedObjects if one != target]
-        if others:
-            relation.RelatedObjects = others
-        else:
-            model.remove(relation)
-
-
 class _Writer:
     """Makes property entities of one model."""
 
     def __init__(self, model: ifcopenshell.file) -> None:
         self._model = model
-        histories = model.by_type("IfcOwnerHistory")
-        self.owner = histories[0] if histories else None
         self._radian = self.create("IfcSIUnit", None, "PLANEANGLEUNIT", None, "RADIAN")
         self._nanometre = self.create("IfcSIUnit", None, "LENGTHUNIT", "NANO", "METRE")
 

@@ -1,0 +1,72 @@
+"""Property sets given to elements of a model, and the model written to a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import ifcopenshell
+import ifcopenshell.guid
+
+from mitsuba_cfs.errors import DataError
+
+Entity = ifcopenshell.entity_instance
+
+
+def owner_of(model: ifcopenshell.file) -> Entity | None:
+    """The first owner history, which IFC2X3 demands of every set; None where there is none."""
+    histories = model.by_type("IfcOwnerHistory")
+    return histories[0] if histories else None
+
+
+def give_set(
+    model: ifcopenshell.file,
+    targets: Sequence[Entity],
+    name: str,
+    description: str,
+    properties: Sequence[Entity],
+) -> None:
+    """Give elements or types a property set; one of that name that they have is replaced."""
+    for target in targets:
+        _take_off(model, target, name)
+    owner = owner_of(model)
+    pset = model.create_entity(
+        "IfcPropertySet", ifcopenshell.guid.new(), owner, name, description, list(properties)
+    )
+    types = [target for target in targets if target.is_a("IfcTypeObject")]
+    for target in types:
+        target.HasPropertySets = [*(target.HasPropertySets or ()), pset]
+    objects = [target for target in targets if not target.is_a("IfcTypeObject")]
+    if objects:
+        model.create_entity(
+            "IfcRelDefinesByProperties", ifcopenshell.guid.new(), owner, None, None, objects, pset
+        )
+
+
+def _take_off(model: ifcopenshell.file, target: Entity, name: str) -> None:
+    """Take the property set of that name off an element or type."""
+    if target.is_a("IfcTypeObject"):
+        kept = [one for one in target.HasPropertySets or () if one.Name != name]
+        target.HasPropertySets = kept or None
+        return
+    for relation in list(target.IsDefinedBy or ()):
+        pset = getattr(relation, "RelatingPropertyDefinition", None)
+        if pset is None or pset.Name != name:
+            continue
+        others = [one for one in relation.RelatedObjects if one != target]
+        if others:
+            relation.RelatedObjects = others
+        else:
+            model.remove(relation)
+            if not pset.DefinesType and not model.get_total_inverses(pset):
+                model.remove(pset)
+
+
+def save(model: ifcopenshell.file, out: str | Path) -> None:
+    """Write the model; a file of that name is replaced only once the new one is whole."""
+    part = Path(out).with_name(Path(out).name + ".part")
+    try:
+        model.write(str(part))
+        part.replace(out)
+    except (OSError, RuntimeError) as error:
+        raise DataError(f"cannot be written: {error}", file=out) from None
