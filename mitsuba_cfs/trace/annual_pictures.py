@@ -24,12 +24,12 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.image import picture_matrix_blocks
 from mitsuba_cfs.trace.picture_outdoors import Outdoors
+from mitsuba_cfs.trace.picture_sharing import FACE_STEPS
 from mitsuba_cfs.trace.picture_sun import PictureSun
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
 TILE = 4  # [px]
-FACE_STEPS = 8  # normals that differ less than 1/16 in each component are one face
 NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
 
 
@@ -58,6 +58,7 @@ def view_matrices(
     tile: int = TILE,
     memory: float = MEMORY,
     folder: Path | None = None,
+    window_reflectance: ArrayLike | None = None,
     progress: Progress = silent,
     **options,
 ) -> ViewMatrices:
@@ -69,9 +70,10 @@ def view_matrices(
         memory: budget [bytes]; 800 x 800 pixels and a window group take 45 MB, without tiles 582.
         folder: of the files where they lie on disk (they go with the process); the system's
             temporary folder by default.
+        window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
         options: basis, samples, max_depth, seed of `picture_matrix_blocks`.
     """
-    pixels, row = _tiles(TracedScene(surfaces, groups), view, tile)
+    pixels, row, group = _tiles(TracedScene(surfaces, groups), view, tile)
     m = int(row.max()) + 1
     columns = len(groups) * options.get("basis", KLEMS_FULL).size
     indirect, lit = (_storage((m, columns), 8 * m * columns > memory, folder) for _ in range(2))
@@ -79,9 +81,17 @@ def view_matrices(
     depth = options.pop("max_depth", 32)
     traced = (
         picture_matrix_blocks(
-            surfaces, groups, view, max_depth=depth, progress=progress, **options
+            surfaces,
+            groups,
+            view,
+            max_depth=depth,
+            window_reflectance=window_reflectance,
+            progress=progress,
+            **options,
         ),
-        picture_matrix_blocks(surfaces, groups, view, max_depth=1, **options),
+        picture_matrix_blocks(
+            surfaces, groups, view, max_depth=1, window_reflectance=window_reflectance, **options
+        ),
         picture_matrix_blocks(black, groups, view, max_depth=1, **options),
     )
     seen, start = [], 0
@@ -93,7 +103,11 @@ def view_matrices(
         seen.append(sparse.csr_array(none.reshape(shape)))
         start += len(block)
     seen = sparse.csr_array(sparse.vstack(seen))
-    share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0).astype(np.float32)
+    share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0)
+    if window_reflectance is not None:  # where a window reflects, all of a pixel does
+        reflecting = np.append(np.asarray(window_reflectance) > 0, False)  # OPAQUE is the last
+        share = np.where(reflecting[group], 1.0, share)
+    share = share.astype(np.float32)
     total = np.maximum(np.bincount(row, share, minlength=m), 0.5 / options.get("samples", 32))
     for rows in (indirect, lit):
         rows /= total[:, None].astype(np.float32)
@@ -103,22 +117,24 @@ def view_matrices(
 
 def _tiles(
     tracer: TracedScene, view: View, tile: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The pixels [n] that show something, and the number [n] of the row that each shares.
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The pixels [n] that show something, the number [n] of the row that each shares, its window.
 
-    A row belongs to a square of pixels and to one face: surface and normal.
+    A row belongs to a square of pixels and to one face: surface and normal.  The window is the
+    group that the pixel's middle shows, OPAQUE where it shows none.
     """
     directions, counts = pixel_directions(view)
     pixels = np.flatnonzero(counts.reshape(-1))
-    if tile == 1:
-        return pixels, np.arange(len(pixels))
     way = mi.Vector3f(directions.reshape(-1, 3)[pixels].T.astype(np.float32))
     eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(eye, way), coherent=True)
     valid = hit.is_valid()
     normal = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid).numpy().T
     surface = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, valid).numpy().astype(np.int64)
-    group = dr.gather(mi.Int32, tracer.group, hit.prim_index, valid).numpy().astype(np.int64)
+    group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
+    group = group.numpy().astype(np.int64)
+    if tile == 1:
+        return pixels, np.arange(len(pixels)), group
     face = np.round(normal * FACE_STEPS).astype(np.int64) + FACE_STEPS
     key = np.ravel_multi_index(tuple(face.T), (2 * FACE_STEPS + 1,) * 3)
     across = -(-view.width // tile)
@@ -128,7 +144,7 @@ def _tiles(
     change = np.any(np.diff(table[:, order], axis=1) != 0, axis=0)
     row = np.empty(len(pixels), dtype=np.int64)
     row[order] = np.concatenate([[0], np.cumsum(change)])
-    return pixels, row
+    return pixels, row, group
 
 
 def _add_rows(rows: NDArray, row: NDArray[np.int64], values: NDArray) -> None:

@@ -56,6 +56,7 @@ def picture_matrix_blocks(
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 32,
     max_depth: int = 32,
+    window_reflectance: ArrayLike | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
@@ -67,8 +68,10 @@ def picture_matrix_blocks(
 
     Args:
         samples: paths for each pixel, at as many places within it.
+        window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
     """
-    tracer, bins = TracedScene(surfaces, groups), DirectionBins(basis)
+    tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
+    bins = DirectionBins(basis)
     shape = (len(groups), bins.size)
     size = max(256, BLOCK_BYTES // (8 * int(np.prod(shape))))
     size = min(size, max(1, 2**31 // samples))
@@ -141,7 +144,6 @@ def _picture_paths(
     slot = row * width + mi.UInt32(group) * K + bins.index(local)
     dr.scatter_add(matrix, mi.Float64(1.0), slot, glazed)
 
-    active &= group == OPAQUE
     face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
     face = dr.mulsign(face, -dr.dot(face, direction))
     reflectance = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)

@@ -31,7 +31,8 @@ def add_view_paths(
     """Add beta * d(irradiance at the start) / d(radiance of each patch) to the matrix.
 
     E(x) = integral of the windows' cosine + sum over the first hits of rho E(hit).  The windows
-    are sampled by area and by cosine, joined with the balance heuristic.
+    are sampled by area and by cosine, joined with the balance heuristic.  A hit may be a window,
+    which reflects to the room what its triangle's reflectance says.
 
     Args:
         carried: share of light that Russian roulette starts with; without it roulette starts late.
@@ -86,7 +87,6 @@ def add_view_paths(
         dr.scatter_add(matrix, mi.Float64(beta * value), slot, glazed)
 
         # ----- Bounce: E(x) gains rho E(hit); Russian roulette -----
-        active &= group_hit == OPAQUE
         face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
         face = dr.mulsign(face, -dr.dot(face, direction))
         position = mi.Point3f(position + direction * hit.t + face * tracer.epsilon)
