@@ -21,8 +21,10 @@ COMMANDS = {
     "bsdf": "Read, check, plot and make BSDF files.",
     "sky": "Sun positions and sky matrices of a weather file.",
     "glare": "Glare indices of a fisheye luminance image.",
+    "dgp": "Glare of a room's views in every hour of a year.",
     "thermal": "Gains, temperatures and comfort of a room, hour by hour.",
     "study": "Many variants from one study file.",
+    "pv": "Yield of the photovoltaic modules of a building.",
     "calibrate": "What each method costs on this machine.",
     "bench": "Accuracy and speed against other programs, on this machine.",
 }
@@ -144,3 +146,7 @@ def _validation_line(error: Exception) -> str | None:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
+
+
+if __name__ == "__main__":
+    main()

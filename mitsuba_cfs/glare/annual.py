@@ -165,6 +165,12 @@ def annual_glare(
     return AnnualGlare(*table.T)
 
 
+def kept_glare(keep: Path, hours: int) -> AnnualGlare | None:
+    """The finished ratings of a run of `annual_glare`; None where hours are missing."""
+    table = _begin(keep, hours)
+    return None if np.isnan(table).any() else AnnualGlare(*table.T)
+
+
 def full_picture(
     values: NDArray[np.float32], pixels: NDArray[np.int64], view: View
 ) -> NDArray[np.float32]:

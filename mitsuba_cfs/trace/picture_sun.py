@@ -79,6 +79,9 @@ class PictureSun:
         groups, self._panes = group.numpy(), []
         for g in range(len(tracer.groups)):
             pane = np.flatnonzero(groups == g)
+            if not len(pane):  # the view shows nothing of this group
+                self._panes.append((pane, None, None))
+                continue
             chosen = mi.UInt32(pane.astype(np.uint32))
             towards = tracer.to_group(g, dr.gather(mi.Vector3f, direction, chosen))
             point = dr.gather(mi.Point3f, mi.Point3f(self._eye + direction * hit.t), chosen)

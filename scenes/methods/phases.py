@@ -61,9 +61,13 @@ def phase_scene(
     five_phase: bool,
     quality: Quality,
     geometry: GlareView | None = None,
+    other: PhaseScene | None = None,
     progress: Progress = silent,
 ) -> PhaseScene:
-    """Trace what a metric needs: D, and V of sensors or of a picture's pixels."""
+    """Trace what a metric needs: D, and V of sensors or of a picture's pixels.
+
+    Args: other: a scene of another view of the same room, for the same metric: its D is taken.
+    """
     q, stopping = quality, Stopping(batches=BATCHES)
     points, normals = place.sensors(metric)
 
@@ -85,8 +89,8 @@ def phase_scene(
     pictured = metric in ("DGP", "eDGP")
     return PhaseScene(
         place, metric, five_phase, q,
-        daylight(DEPTH),
-        daylight(1) if direct else None,
+        other.daylight if other else daylight(DEPTH),
+        other.direct_daylight if other else daylight(1) if direct else None,
         view(32) if len(points) else None,
         view(1) if len(points) and five_phase else None,
         view_matrices(

@@ -1,0 +1,32 @@
+"""What the user may choose about a year of glare; every default is stated here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+METHODS = ("five-phase", "three-phase")
+METRICS = ("DGP", "eDGP", "sDGP")
+
+
+@dataclass(frozen=True, slots=True)
+class YearOptions:
+    """Inputs and choices."""
+
+    building: Path
+    weather: Path
+    system: Path
+    space: str | None = None  # name or GUID; None: the first room that has a window
+    views: tuple[str, ...] = ()  # Radiance view options, or files of them
+    grid: float | None = None  # [m] spacing of eyes all over the room, in place of one
+    directions: int = 1  # at every eye, the first towards the biggest window
+    eye_height: float = 1.2  # [m] above the floor, a seated eye (EN 17037)
+    method: str = "five-phase"
+    metric: str = "DGP"
+    size: int = 800  # [px] of a side
+    samples: int = 32  # paths of a pixel
+    memory_gb: float = 2.0  # of a view's matrices, above it they lie on disk
+    occupied: tuple[int, int] = (8, 18)  # clock hours, every day
+    worst: int = 3  # pictures of each view's worst hours
+    hdr: bool = False  # the pictures as .hdr too
+    seed: int = 0

@@ -1,0 +1,148 @@
+"""The files of a year of glare: ratings, classes of each view, heat maps, worst hours."""
+
+from __future__ import annotations
+
+import json
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.classes import (
+    CLASSES,
+    LIMITS,
+    class_hours,
+    exceeded_share,
+    hour_not_exceeded,
+    protection_level,
+)
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.images.hdr import write_hdr
+from mitsuba_cfs.images.view import format_view
+from scenes.figures.carpet import day_grid
+from scenes.pictures import write_check_picture, write_falsecolour
+from scenes.year_of_glare.year import ViewYear, Year, used_dgp
+
+KEPT, MARK = "ratings", "glare_year.json"
+LOWEST, HIGHEST = 0.15, 0.60  # ends of the heat map's scale
+COLOURS = LinearSegmentedColormap.from_list(
+    "glare",
+    [(0.0, "#26456e"), (0.42, "#9cc3d5"), (0.444, "#f3e7a1"), (0.555, "#f0b04a"),
+     (0.667, "#d9622b"), (1.0, "#7a1022")],
+)  # fmt: skip
+
+
+def kept_folder(folder: Path) -> Path:
+    """The folder of finished ratings in a folder of results; both are made."""
+    if folder.exists() and not folder.is_dir():
+        raise DataError("is a file; results need a folder", file=folder, field="--out")
+    strange = folder.is_dir() and any(folder.iterdir()) and not (folder / KEPT).is_dir()
+    if strange:
+        raise DataError(
+            f"holds other files (and no {KEPT} of an earlier run)", file=folder, field="--out"
+        )
+    try:
+        (folder / KEPT).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        message = f"cannot be written: {error.strerror or error}"
+        raise DataError(message, file=folder, field="--out") from error
+    return folder / KEPT
+
+
+def write_view(year: Year, rated: ViewYear, folder: Path) -> dict[str, object]:
+    """Write a view's ratings, heat map and pictures; its row of `views.csv`."""
+    name = rated.view.name
+    rated.ratings.to_parquet(folder / f"{name}.parquet")
+    row = view_row(year, rated)
+    write_heat_map(folder / f"{name}_heat_map.png", year, rated)
+    for moment, picture in rated.pictures.items():
+        where = folder / f"{name}_{moment:%m-%d_%Hh}"
+        result = evaluate(picture, rated.view.view)
+        title = f"{moment:%d %B %H:%M}, {year.options.metric} {rated.ratings.dgp[moment]:.2f}"
+        write_falsecolour(where.with_suffix(".png"), picture, title=title)
+        write_check_picture(Path(f"{where}_sources.png"), result, title=title)
+        if year.options.hdr:
+            write_hdr(where.with_suffix(".hdr"), picture, rated.view.view)
+    return row
+
+
+def view_row(year: Year, rated: ViewYear) -> dict[str, object]:
+    """What a year of a view comes to; shares are of the hours of use."""
+    dgp = used_dgp(year, rated.ratings.dgp.to_numpy())
+    view = rated.view.view
+    hours = class_hours(dgp)
+    x, y, z = view.position
+    return {
+        "view": rated.view.name, "x": x, "y": y, "z": z,
+        "direction_x": view.direction[0], "direction_y": view.direction[1],
+        "direction_z": view.direction[2], "hours_of_use": len(dgp),
+        **{f"hours_{name}": int(count) for name, count in zip(CLASSES, hours, strict=True)},
+        **{f"share_above_{limit:.2f}": exceeded_share(dgp, limit) for limit in LIMITS},
+        "dgp_exceeded_in_5_percent": hour_not_exceeded(dgp),
+        "protection_en17037": protection_level(dgp),
+        "highest_dgp": float(rated.ratings.dgp.max()),
+        "worst_hour": str(rated.ratings.dgp.idxmax()),
+        "seconds": round(rated.seconds, 1),
+        "VIEW": format_view(view),
+    }  # fmt: skip
+
+
+def write_heat_map(path: Path, year: Year, rated: ViewYear) -> None:
+    """DGP by hour of the day and day of the year (PNG); dark hours are grey."""
+    times = year.weather.midpoints
+    whole = np.full(len(times), np.nan)
+    whole[year.lit] = rated.ratings.dgp.to_numpy()
+    grid = day_grid(times, whole)
+    figure = Figure(figsize=(9, 3.6), dpi=140)
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.07, 0.15, 0.78, 0.70))
+    axes.set_facecolor("#d8d8d8")
+    days = grid.shape[1]
+    image = axes.imshow(
+        grid, cmap=COLOURS, norm=Normalize(LOWEST, HIGHEST), aspect="auto",
+        extent=(0, days, 0, 24), interpolation="nearest",
+    )  # fmt: skip
+    starts = pd.date_range(times[0].normalize(), periods=days, freq="D")
+    first = np.flatnonzero(starts.day == 1)
+    axes.set_xticks(first, [f"{starts[d]:%b}" for d in first], ha="left", fontsize=8)
+    axes.set_yticks(range(0, 25, 3), [f"{h:02d}:00" for h in range(0, 25, 3)], fontsize=8)
+    axes.set_ylabel("local standard time", fontsize=8)
+    dgp = used_dgp(year, rated.ratings.dgp.to_numpy())
+    start, end = year.options.occupied
+    axes.set_title(
+        f"{year.options.metric}, {year.options.method}, {year.room}, {rated.view.name}: "
+        f"above 0.45 in {100 * exceeded_share(dgp, 0.45):.1f} % of the hours of use "
+        f"({start} to {end} o'clock), protection: {protection_level(dgp)}",
+        fontsize=8, loc="left",
+    )  # fmt: skip
+    for hour in (start, end):
+        axes.axhline(hour, color="black", linewidth=0.6, linestyle=":")
+    bar = figure.colorbar(image, cax=figure.add_axes((0.88, 0.15, 0.02, 0.70)), extend="both")
+    bar.set_ticks([0.15, 0.25, *LIMITS, 0.60], labels=["0.15", "0.25", *map(str, LIMITS), "0.60"])
+    bar.ax.tick_params(labelsize=8)
+    figure.savefig(path)
+
+
+def write_summary(year: Year, rows: list[dict[str, object]], folder: Path) -> pd.DataFrame:
+    """Write the table of views and what the run was made from; the table."""
+    table = pd.DataFrame(rows)
+    table.to_csv(folder / "views.csv", index=False)
+    options = year.options
+    manifest = {
+        "room": year.room,
+        "options": {name: _plain(getattr(options, name)) for name in options.__slots__},
+        "inputs": year.digest,
+        "hours_with_sun": len(year.lit),
+        "version": metadata.version("mitsuba-cfs"),
+    }
+    (folder / MARK).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+    return table
+
+
+def _plain(value: object) -> object:
+    return str(value) if isinstance(value, Path) else value

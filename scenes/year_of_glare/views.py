@@ -1,0 +1,109 @@
+"""The views that are rated: given ones, or a grid of eyes that look in several directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.model import Space
+from bim.sensors import horizontal_section, sensor_grid, view_point
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.view import View, fisheye, parse_view
+from scenes.year_of_glare.options import YearOptions
+
+MARGIN = 0.5  # [m] of the grid of eyes from the walls
+
+
+@dataclass(frozen=True, slots=True)
+class NamedView:
+    """A view and what it is called in files and tables."""
+
+    name: str
+    view: View
+
+
+def chosen_views(space: Space, options: YearOptions) -> list[NamedView]:
+    """Every view of the options; without any the room's middle towards its biggest window."""
+    if options.views:
+        found = [view for text in options.views for view in _given(text, options.size)]
+    else:
+        found = _grid(space, options)
+    for each in found:
+        _check(each, space)
+    return found
+
+
+def _given(text: str, size: int) -> list[NamedView]:
+    """Views of a Radiance view file, a line each, or of the text itself."""
+    if text.strip().startswith("-v"):
+        lines, file, stem = [text], None, "view"
+    else:
+        file = Path(text)
+        try:
+            lines = file.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise DataError(f"cannot be read: {error}", file=file, field="--view") from None
+        stem = file.stem
+    found = []
+    for number, line in enumerate(line for line in lines if "-v" in line):
+        try:
+            view = parse_view(line, size, size)
+        except ValueError as error:
+            raise DataError(str(error), file=file, field="--view") from None
+        found.append(NamedView(f"{stem}_{number + 1}", view))
+    if not found:
+        raise DataError("holds no view (a line with -vta -vp ... -vd ...)", file=file)
+    return found
+
+
+def _grid(space: Space, options: YearOptions) -> list[NamedView]:
+    """Eyes all over the room, or in its middle, and the directions of each."""
+    middle, towards = view_point(space, options.eye_height)
+    eyes = middle[None]
+    if options.grid is not None:
+        eyes, _ = sensor_grid(space, options.grid, options.eye_height, MARGIN)
+    found = []
+    for e, eye in enumerate(eyes):
+        for d in range(options.directions):
+            direction = turned(towards, 2 * np.pi * d / options.directions)
+            view = fisheye(eye, direction, options.size)
+            found.append(NamedView(f"eye{e + 1:03d}_{d + 1}", view))
+    return found
+
+
+def turned(direction: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """A direction [3] turned about the vertical, counter-clockwise seen from above."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = direction
+    return np.array([c * x - s * y, s * x + c * y, z])
+
+
+def _check(each: NamedView, space: Space) -> None:
+    """Refuse views whose glare would mean nothing."""
+    view = each.view
+    if view.kind not in ("angular", "hemispherical"):
+        raise DataError(
+            f"{each.name} is a {view.kind} view: expected a fisheye (-vta or -vth)", field="--view"
+        )
+    if min(view.horizontal_deg, view.vertical_deg) < 180:
+        raise DataError(
+            f"{each.name} shows {view.horizontal_deg:g} x {view.vertical_deg:g} degrees: "
+            "expected 180 x 180 (-vh 180 -vv 180)",
+            field="--view",
+        )
+    x, y, z = view.position
+    section = horizontal_section(space.shell, z)
+    if section.is_empty or not section.contains(shapely.Point(x, y)):
+        raise DataError(
+            f"{each.name}: its eye ({x:g}, {y:g}, {z:g}) is not in the room {space.name}",
+            field="--view",
+        )
+
+
+def shown_as(view: View, size: int) -> View:
+    """The view in pictures of another size."""
+    return replace(view, width=size, height=size)
