@@ -7,6 +7,7 @@ The value is constant on each pair of patches; a patch is drawn in proportion to
 solid angle and then a point of it evenly in cos(theta) d_omega.  A file may differ between light
 that goes one way and the other: each transport mode has its own tables (see `plugin_base`).
 With `peak`, what the matrices send straight on beyond what surrounds it passes undisturbed.
+In variants of colour a file's CIE-X and CIE-Z bands tint its Visible one.
 
 Importing this module registers the plugin, again for every Mitsuba variant that is set later.
 """
@@ -19,19 +20,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.colour import relative_rgb
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.plugin_base import window_bsdf
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.bsdf.plugin_data import PREFIXES, read_band
 
 PLUGIN = "klems_bsdf"
 
 
 def klems_plugin(
-    klems: KlemsBsdf, *, up: tuple[float, float, float] | None = None, peak: bool = False
+    klems: KlemsBsdf,
+    *,
+    colour: tuple[KlemsBsdf, KlemsBsdf] | None = None,
+    up: tuple[float, float, float] | None = None,
+    peak: bool = False,
 ) -> dict:
-    """The `load_dict` entry of a system's BSDF; `up` [3] is the world vector of its up."""
+    """The `load_dict` entry of a system's BSDF.
+
+    Args:
+        colour: its CIE-X and CIE-Z bands, for variants of colour.
+        up: [3] world vector of the system's up.
+        peak: let what goes straight on pass undisturbed.
+    """
     import mitsuba as mi
 
     if klems.basis_in != klems.basis_out:
@@ -43,8 +54,10 @@ def klems_plugin(
         "theta_bounds": mi.TensorXf(np.array(basis.theta_bounds, dtype=np.float32)),
         "phi_counts": mi.TensorXf(np.array(basis.phi_counts, dtype=np.float32)),
     }
-    for name, block in klems.filled().blocks().items():
-        entry[name] = mi.TensorXf(np.ascontiguousarray(block, dtype=np.float32))
+    bands = dict(zip(PREFIXES, (klems, *(colour or ())), strict=False))
+    for prefix, band in bands.items():
+        for name, block in band.filled().blocks().items():
+            entry[prefix + name] = mi.TensorXf(np.ascontiguousarray(block, dtype=np.float32))
     if up is not None:
         entry["up"] = list(map(float, up))
     return entry
@@ -89,24 +102,29 @@ def without_peak(klems: KlemsBsdf) -> tuple[KlemsBsdf, NDArray[np.float64]]:
     return rest, np.stack([peak.transmittance for peak in peaks])
 
 
-def _read(props) -> KlemsBsdf:
-    """The matrices that the plugin's properties name (a file) or hold (tensors)."""
+def _read(props) -> tuple[KlemsBsdf, tuple[KlemsBsdf, KlemsBsdf] | None]:
+    """The matrices that the plugin's properties name (a file) or hold (tensors), and their X, Z."""
     if "filename" in props:
-        path, band = props["filename"], props.get("band", "Visible")
-        file = read_bsdf_xml(path)
-        bsdf = file.bands.get(band)
-        if not isinstance(bsdf, KlemsBsdf):
-            held = "tensor trees" if bsdf else ", ".join(file.bands)
-            raise DataError(
-                f"expected Klems matrices, the file holds {held}", file=path, element=band
-            )
-        return bsdf
+        return read_band(props, KlemsBsdf)
     bounds, counts = (np.array(props[name]).ravel() for name in ("theta_bounds", "phi_counts"))
     bounds = tuple(np.clip(np.float64(bounds), 0, np.pi / 2).tolist())
     basis = KlemsBasis("plugin", bounds, tuple(int(count) for count in counts))
     names = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
-    blocks = {name: np.array(props[name], dtype=np.float64) for name in names if name in props}
-    return KlemsBsdf(basis, basis, **blocks)
+    bands = []
+    for prefix in PREFIXES:
+        blocks = {n: np.float64(props[prefix + n]) for n in names if prefix + n in props}
+        bands.append(KlemsBsdf(basis, basis, **blocks))
+    return bands[0], tuple(bands[1:]) if bands[1].blocks() else None
+
+
+def entry_colours(klems: KlemsBsdf, colour: tuple[KlemsBsdf, KlemsBsdf]) -> NDArray[np.float64]:
+    """Linear sRGB over the grey value [mode, side, K, same or other side, K, 3] of each entry."""
+    if any((b.basis_in, b.basis_out) != (klems.basis_in, klems.basis_out) for b in colour):
+        raise ValueError(
+            "the CIE-X and CIE-Z bands are on another angle basis than the Visible one"
+        )
+    bands = [scattering_tables(band) for band in (colour[0], klems, colour[1])]
+    return relative_rgb(*(np.stack([reversed_tables(t), t]) for t in bands))
 
 
 def _register(variant: str) -> None:
@@ -114,15 +132,18 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
+    from mitsuba_cfs.bsdf.traced_colour import TracedColour, sees_colour
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis, gather, table
 
     class KlemsBsdfPlugin(window_bsdf()):
         def __init__(self, props):
             super().__init__(props)
-            klems = _read(props)
+            klems, colour = _read(props)
             if klems.basis_in != klems.basis_out:
                 raise ValueError("klems_bsdf needs the same basis for incident and outgoing light")
             self.size, self.basis = klems.basis_in.size, TracedBasis(klems.basis_in)
+            if colour is not None and sees_colour():
+                self.colour = TracedColour(entry_colours(klems, colour).reshape(-1, 3))
             if self.peak:
                 klems, straight = without_peak(klems)
                 self.straight = table(straight)  # [side that the light comes from, K]
@@ -149,8 +170,9 @@ def _register(variant: str) -> None:
             through = known.z * other.z < 0
             column = self.patch(other, ctx.mode != mi.TransportMode.Importance)
             row = 2 * self.row(ctx, known) + dr.select(through, mi.UInt32(1), mi.UInt32(0))
-            value = gather(self.matrix, row * self.size + column, active)
-            return value, value
+            entry = row * self.size + column
+            value = gather(self.matrix, entry, active)
+            return value, value, entry
 
         def totals(self, ctx, known, active):
             row = 2 * self.row(ctx, known)
@@ -163,6 +185,11 @@ def _register(variant: str) -> None:
             side = dr.select(from_front, mi.UInt32(0), mi.UInt32(1))
             return gather(self.straight, side * self.size + self.patch(known, incident), active)
 
+        def through_entry(self, ctx, known, active):
+            """Of the beam's colour: the patch straight on, of the table for transmission."""
+            patch = self.patch(known, ctx.mode == mi.TransportMode.Importance)
+            return (2 * self.row(ctx, known) + 1) * self.size + patch
+
         def draw(self, ctx, known, through, u, point, active):
             row = 2 * self.row(ctx, known) + dr.select(through, mi.UInt32(1), mi.UInt32(0))
             patch = self.search(row * self.size, u)
@@ -170,8 +197,9 @@ def _register(variant: str) -> None:
             x, y, z = self.basis.direction(patch, point.x, point.y)
             z = dr.select((known.z > 0) ^ through, z, -z)
             other = mi.Vector3f(x, -y, z) if incident else mi.Vector3f(-x, y, z)
-            value = gather(self.matrix, row * self.size + patch, active)
-            return other, value, value
+            entry = row * self.size + patch
+            value = gather(self.matrix, entry, active)
+            return other, value, value, entry
 
         def search(self, offset, target):
             """First entry of a row whose cumulative share exceeds `target`."""

@@ -3,12 +3,16 @@
 The shape's normal points outdoors (to the file's Front); `up` is the world vector that the file's
 up means, north where the pane is level.  A plugin says, for directions in the window frame,
 
-- `values(ctx, known, other, active)`: f [1/sr], and its density in place of f when it is sampled;
-- `draw(ctx, known, u, point, active)`: another direction, f and density there, whether it lies on
-  the other side;
+- `values(ctx, known, other, active)`: f [1/sr], its density in place of f when it is sampled, and
+  the table entry that it comes from;
+- `draw(ctx, known, through, u, point, active)`: another direction, and f, density and entry there;
 - `totals(ctx, known, active)`: what of `known` is reflected and transmitted, by that density;
 - `through(ctx, known, active)`: with `peak`, the share that goes straight on, unscattered: a beam
-  of its own (a null component), which `values` and `totals` leave out.
+  of its own (a null component), which `values` and `totals` leave out;
+- `through_entry(ctx, known, active)`: the table entry of that beam.
+
+f is grey (the luminance).  In variants of colour a plugin may have the `colour` of each entry,
+which f is multiplied with; directions are drawn by the grey value.
 
 `known` is the direction that a path has come from.  The light goes along it when paths start at
 the camera (`TransportMode.Radiance`) and comes from it when they start at a light.  Sampled are
@@ -41,6 +45,7 @@ def window_bsdf():
                 mi.BSDFFlags.GlossyTransmission | common,
             ]
             self.m_flags = self.m_components[0] | self.m_components[1]
+            self.colour = None  # a `TracedColour`
             self.peak = bool(props.get("peak", False))
             if self.peak:
                 sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
@@ -82,6 +87,13 @@ def window_bsdf():
                 straight = self.through(ctx, known, active)
             return reflected if reflects else 0.0, transmitted if transmits else 0.0, straight
 
+        def tinted(self, value, entry, si, active):
+            """Grey values of table entries as a spectrum, zero where not active."""
+            value = dr.select(active, value, 0.0)
+            if self.colour is None:
+                return mi.Spectrum(value)
+            return self.colour.spectrum(value, entry, si, active)
+
         def eval_pdf(self, ctx, si, wo, active=True):
             turn = self.turn(si)
             known, other = self.to_window(si.wi, turn), self.to_window(wo, turn)
@@ -89,11 +101,11 @@ def window_bsdf():
             through = known.z * other.z < 0
             active = mi.Mask(active) & (known.z != 0) & (other.z != 0)
             active &= dr.select(through, mi.Mask(transmits), mi.Mask(reflects))
-            value, density = self.values(ctx, known, other, active)
+            value, density, entry = self.values(ctx, known, other, active)
             total = sum(self.asked_totals(ctx, known, active))
             cosine = dr.abs(wo.z)
             pdf = dr.select(active & (total > 0), density * cosine / dr.maximum(total, TINY), 0.0)
-            return mi.Spectrum(dr.select(active, value * cosine, 0.0)), pdf
+            return self.tinted(value * cosine, entry, si, active), pdf
 
         def eval(self, ctx, si, wo, active=True):
             return self.eval_pdf(ctx, si, wo, active)[0]
@@ -115,7 +127,7 @@ def window_bsdf():
                 dr.select(through, transmitted, reflected), TINY
             )
             u = dr.clip(u, 0.0, ONE_BELOW)
-            other, value, density = self.draw(ctx, known, through, u, sample2, active)
+            other, value, density, entry = self.draw(ctx, known, through, u, sample2, active)
 
             bs = mi.BSDFSample3f()
             bs.wo = dr.select(beam, -si.wi, self.to_shading(other, turn))
@@ -128,7 +140,9 @@ def window_bsdf():
             bs.sampled_component = dr.select(beam, mi.UInt32(2), index)
             active &= bs.pdf > 0
             weight = total * dr.select(beam, 1.0, value / dr.maximum(density, TINY))
-            return bs, mi.Spectrum(dr.select(active, weight, 0.0))
+            if self.peak and self.colour is not None:
+                entry = dr.select(beam, self.through_entry(ctx, known, active), entry)
+            return bs, self.tinted(weight, entry, si, active)
 
         def traverse(self, callback):
             callback.put("up", self.up, mi.ParamFlags.NonDifferentiable)

@@ -5,116 +5,65 @@
 Nothing is made dense: a value is found by descent, a direction drawn level by level.  Rank 4 is
 sampled exactly in both transport modes.  Rank 3 is when paths start at a light; from the camera
 the tree of the way back, f(i -> o) = f(o -> i), is known only by means over its cells: it is drawn
-from that and weighted by the true value.
+from that and weighted by the true value.  With `peak`, what goes straight on beyond what surrounds
+it passes undisturbed.  In variants of colour a file's CIE-X and CIE-Z bands tint its Visible one.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.plugin_base import window_bsdf
-from mitsuba_cfs.bsdf.tensor_peak import through_peak
-from mitsuba_cfs.bsdf.tensor_sampling import SamplingTree, joined, sampling_tree
+from mitsuba_cfs.bsdf.plugin_data import PREFIXES, read_band
+from mitsuba_cfs.bsdf.plugin_trees import BLOCKS, plugin_trees
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml
-from mitsuba_cfs.errors import DataError
 
 PLUGIN = "tensor_tree_bsdf"
-BLOCKS = ("reflection_front", "reflection_back", "transmission_front", "transmission_back")
-FLOOR = 0.02  # share of its mean that the density of a resampled tree never falls below
 
 
 def tensor_tree_plugin(
-    bsdf: TensorTreeBsdf, *, up: tuple[float, float, float] | None = None, peak: bool = False
+    bsdf: TensorTreeBsdf,
+    *,
+    colour: tuple[TensorTreeBsdf, TensorTreeBsdf] | None = None,
+    up: tuple[float, float, float] | None = None,
+    peak: bool = False,
 ) -> dict:
-    """The `load_dict` entry of a system's BSDF; `up` [3] is the world vector of its up."""
+    """The `load_dict` entry of a system's BSDF.
+
+    Args:
+        colour: its CIE-X and CIE-Z bands, for variants of colour.
+        up: [3] world vector of the system's up.
+        peak: let what goes straight on pass undisturbed.
+    """
     import mitsuba as mi
 
     entry = {"type": PLUGIN, "peak": peak}
-    for name, tree in bsdf.blocks().items():
-        entry[f"{name}_depths"] = mi.TensorXf(tree.depths.astype(np.float32))
-        entry[f"{name}_values"] = mi.TensorXf(tree.values.astype(np.float32))
-        entry["rank"] = tree.rank
+    for prefix, band in zip(PREFIXES, (bsdf, *(colour or ())), strict=False):
+        for name, tree in band.blocks().items():
+            entry[f"{prefix}{name}_depths"] = mi.TensorXf(tree.depths.astype(np.float32))
+            entry[f"{prefix}{name}_values"] = mi.TensorXf(tree.values.astype(np.float32))
+            entry["rank"] = tree.rank
     if up is not None:
         entry["up"] = list(map(float, up))
     return entry
 
 
-def forward_trees(bsdf: TensorTreeBsdf) -> list[TensorTree]:
-    """The trees of `BLOCKS`, light to where it goes, what is absent filled in."""
-    rank = next(iter(bsdf.blocks().values())).rank
-    trees = []
-    for name in BLOCKS:
-        tree, turned = bsdf.lookup(name)
-        if tree is None:
-            tree = TensorTree(rank, np.zeros(1, dtype=np.int64), np.zeros(1))
-        trees.append(tree.reversed() if turned else tree)
-    return trees
-
-
-def backward_trees(bsdf: TensorTreeBsdf) -> list[TensorTree]:
-    """The trees read from where the light goes to where it came from, by the side it leaves on."""
-    forward = dict(zip(BLOCKS, forward_trees(bsdf), strict=True))
-    forward["transmission_front"], forward["transmission_back"] = (
-        forward["transmission_back"],
-        forward["transmission_front"],
-    )
-    return [tree.reversed() for tree in forward.values()]
-
-
-def _density_tree(tree: TensorTree) -> TensorTree:
-    """A resampled tree that is nowhere zero where its neighbours are not."""
-    floor = FLOOR * tree.values[tree.values > 0].mean() if np.any(tree.values > 0) else 0.0
-    return TensorTree(tree.rank, tree.depths, np.maximum(tree.values, floor))
-
-
-def tables(
-    bsdf: TensorTreeBsdf, peak: bool
-) -> tuple[SamplingTree, SamplingTree, NDArray[np.float64] | None]:
-    """Trees to find values in, trees to draw from, and with `peak` the beams of these [L].
-
-    Four forward ones, then four backward ones; rank 4 draws from those that it finds values in.
-    """
-    forward, backward = forward_trees(bsdf), backward_trees(bsdf)
-    if forward[0].rank == 4:
-        trees, beams = forward + backward, None
-        if peak:
-            parts = [
-                through_peak(tree) if number % 4 >= 2 else (tree, np.zeros(len(tree.values)))
-                for number, tree in enumerate(trees)
-            ]
-            trees = [tree for tree, _ in parts]
-            # a tree of a single value gets a node with 16 leaves
-            beams = np.concatenate([beam if t.depth else np.zeros(16) for t, beam in parts])
-        both = joined([sampling_tree(tree) for tree in trees])
-        return both, both, beams
-    if peak:
-        raise ValueError("tensor_tree_bsdf: peak needs trees of rank 4")
-    drawn = [sampling_tree(tree) for tree in forward + [_density_tree(t) for t in backward]]
-    return joined(drawn[:4]), joined(drawn), None
-
-
-def _read(props) -> TensorTreeBsdf:
-    """The trees that the plugin's properties name (a file) or hold (tensors)."""
+def _read(props) -> tuple[TensorTreeBsdf, tuple[TensorTreeBsdf, TensorTreeBsdf] | None]:
+    """The trees that the plugin's properties name (a file) or hold (tensors), and their X, Z."""
     if "filename" in props:
-        path, band = props["filename"], props.get("band", "Visible")
-        file = read_bsdf_xml(path)
-        bsdf = file.bands.get(band)
-        if not isinstance(bsdf, TensorTreeBsdf):
-            held = "Klems matrices" if bsdf else ", ".join(file.bands)
-            raise DataError(
-                f"expected tensor trees, the file holds {held}", file=path, element=band
-            )
-        return bsdf
-    trees = {}
-    for name in BLOCKS:
-        if f"{name}_depths" in props:
-            depths, values = (np.array(props[f"{name}_{part}"]) for part in ("depths", "values"))
-            depths, values = depths.ravel().astype(np.int64), values.ravel().astype(float)
-            trees[name] = TensorTree(int(props["rank"]), depths, values)
-    return TensorTreeBsdf(**trees)
+        return read_band(props, TensorTreeBsdf)
+    bands = []
+    for prefix in PREFIXES:
+        trees = {}
+        for name in BLOCKS:
+            if f"{prefix}{name}_depths" in props:
+                parts = (props[f"{prefix}{name}_{part}"] for part in ("depths", "values"))
+                depths, values = (np.array(part).ravel() for part in parts)
+                rank = int(props["rank"])
+                trees[name] = TensorTree(rank, depths.astype(np.int64), values.astype(float))
+        bands.append(TensorTreeBsdf(**trees))
+    return bands[0], tuple(bands[1:]) if bands[1].blocks() else None
 
 
 def _register(variant: str) -> None:
@@ -122,25 +71,39 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
+    from mitsuba_cfs.bsdf.traced_colour import TracedColour, sees_colour
+    from mitsuba_cfs.bsdf.traced_klems import gather, table
     from mitsuba_cfs.bsdf.traced_tree import TracedTrees, disk_to_square, integers, square_to_disk
     from mitsuba_cfs.bsdf.traced_tree import gather_integer as gather_root
 
     class TensorTreePlugin(window_bsdf()):
         def __init__(self, props):
             super().__init__(props)
-            valued, drawn, beams = tables(_read(props), self.peak)
-            self.rank = valued.rank
-            self.drawn = TracedTrees(drawn, beams)
-            self.valued = self.drawn if valued is drawn else TracedTrees(valued)
-            self.value_roots, self.draw_roots = integers(valued.roots), integers(drawn.roots)
+            bsdf, colour = _read(props)
+            trees = plugin_trees(bsdf, self.peak, colour if sees_colour() else None)
+            self.rank = trees.valued.rank
+            self.drawn = TracedTrees(trees.drawn)
+            same = trees.valued is trees.drawn
+            self.valued = self.drawn if same else TracedTrees(trees.valued)
+            self.value_roots, self.draw_roots = map(
+                integers, (trees.valued.roots, trees.drawn.roots)
+            )
+            if trees.beams is not None:
+                self.beams, self.beam_cells = table(trees.beams), trees.beams.shape[-1]
+            if trees.colours is not None:
+                self.colour = TracedColour(trees.colours)
 
         def tree(self, ctx, known, through):
             """Number of the tree (see `BLOCKS`) for a known direction, and that of its values."""
-            forward = dr.select(known.z > 0, mi.UInt32(0), mi.UInt32(1))
-            forward += dr.select(through, mi.UInt32(2), mi.UInt32(0))
+            forward = self.forward(known, through)
             if ctx.mode == mi.TransportMode.Importance:
                 return forward
             return forward + 4
+
+        def forward(self, incident, through):
+            """Number of the forward tree for light from `incident`."""
+            number = dr.select(incident.z > 0, mi.UInt32(0), mi.UInt32(1))
+            return number + dr.select(through, mi.UInt32(2), mi.UInt32(0))
 
         def place(self, known):
             """Position of a known direction in the tree, and its azimuth where that is turned."""
@@ -165,16 +128,15 @@ def _register(variant: str) -> None:
             number = self.tree(ctx, known, through)
             position, azimuth = self.place(known)
             root = gather_root(self.draw_roots, number, active)
-            density = self.drawn.value(root, position, self.square(other, azimuth), active)
+            density, leaf = self.drawn.value(root, position, self.square(other, azimuth), active)
             if self.rank == 4 or ctx.mode == mi.TransportMode.Importance:
-                return density, density
-            return self.true_value(known, other, active), density
+                return density, density, leaf
+            value, leaf = self.true_value(known, other, active)
+            return value, density, leaf
 
         def true_value(self, known, other, active):
             """Rank 3, from the camera: the value of light that comes from `other`."""
-            through = known.z * other.z < 0
-            number = dr.select(other.z > 0, mi.UInt32(0), mi.UInt32(1))
-            number += dr.select(through, mi.UInt32(2), mi.UInt32(0))
+            number = self.forward(other, known.z * other.z < 0)
             position, azimuth = self.place(other)
             root = gather_root(self.value_roots, number, active)
             return self.valued.value(root, position, self.square(known, azimuth), active)
@@ -191,21 +153,41 @@ def _register(variant: str) -> None:
             )
 
         def through(self, ctx, known, active):
-            root = gather_root(self.draw_roots, self.tree(ctx, known, mi.Mask(True)), active)
-            return self.drawn.straight(root, self.place(known)[0], active)
+            if self.rank == 4:
+                return gather(self.beams, self.through_entry(ctx, known, active), active)
+            place = self.place(known)[0][0] * (2 * self.beam_cells)
+            cell = dr.minimum(mi.UInt32(place), mi.UInt32(self.beam_cells - 1))
+            return gather(
+                self.beams, self.straight_tree(ctx, known) * self.beam_cells + cell, active
+            )
+
+        def through_entry(self, ctx, known, active):
+            """Leaf that holds the beam: of the drawn trees for rank 4, of the forward ones else."""
+            if self.rank == 4:
+                number, roots = self.tree(ctx, known, mi.Mask(True)), self.draw_roots
+            else:
+                number, roots = self.straight_tree(ctx, known), self.value_roots
+            root = gather_root(roots, number, active)
+            return self.valued.straight(root, self.place(known)[0], active)
+
+        def straight_tree(self, ctx, known):
+            """Number of the forward tree of a straight beam that comes from or goes to `known`."""
+            incident = known if ctx.mode == mi.TransportMode.Importance else -known
+            return self.forward(incident, mi.Mask(True))
 
         def draw(self, ctx, known, through, u, point, active):
             position, (c, s) = self.place(known)
             root = gather_root(self.draw_roots, self.tree(ctx, known, through), active)
-            a, b, density = self.drawn.sample(root, position, point.x, point.y, active)
+            a, b, density, leaf = self.drawn.sample(root, position, point.x, point.y, active)
             x, y = square_to_disk(a, b)
             if self.rank == 3:
                 x, y = x * c - y * s, x * s + y * c
             z = dr.safe_sqrt(1 - x * x - y * y) * dr.sign(known.z)
             other = mi.Vector3f(-x, y, dr.select(through, -z, z))
             if self.rank == 4 or ctx.mode == mi.TransportMode.Importance:
-                return other, density, density
-            return other, self.true_value(known, other, active), density
+                return other, density, density, leaf
+            value, leaf = self.true_value(known, other, active)
+            return other, value, density, leaf
 
         def to_string(self):
             return f"TensorTreeBsdf[rank {self.rank}, {self.drawn.levels} levels]"

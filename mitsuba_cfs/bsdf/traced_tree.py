@@ -66,7 +66,7 @@ def square_to_disk(u, v):
 class TracedTrees:
     """Several trees of one rank, each begun at its root node."""
 
-    def __init__(self, tree: SamplingTree, beams=None) -> None:
+    def __init__(self, tree: SamplingTree) -> None:
         self.known = tree.rank - 2  # coordinates of the incident position
         self.width = 1 << tree.rank
         self.levels = int(tree.heights.max())
@@ -75,15 +75,16 @@ class TracedTrees:
         self.grids = integers(grids.ravel())
         self.values = table(tree.values)
         self.masses = table(tree.masses)
-        self.beams = None if beams is None else table(beams)  # [L] see `tensor_peak`
 
     def value(self, root, incident, outgoing, active=True):
-        """BSDF [1/sr] at an incident position and a point of the outgoing square."""
-        return gather(self.values, self.leaf(root, incident, outgoing, active), active)
+        """BSDF [1/sr] at an incident position and a point of the outgoing square, and its leaf."""
+        leaf = self.leaf(root, incident, outgoing, active)
+        return gather(self.values, leaf, active), leaf
 
     def straight(self, root, incident, active=True):
-        """Share of the light at a rank 4 position that goes straight on: to the same point."""
-        return gather(self.beams, self.leaf(root, incident, incident, active), active)
+        """Leaf that holds what goes straight on: rank 4 to the same point, rank 3 opposite."""
+        outgoing = incident if self.known == 2 else (1 - incident[0], mi.Float(0.5))
+        return self.leaf(root, incident, outgoing, active)
 
     def leaf(self, root, incident, outgoing, active=True):
         """Number of the leaf at an incident position and a point of the outgoing square."""
@@ -122,7 +123,7 @@ class TracedTrees:
         return dr.pi / 4 * (m[0] + m[1] + m[2] + m[3])
 
     def sample(self, root, incident, u, v, active=True):
-        """Point of the outgoing square in proportion to the values there, and the value.
+        """Point of the outgoing square in proportion to the values there, the value and its leaf.
 
         At each level one coordinate's half is chosen by `u`, then the other's by `v`; what is left
         of them places the point in the leaf.
@@ -147,7 +148,7 @@ class TracedTrees:
             inside = inside & (found >= 0)
             node = dr.select(inside, found, node)
         value = gather(self.values, leaf, active)
-        return low_u + u * size, low_v + v * size, value
+        return low_u + u * size, low_v + v * size, value, leaf
 
     def _choose(self, u, first, second, inside):
         """Whether `u` chooses the second of two masses, and what is left of it."""

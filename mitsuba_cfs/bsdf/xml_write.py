@@ -24,6 +24,8 @@ HEADER = (
 FOOTER = "</Layer>\n</Optical>\n</WindowElement>\n"
 SPECTRA = {
     "Visible": ("CIE Illuminant D65 1nm.ssp", "ASTM E308 1931 Y.dsp"),
+    "CIE-X": ("CIE Illuminant D65 1nm.ssp", "ASTM E308 1931 X.dsp"),
+    "CIE-Z": ("CIE Illuminant D65 1nm.ssp", "ASTM E308 1931 Z.dsp"),
     "Solar": ("CIE Illuminant D65 1nm.ssp", "None"),
 }
 

@@ -43,6 +43,12 @@ def query(path: Path, incident: NDArray, outgoing: NDArray) -> NDArray:
     return ask(path, np.concatenate([angles_deg(incident), angles_deg(outgoing)], -1))
 
 
+def query_xyz(path: Path, incident: NDArray, outgoing: NDArray) -> NDArray:
+    """Radiance's BSDF as X, Y and Z [N, 3] [1/sr]."""
+    angles = np.concatenate([angles_deg(incident), angles_deg(outgoing)], -1)
+    return ask(path, np.concatenate([angles, np.zeros((len(angles), 1))], -1)).reshape(-1, 3)
+
+
 def direct_hemispherical(path: Path, incident: NDArray) -> NDArray:
     """Radiance's share [N] of the light from each direction that is scattered to either side."""
     return ask(path, angles_deg(incident))
@@ -57,7 +63,7 @@ def samples(path: Path, incident: NDArray, count: int) -> NDArray:
 def ask(path: Path, angles: NDArray) -> NDArray:
     """Radiance's answer [N] to lines of two (hemispherical) or four angles (BSDF) [degrees].
 
-    Two angles and a count ask for so many sampled directions.
+    Two angles and a count ask for so many sampled directions, four and a zero for X, Y and Z.
     """
     answer = subprocess.run(
         [sys.executable, __file__, str(path)],
@@ -120,6 +126,8 @@ def main(path: str) -> None:
         elif len(angles) == 3:
             drawn = bsdf.sample(data, *angles[:2], int(angles[2]), 15)[:, :3]
             print(" ".join(map(repr, drawn.astype(float).ravel().tolist())))
+        elif len(angles) == 5:
+            print(" ".join(map(repr, bsdf.query(data, *angles[:4]).tolist())))
         else:
             print(repr(float(bsdf.query(data, *angles)[1])))
     sys.stdout.flush()

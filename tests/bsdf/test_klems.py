@@ -179,26 +179,3 @@ def test_unlike_bases_and_odd_counts_can_be_reversed():
     filled = KlemsBsdf(basis, KLEMS_QUARTER, transmission_front=block).filled()
     assert filled.transmission_back.shape == (41, 6)
     assert filled.transmission_back.min() >= 0.1
-
-
-@pytest.mark.parametrize("name", ["llvm_ad_rgb", "llvm_ad_spectral"])
-def test_other_variants_see_grey(variant, name):
-    """The plugins in colour variants: the same value in every channel."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from mitsuba_cfs import variants
-    from mitsuba_cfs.bsdf.plugin import klems_plugin
-
-    flat = np.full((41, 41), 0.3 / np.pi)
-    variants.activate(name)
-    try:
-        bsdf = mi.load_dict(klems_plugin(KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, flat)))
-        si = dr.zeros(mi.SurfaceInteraction3f)
-        si.sh_frame = mi.Frame3f(mi.Vector3f(0, -1, 0))
-        si.wi = mi.Vector3f(0, 0, -1)
-        value = np.ravel(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(0, 0.6, 0.8)))
-        np.testing.assert_allclose(value, 0.3 / np.pi * 0.8, rtol=1e-5)
-        assert len(value) == (3 if "rgb" in name else 4)
-    finally:
-        variants.activate("llvm_ad_mono")
