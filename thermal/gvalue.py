@@ -55,6 +55,7 @@ def thermal_data(
     g_normal: float | None = None,
     normal: int = 0,
     shading_position: str = "none",
+    item: str = "fenestration",
 ) -> ThermalData:
     """U and g per direction from a BSDF and what else is known.
 
@@ -65,6 +66,7 @@ def thermal_data(
     Args:
         transmittance, reflectance: [K] solar, direction to hemisphere.
         g_normal: g at the direction with index `normal` (Klems: 0).
+        item: what errors name.
     """
     known = ", ".join(TYPICAL_SYSTEMS)
     fits = shading_position in TYPICAL_SYSTEMS
@@ -78,27 +80,30 @@ def thermal_data(
             f"U was not given: {u_value:g} W/(m2 K) is taken, "
             f"as of low-e double glazing {_SHADES[shading_position]}."
         )
-    require_range(u_value, 0.1, 7.0, "U", "W/(m2 K)")
+    require_range(u_value, 0.1, 7.0, f"{item}: U", "W/(m2 K)")
     if g_normal is None:
         notes.append(
             f"g was not given: {100 * share:g} % of the absorbed sun is taken to go inwards, "
             f"as of low-e double glazing {_SHADES[shading_position]}."
         )
     else:
-        share = inward_share(float(tau.flat[normal]), float(rho.flat[normal]), g_normal)
+        share = inward_share(float(tau.flat[normal]), float(rho.flat[normal]), g_normal, item=item)
     return ThermalData(u_value, g_from_inward_share(tau, rho, share), tuple(notes))
 
 
-def inward_share(transmittance: float, reflectance: float, g_value: float) -> float:
+def inward_share(
+    transmittance: float, reflectance: float, g_value: float, *, item: str = "fenestration"
+) -> float:
     """Share N of the absorbed sun that reaches the room: (g - tau)/(1 - tau - rho)."""
-    require_range(g_value, 0.0, 1.0, "g")
-    require(g_value >= transmittance - 0.01, "g", f"{g_value:g} is below tau {transmittance:.3f}")
+    require_range(g_value, 0.0, 1.0, f"{item}: g")
+    message = f"{g_value:g} is below tau {transmittance:.3f}"
+    require(g_value >= transmittance - 0.01, f"{item}: g", message)
     absorptance = 1.0 - transmittance - reflectance
     if absorptance < 1e-3:
         return 0.0
     share = max(g_value - transmittance, 0.0) / absorptance
     message = f"{g_value:g} needs {share:.2f} times the absorbed sun (tau {transmittance:.3f})"
-    require(share <= 1.0, "g", message)
+    require(share <= 1.0, f"{item}: g", message)
     return share
 
 

@@ -198,17 +198,20 @@ def box_building(box: BoxTable) -> Building:
         )
         for side, layers in box.construction.items()
     }
-    return shoebox(
-        box.width,
-        box.depth,
-        box.height,
-        windows=[WindowRectangle(**w.model_dump()) for w in box.window],
-        facing_deg=box.facing_deg,
-        recess=box.recess,
-        reflectance=box.reflectance or None,
-        adjacency=box.adjacency or None,
-        constructions=constructions or None,
-    )
+    try:
+        return shoebox(
+            box.width,
+            box.depth,
+            box.height,
+            windows=[WindowRectangle(**w.model_dump()) for w in box.window],
+            facing_deg=box.facing_deg,
+            recess=box.recess,
+            reflectance=box.reflectance or None,
+            adjacency=box.adjacency or None,
+            constructions=constructions or None,
+        )
+    except ValueError as error:
+        raise DataError(str(error), field="box") from error
 
 
 def _skies(weather: Weather, study: StudyFile) -> Skies:

@@ -116,3 +116,36 @@ def test_lamps_dim_to_what_is_missing():
     assert gains.convective[0] == pytest.approx(80.0) and gains.radiant[0] == pytest.approx(60.0)
     with pytest.raises(ThermalInputError, match="target"):
         dimmed_share([1.0], 0.0)
+
+
+def test_coupled_rooms_of_an_ifc(tmp_path, variant, capsys):
+    path = tmp_path / "study.toml"
+    path.write_text(
+        f'weather = "{WEATHER}"\nbuilding = "{DEMO / "office.ifc"}"\ncouple = true\n'
+        f'[[system]]\nbsdf = "{BLIND}"\n[air]\ndoor_m3_s = 0.05\n{TRACE}'
+    )
+    assert main(["thermal", str(path), "--out", str(tmp_path / "out")]) == 0
+    years = [pd.read_csv(tmp_path / "out" / f"hours_{k}.csv") for k in (1, 2)]
+    through = [hours["partitions_w"] for hours in years]
+    assert np.abs(through[0]).mean() > 1.0
+    assert abs(through[0].sum() + through[1].sum()) < 0.02 * np.abs(through[0]).sum()
+    for hours in years:
+        flows = [c for c in hours if c.endswith("_w") and c not in ("heating_w", "cooling_w")]
+        total = hours[flows].drop(columns="storage_w").sum(axis=1) - hours["storage_w"]
+        assert np.abs(total).max() < 1e-2  # written with four decimals
+    # the person by the window feels it: not the mean of all surfaces
+    assert "operative" in capsys.readouterr().out
+
+
+def test_window_larger_than_its_wall_is_one_line(tmp_path, variant, capsys):
+    path = study_file(tmp_path, TRACE)
+    path.write_text(path.read_text().replace("width = 3.0", "width = 5.0"))
+    assert main(["thermal", str(path), "--out", str(tmp_path / "out")]) != 0
+    assert "window 0: does not lie inside the front side" in capsys.readouterr().err
+
+
+def test_fault_of_a_system_names_it(tmp_path, variant, capsys):
+    path = study_file(tmp_path, "g_value = 0.05\n" + TRACE)
+    assert main(["thermal", str(path), "--out", str(tmp_path / "out")]) != 0
+    error = capsys.readouterr().err
+    assert "venetian blind" in error and "0.05 is below tau" in error
