@@ -27,12 +27,14 @@ def read_standing(
     select: Sequence[str] = (),
     *,
     corrections: Corrections | None = None,
+    selected_in: str | Path = "",
     progress: Progress | None = None,
 ) -> Standing:
     """All elements of an IFC file, and those that selectors choose by GUID, type, material, name.
 
     Args:
         select: ifcopenshell selectors, as in `bim.ifc.corrections`.
+        selected_in: the file that the selectors stand in, for messages.
         corrections: by default those of `<model>.corrections.toml` beside the model.
     Raises: `DataError` where the file cannot be read or a selector is none.
     """
@@ -45,7 +47,7 @@ def read_standing(
             replace(one, reflectance_visible=value, reflectance_solar=value) for one in elements
         ]
     found = tuple(
-        frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, path))
+        frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in))
         for query in select
     )
     return Standing(tuple(elements), found, source.problems, source.name)

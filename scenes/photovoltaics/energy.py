@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pvlib
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
@@ -62,6 +63,18 @@ def cell_temperatures(
     )
 
 
+def _cell_power(
+    cell: Cell, irradiance: NDArray[np.float64], temperature: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Maximum power of one cell by itself, of the shape of its conditions [W]; from a table."""
+    light = np.linspace(0.0, max(1.0, irradiance.max()), 101)
+    warm = np.linspace(temperature.min() - 1, temperature.max() + 1, 41)
+    grid = np.stack(np.meshgrid(light, warm, indexing="ij")).reshape(2, -1, 1)
+    power = string_power(cell, grid[0], grid[1], [1.0], [0], bypass=np.inf)
+    table = RegularGridInterpolator((light, warm), power.reshape(len(light), len(warm)))
+    return table(np.stack([irradiance, temperature], axis=-1))
+
+
 def subsystem_yields(
     modules: Sequence[PvModule],
     subsystems: Sequence[Subsystem],
@@ -104,10 +117,7 @@ def subsystem_yields(
             for m in subsystem.modules:
                 own = members == m
                 power += string_power(cell, light[:, own], warm[:, own], cells[own], substring[own])
-        ideal = sum(
-            string_power(cell, light[:, [i]], warm[:, [i]], cells[[i]], [0]).sum()
-            for i in range(len(rows))
-        )
+        ideal = (cells * _cell_power(cell, light, warm)).sum()
         direct = power * (1 - other_losses)
         peak = sheet.power * len(subsystem.modules)
         alternating = pvlib.inverter.pvwatts(direct, peak, eta_inv_nom=inverter_efficiency)

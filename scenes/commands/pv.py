@@ -1,0 +1,85 @@
+"""`cfs pv`: irradiance and yield of the photovoltaic modules in an IFC file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+
+
+@click.command()
+@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
+@click.option("--study", "study_file", required=True, type=FILE, help="TOML file, docs/pv.md.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
+@click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
+def command(
+    building: Path, weather: Path, study_file: Path, out: Path, seed: int, no_cache: bool
+) -> None:
+    """Irradiance and yield of the photovoltaic modules of a building.
+
+    Modules are found by material, type, name or GUID; shade and reflections by everything in the
+    model are traced, the sun as its exact disc.
+    """
+    from mitsuba_cfs import variants
+    from mitsuba_cfs.sky.weather import read_epw
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.photovoltaics.study_file import read_pv_study
+    from scenes.result_folder import check_folder
+
+    study = read_pv_study(study_file)
+    climate = read_epw(weather)
+    check_folder(out)
+    variants.activate()
+    from mitsuba_cfs.matrices.cache import MatrixCache
+    from scenes.photovoltaics.study import run_pv
+
+    cache = None if no_cache else MatrixCache.of_user()
+    with ProgressBar() as progress:
+        result = run_pv(
+            building, climate, study, file=study_file, seed=seed, progress=progress, cache=cache
+        )
+        progress("results", 0.0)
+        record = {
+            "building": str(building), "weather": str(weather),
+            "study": study.model_dump(mode="json"), "seed": seed,
+            "relative_standard_error_of_diffuse": result.irradiance.diffuse_error,
+        }  # fmt: skip
+        _write(result, record, out)
+        progress("results", 1.0)
+    for row in result.yield_table().itertuples():
+        click.echo(
+            f"{row.subsystem}: {row.modules} modules, {row.peak_kw:.2f} kW, "
+            f"{row.yield_kwh:.0f} kWh a year ({row.kwh_per_kw:.0f} kWh/kW), "
+            f"mismatch {100 * row.mismatch_loss:.1f} %"
+        )
+    click.echo(f"results: {out}")
+
+
+def _write(result, record: dict, out: Path) -> None:
+    """Tables, hourly power, pictures."""
+    import pandas as pd
+
+    from scenes.photovoltaics.picture import view_directions, write_irradiation_picture
+    from scenes.result_folder import MARK, result_folder
+
+    times = result.weather.times[result.irradiance.steps]
+    power = pd.DataFrame(
+        {one.name: one.alternating_current for one in result.yields},
+        index=pd.Index(times, name="time"),
+    )
+    with result_folder(out) as folder:
+        result.module_table().round(4).to_csv(folder / "modules.csv", index=False)
+        result.yield_table().round(4).to_csv(folder / "yield.csv", index=False)
+        power.astype("float32").to_parquet(folder / "power_w.parquet")
+        problems = [(p.where, p.what, p.consequence) for p in result.problems]
+        pd.DataFrame(problems, columns=["where", "what", "consequence"]).to_csv(
+            folder / "problems.csv", index=False
+        )
+        for name, towards in view_directions(result):
+            write_irradiation_picture(folder / f"irradiation_{name}.png", result, towards)
+        (folder / MARK).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")

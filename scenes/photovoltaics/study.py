@@ -1,0 +1,192 @@
+"""From an IFC file and a weather file to the yield of its photovoltaic modules."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from bim.ifc.corrections import corrections_beside
+from bim.ifc.standing import Standing, read_standing
+from bim.model import Problem
+from bim.to_tracer import COMPASS
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.weather import Weather
+from scenes.photovoltaics.energy import Subsystem, SubsystemYield, subsystem_yields
+from scenes.photovoltaics.irradiance import CellIrradiance, cell_irradiance
+from scenes.photovoltaics.modules import PvModule, pv_modules
+from scenes.photovoltaics.study_file import PvStudy
+from scenes.photovoltaics.two_diode import fitted_cell
+
+FLAT = 30.0  # a face tilted less looks up [degrees]
+
+
+@dataclass(frozen=True, slots=True)
+class PvResult:
+    """All that came out."""
+
+    standing: Standing
+    modules: tuple[PvModule, ...]
+    subsystems: tuple[Subsystem, ...]
+    irradiance: CellIrradiance
+    yields: tuple[SubsystemYield, ...]
+    weather: Weather
+    problems: tuple[Problem, ...]
+
+    def module_table(self) -> pd.DataFrame:
+        """Annual irradiation of each module, in the plane and behind its glass [kWh/m2]."""
+        step = self.weather.step_h / 1000
+        owner = {m: one.name for one in self.subsystems for m in one.modules}
+        rows = []
+        for number, module in enumerate(self.modules):
+            own = self.irradiance.module == number
+            plain = self.irradiance.plain[own].sum(axis=1, dtype=float) * step
+            effective = self.irradiance.effective[own].sum(axis=1, dtype=float) * step
+            rows.append(
+                {
+                    "guid": module.guid,
+                    "name": module.name,
+                    "subsystem": owner.get(number, ""),
+                    "azimuth_deg": module.azimuth_deg,
+                    "tilt_deg": module.tilt_deg,
+                    "area_m2": module.area,
+                    "irradiation_kwh_m2": plain.mean(),
+                    "least_lit_cells_kwh_m2": plain.min(),
+                    "effective_kwh_m2": effective.mean(),
+                }
+            )
+        return pd.DataFrame(rows)
+
+    def yield_table(self) -> pd.DataFrame:
+        """Annual energy of each subsystem [kWh], and what it is per kW of peak power."""
+        rows = []
+        for one in self.yields:
+            direct, alternating = (
+                float(power.sum()) * self.weather.step_h / 1000
+                for power in (one.direct_current, one.alternating_current)
+            )
+            ideal = one.unmatched / 1000
+            rows.append(
+                {
+                    "subsystem": one.name,
+                    "modules": one.modules,
+                    "peak_kw": one.peak / 1000,
+                    "yield_kwh": alternating,
+                    "direct_current_kwh": direct,
+                    "mismatch_loss": 1 - direct / ideal if ideal > 0 else 0.0,
+                    "kwh_per_kw": alternating / (one.peak / 1000),
+                }
+            )
+        return pd.DataFrame(rows)
+
+
+def run_pv(
+    model: Path,
+    weather: Weather,
+    study: PvStudy,
+    *,
+    file: Path | None = None,
+    samples: int = 8192,
+    seed: int = 0,
+    progress: Progress = silent,
+    cache: MatrixCache | None = None,
+) -> PvResult:
+    """Find the modules, trace their irradiance and model their yield.
+
+    Args: file: of the study, for messages.
+    """
+    corrections = corrections_beside(model)
+    corrections = replace(
+        corrections,
+        leave_out=(*corrections.leave_out, *study.leave_out),
+        surroundings=corrections.surroundings if study.surroundings is None else study.surroundings,
+    )
+    queries = [study.module.select, *(table.select for table in study.subsystem)]
+    standing = read_standing(
+        model, queries, corrections=corrections, selected_in=file or "", progress=progress
+    )
+    modules = pv_modules(
+        standing.elements, standing.chosen[0],
+        substrings=study.module.substrings, along=study.module.groups,
+    )  # fmt: skip
+    if not modules:
+        message = f"chooses no element with a shape in {model}"
+        raise DataError(message, file=file, field=f"module.select = {study.module.select!r}")
+    try:
+        cell = fitted_cell(study.module.datasheet())
+    except ValueError as error:
+        raise DataError(str(error), file=file, field="module") from None
+    subsystems, problems = _subsystems(study, standing, modules, file)
+    irradiance = cell_irradiance(
+        standing.elements, modules, weather, samples=samples, seed=seed, progress=progress,
+        cache=cache,
+    )  # fmt: skip
+    yields = subsystem_yields(
+        modules, subsystems, irradiance, weather, study.module.datasheet(), cell,
+        mounting=study.module.mounting, other_losses=study.other_losses,
+        inverter_efficiency=study.inverter_efficiency, progress=progress,
+    )  # fmt: skip
+    return PvResult(
+        standing, tuple(modules), subsystems, irradiance, tuple(yields), weather,
+        (*standing.problems, *problems),
+    )  # fmt: skip
+
+
+def _subsystems(
+    study: PvStudy, standing: Standing, modules: Sequence[PvModule], file: Path | None
+) -> tuple[tuple[Subsystem, ...], list[Problem]]:
+    """Modules of each stated subsystem; without any, those of each orientation."""
+    problems = _unalike(modules)
+    if not study.subsystem:
+        names = [orientation(module) for module in modules]
+        return tuple(
+            Subsystem(name, tuple(np.flatnonzero(np.array(names) == name).tolist()), False)
+            for name in dict.fromkeys(names)
+        ), problems
+    taken: dict[str, str] = {}
+    result = []
+    for table, guids in zip(study.subsystem, standing.chosen[1:], strict=True):
+        own = tuple(number for number, module in enumerate(modules) if module.guid in guids)
+        if not own:
+            field = f"subsystem {table.name}: select"
+            raise DataError("chooses none of the modules", file=file, field=field)
+        for number in own:
+            guid = modules[number].guid
+            if guid in taken:
+                what = f"module {modules[number].name} is also in {taken[guid]}"
+                raise DataError(what, file=file, field=f"subsystem {table.name}: select")
+            taken[guid] = table.name
+        result.append(Subsystem(table.name, own, table.in_series))
+    for module in modules:
+        if module.guid not in taken:
+            what = f"module {module.name}: in no subsystem"
+            problems.append(Problem(module.guid, what, "its yield is not counted"))
+    return tuple(result), problems
+
+
+def orientation(module: PvModule) -> str:
+    """Compass point of a module's face, or "roof"."""
+    if module.tilt_deg < FLAT:
+        return "roof"
+    return COMPASS[round(module.azimuth_deg / 45) % 8]
+
+
+def _unalike(modules: Sequence[PvModule]) -> list[Problem]:
+    """Modules of another size than most: one datasheet cannot be theirs."""
+    sizes = [round(module.area, 2) for module in modules]
+    usual = Counter(sizes).most_common(1)[0][0]
+    return [
+        Problem(
+            module.guid,
+            f"module {module.name}: {module.area:.2f} m2, most have {usual:.2f} m2",
+            "the datasheet's power is used for it nevertheless",
+        )
+        for module in modules
+        if abs(module.area - usual) > 0.05 * usual
+    ]

@@ -1,0 +1,147 @@
+"""Modules found among a model's elements, and their irradiance hour by hour."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bim.model import Element
+from mitsuba_cfs.sky.weather import read_epw
+from scenes.photovoltaics.modules import pv_modules
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+DEMO = Path(__file__).parent.parent.parent / "scenes" / "demo"
+FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+
+
+def box(guid: str, low, high, *, reflectance: float = 0.0) -> Element:
+    """A closed box along the axes."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    p = np.array([[x0, y0, z0], [x1, y0, z0], [x1, y1, z0], [x0, y1, z0],
+                  [x0, y0, z1], [x1, y0, z1], [x1, y1, z1], [x0, y1, z1]], dtype=float)  # fmt: skip
+    triangles = [[p[f[0]], p[f[i]], p[f[i + 1]]] for f in FACES for i in (1, 2)]
+    return Element(guid, guid, "IfcSolarDevice", np.array(triangles), reflectance, reflectance)
+
+
+WALL = box("wall", (-5, 0, 0), (5, 0.3, 8))
+PANEL = box("panel", (-0.5, -0.14, 1), (0.5, -0.10, 3))  # south of the wall, upright
+
+
+def test_active_face_is_the_one_away_from_the_wall():
+    (module,) = pv_modules([WALL, PANEL], frozenset({"panel"}), substrings=2, along=5)
+    np.testing.assert_allclose(module.normal, [0, -1, 0], atol=1e-9)
+    assert (module.azimuth_deg, module.tilt_deg) == pytest.approx((180, 90))
+    assert module.area == pytest.approx(2.0)
+    assert module.points[:, 1] == pytest.approx(-0.145)
+    # strips across the short side x, groups along z
+    for strip in range(2):
+        own = module.points[module.substring == strip]
+        assert np.ptp(own[:, 0]) == pytest.approx(0)
+        assert sorted(own[:, 2]) == pytest.approx([1.2, 1.6, 2.0, 2.4, 2.8])
+    sides = np.linalg.norm(module.edges, axis=-1)
+    assert sides == pytest.approx(np.tile([0.5, 0.4], (10, 1)))
+
+
+def test_lone_sheet_looks_to_the_free_side():
+    a, b, c, d = [-1.0, -0.2, 1], [1, -0.2, 1], [1, -0.2, 3], [-1, -0.2, 3]
+    sheet = Element("s", "s", "IfcPlate", np.array([[c, b, a], [d, c, a]], dtype=float), 0.1, 0.1)
+    (module,) = pv_modules([WALL, sheet], frozenset({"s"}))
+    np.testing.assert_allclose(module.normal, [0, -1, 0], atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def two_days():
+    """A clear and a cloudy day of the demo's weather."""
+    weather = read_epw(next(DEMO.glob("*.epw")))
+    return weather.select(np.arange(24 * 170, 24 * 172))
+
+
+def test_free_flat_module_gets_the_global_horizontal_irradiance(variant, two_days):
+    from mitsuba_cfs.sky.matrix import sky_series
+    from scenes.photovoltaics.irradiance import cell_irradiance
+
+    flat = box("m", (0, 0, 5), (1, 2, 5.04))
+    modules = pv_modules([flat], frozenset({"m"}))
+    found = cell_irradiance([flat], modules, two_days)
+    series = sky_series(two_days, "solar")
+    expected = series.global_horizontal[found.steps]
+    # 1 %: the sky's patches against the cosine inside each; the sampling error is below 0.3 %
+    np.testing.assert_allclose(found.plain.mean(axis=0), expected, rtol=0.01, atol=1.0)
+    assert np.all(found.effective < found.plain * 1.001)
+    assert 0.93 < found.effective.sum() / found.plain.sum() < 0.99
+    assert found.diffuse_error < 0.01
+
+
+def test_shade_of_a_black_fin_is_sharp_and_reflections_count(variant, two_days):
+    from mitsuba_cfs.sky.matrix import sky_series
+    from scenes.photovoltaics.irradiance import cell_irradiance
+
+    flat = box("m", (0, 0, 5), (1, 2, 5.04))
+    south = box("screen", (-50, -0.2, 0), (50, -0.1, 60))
+    modules = pv_modules([flat], frozenset({"m"}))
+    series = sky_series(two_days, "solar")
+    dark, bright = (
+        cell_irradiance([flat, Element(**{**_fields(south), "reflectance_solar": r})], modules,
+                        two_days) for r in (0.0, 0.8)
+    )  # fmt: skip
+    sun = series.sun[dark.steps]
+    hidden = (sun[:, 1] < -0.05) & (sun[:, 2] > 0.05)
+    assert hidden.sum() > 8
+    beam = series.direct_normal[dark.steps] * sun[:, 2]
+    # half the sky is left at most, and none of the sun
+    left = dark.plain.mean(axis=0)[hidden]
+    assert np.all(left < 0.75 * series.diffuse_horizontal[dark.steps][hidden] + 1)
+    assert beam[hidden].max() > 300
+    north = (sun[:, 1] > 0.05) & (beam > 20)
+    gain = (bright.plain - dark.plain).mean(axis=0)
+    assert np.all(gain > -1) and np.all(gain[north] > 1)
+
+
+def _fields(element: Element) -> dict:
+    return {name: getattr(element, name) for name in element.__slots__}
+
+
+def test_command_from_ifc_to_yield(variant, tmp_path, capsys):
+    from scenes import cli
+    from scenes.demo.make_facade import facade
+
+    model = tmp_path / "facade.ifc"
+    facade().write(str(model))
+    text = (DEMO / "facade_pv.toml").read_text()
+    head = text[: text.index("[[subsystem]]")].replace(
+        "'IfcElement, material=\"PV laminate\"'", "'IfcElement, Name=/PV 09 row 0 .*/'"
+    )
+    study = tmp_path / "pv.toml"
+    study.write_text(head)
+    out = tmp_path / "out"
+    weather = next(DEMO.glob("*.epw"))
+    run = ["pv", str(model), "--weather", str(weather), "--out", str(out), "--no-cache"]
+    assert cli.run([*run, "--study", str(study)]) == 0
+    table = pd.read_csv(out / "modules.csv")
+    assert len(table) == 6
+    assert table.azimuth_deg.to_numpy() == pytest.approx(135)
+    assert table.tilt_deg.to_numpy() == pytest.approx(15)
+    found = pd.read_csv(out / "yield.csv").iloc[0]
+    assert found.modules == 6 and found.subsystem == "roof"
+    # Chicago, 15 degrees to the south-east: PVWatts-like 1200 to 1350 kWh/kW free of shade
+    assert 950 < found.kwh_per_kw < 1350
+    hourly = pd.read_parquet(out / "power_w.parquet")
+    assert hourly.roof.sum() / 1000 == pytest.approx(found.yield_kwh, rel=1e-4)
+    assert list(out.glob("irradiation_from_*.png"))
+
+    for wrong, said in (
+        (head.replace("cells = 60", "cells = 6"), "no two-diode cell"),
+        (head.replace("PV 09 row 0 .*", "nothing"), "chooses no element"),
+        (head.replace("current = 8.05", "current = -1"), "module.current"),
+        (head + '\n[[subsystem]]\nname = "x"\nselect = "IfcSlab"\n', "none of the modules"),
+        (head.replace("select = 'Ifc", "select = 'Ifc,,("), "pv.toml: Ifc,,("),
+    ):
+        study.write_text(wrong)
+        capsys.readouterr()
+        assert cli.run([*run, "--study", str(study)]) == 1
+        error = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
+        assert len(error) == 1 and said in error[0], error
