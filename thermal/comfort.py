@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.errors import require
+from thermal.errors import ThermalInputError, require
 
 KELVIN = 273.15
 
@@ -188,7 +188,7 @@ def pmv_ppd(
     air_c: ArrayLike,
     mrt_c: ArrayLike,
     *,
-    air_speed: float = 0.1,
+    air_speed: ArrayLike = 0.1,
     humidity: ArrayLike = 50.0,
     metabolic_rate: float = 1.2,
     clothing: float = 0.5,
@@ -200,16 +200,9 @@ def pmv_ppd(
     """
     from pythermalcomfort.models import pmv_ppd_iso
 
-    air = np.asarray(air_c, dtype=float)
+    air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
     result = pmv_ppd_iso(
-        tdb=air,
-        tr=np.asarray(mrt_c, dtype=float),
-        vr=np.full_like(air, air_speed),
-        rh=np.broadcast_to(np.asarray(humidity, dtype=float), air.shape),
-        met=metabolic_rate,
-        clo=clothing,
-        limit_inputs=False,
-        round_output=False,
+        tdb=air, tr=mrt, vr=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN
     )
     return np.asarray(result.pmv, dtype=float), np.asarray(result.ppd, dtype=float)
 
@@ -218,7 +211,7 @@ def standard_effective_temperature(
     air_c: ArrayLike,
     mrt_c: ArrayLike,
     *,
-    air_speed: float = 0.1,
+    air_speed: ArrayLike = 0.1,
     humidity: ArrayLike = 50.0,
     metabolic_rate: float = 1.2,
     clothing: float = 0.5,
@@ -226,15 +219,25 @@ def standard_effective_temperature(
     """SET [H] [degC] (Gagge two-node model, pythermalcomfort); arguments as for `pmv_ppd`."""
     from pythermalcomfort.models import set_tmp
 
-    air = np.asarray(air_c, dtype=float)
-    result = set_tmp(
-        tdb=air,
-        tr=np.asarray(mrt_c, dtype=float),
-        v=np.full_like(air, air_speed),
-        rh=np.broadcast_to(np.asarray(humidity, dtype=float), air.shape),
-        met=metabolic_rate,
-        clo=clothing,
-        limit_inputs=False,
-        round_output=False,
-    )
+    air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
+    result = set_tmp(tdb=air, tr=mrt, v=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
     return np.asarray(result.set, dtype=float)
+
+
+_PLAIN = {"limit_inputs": False, "round_output": False}
+
+
+def _surroundings(
+    air_c: ArrayLike, mrt_c: ArrayLike, air_speed: ArrayLike, humidity: ArrayLike
+) -> tuple[NDArray[np.float64], ...]:
+    """Air, mean radiant temperature, air speed and humidity as arrays of one shape, checked."""
+    values = [np.asarray(v, dtype=float) for v in (air_c, mrt_c, air_speed, humidity)]
+    try:
+        air, mrt, speed, moist = (np.array(v) for v in np.broadcast_arrays(*values))
+    except ValueError as error:
+        shapes = ", ".join(str(v.shape) for v in values)
+        raise ThermalInputError("comfort", f"air, radiant, speed, humidity: {shapes}") from error
+    require(bool(np.all(np.isfinite(air + mrt))), "comfort", "a temperature is missing")
+    require(bool(np.all(speed >= 0)), "air speed", "is negative")
+    require(bool(np.all((moist >= 0) & (moist <= 100))), "humidity", "lies outside 0 to 100 %")
+    return air, mrt, speed, moist

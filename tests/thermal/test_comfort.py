@@ -106,3 +106,23 @@ def test_set_at_its_reference_condition():
     air = np.array([25.0])
     value = standard_effective_temperature(air, air, metabolic_rate=1.0, clothing=0.6)
     assert value[0] == pytest.approx(25.0, abs=0.4)
+
+
+@pytest.mark.parametrize("index", [pmv_ppd, standard_effective_temperature])
+def test_surroundings_are_broadcast_and_checked(index):
+    def first(**changes):
+        found = index([22.0, 26.0], 24.0, **changes)
+        return found[0] if isinstance(found, tuple) else found
+
+    still = first(air_speed=[0.1, 0.1], humidity=[40.0, 60.0])
+    assert still.shape == (2,)
+    np.testing.assert_allclose(still, [first(humidity=40.0)[0], first(humidity=60.0)[1]])
+    for changes, words in (
+        ({"air_speed": -0.1}, "air speed"),
+        ({"humidity": 130.0}, "humidity"),
+        ({"humidity": [50.0, 50.0, 50.0]}, "comfort"),
+    ):
+        with pytest.raises(ThermalInputError, match=words):
+            first(**changes)
+    with pytest.raises(ThermalInputError, match="missing"):
+        index([np.nan], 24.0)

@@ -1,0 +1,1 @@
+"""The dissertation's example applications (chapter 5) as scripts."""
