@@ -11,6 +11,8 @@ from rich.table import Table
 
 from bim.fenestration import ShadingState, read_g_table
 from bim.ifc.attach import attach as attach_to_ifc
+from bim.ifc.survey import markdown
+from bim.ifc.survey import survey as surveyed
 from bim.model import Building, Space
 from bim.read_ifc import read_ifc
 from bim.to_energyplus import write_epjson
@@ -132,6 +134,22 @@ def export(
     if gltf is not None:
         write_gltf(replace(read, spaces=spaces), gltf)
         click.echo(gltf)
+
+
+@command.command()
+@click.argument("files", type=FILE, nargs=-1, required=True, metavar="BUILDING.ifc...")
+@click.option("--markdown", "out", type=click.Path(path_type=Path), help="Also write the table.")
+def survey(files: tuple[Path, ...], out: Path | None) -> None:
+    """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
+    rows = []
+    with ProgressBar() as progress:
+        for row in surveyed(files):
+            rows.append(row)
+            progress("files", len(rows) / len(files))
+    table = markdown(rows)
+    click.echo(table)
+    if out is not None:
+        out.write_text(table + "\n", encoding="utf-8")
 
 
 def _chosen(building: Building, names: tuple[str, ...], path: Path) -> tuple[Space, ...]:

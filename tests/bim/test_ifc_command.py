@@ -54,3 +54,19 @@ def test_not_an_ifc(tmp_path):
     path.write_text("hello")
     result = CliRunner().invoke(command, ["check", str(path)])
     assert isinstance(result.exception, DataError) and "text.ifc" in str(result.exception)
+
+
+def test_survey_has_a_line_for_each_file(path, tmp_path):
+    other, table = tmp_path / "text.ifc", tmp_path / "table.md"
+    other.write_text("hello")
+    result = CliRunner().invoke(
+        command, ["survey", str(path), str(other), "--markdown", str(table)], catch_exceptions=False
+    )
+    assert result.exit_code == 0
+    head, _, room, refused, _, sums = table.read_text().splitlines()
+    cells = dict(zip(head.split("|"), room.split("|"), strict=True))
+    cells = {key.strip(): value.strip() for key, value in cells.items()}
+    assert (cells["file"], cells["schema"], cells["rooms"]) == ("model.ifc", "IFC4", "1")
+    assert (cells["windows"], cells["glass m2"], cells["open"]) == ("1", "3.6", "0")
+    assert float(cells["memory MB"]) > 50 and "refused: not an IFC file" in refused
+    assert "2 files, 1 refused; 1 rooms" in sums
