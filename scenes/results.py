@@ -44,7 +44,7 @@ class GlareResults:
 
 @dataclass(frozen=True, slots=True)
 class ThermalResult:
-    """Free-floating temperatures of a year and adaptive comfort."""
+    """Temperatures of a year and adaptive comfort."""
 
     temperatures: pd.DataFrame  # [H] index time: outdoor_c, air_c, mrt_c, operative_c, surfaces...
     gains: pd.DataFrame  # [H] index time: incident_w, transmitted_w, absorbed_outer_w, ...
@@ -52,6 +52,16 @@ class ThermalResult:
     comfort_summary: dict[str, float]  # by name; percentages as 0..100
     # one entry a system: its name; u_value, g_value, transmittances, ... at normal incidence
     fenestration: tuple[dict[str, float | str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OperationResult:
+    """What a room's operation did: shading, heating, cooling, lamps."""
+
+    states: tuple[str, ...]  # names of the shading states, from open to closed
+    hours: pd.DataFrame  # [H] index time: shading_state, heating_w, cooling_w, lighting_w
+    summary: dict[str, float]  # heating_kwh, cooling_kwh, lighting_kwh, peaks
+    rule: str  # of the shading control, in words
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +73,9 @@ class SpaceResult:
     glare: GlareResults
     thermal: ThermalResult
     seconds: dict[str, float]  # by stage
+    operation: OperationResult | None = None  # None: one state all year, floating freely
+    annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
+    like: str = ""  # name of the room alike that these results were computed for; "": this one
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,3 +89,4 @@ class RunResult:
     problems: tuple[Problem, ...]
     manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know
+    method: str = "three-phase"  # one of scenes.job.options.METHODS

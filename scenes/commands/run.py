@@ -9,13 +9,17 @@ import click
 from scenes.job.options import METHODS, JobOptions
 
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
-_DEFAULT = JobOptions(Path(), Path(), Path())
+LOADS = ("heating", "cooling", "lighting")
+_DEFAULT = JobOptions(Path(), Path())
 
 
 @click.command()
 @click.argument("building", type=FILE, metavar="BUILDING.ifc")
 @click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
-@click.option("--cfs", "system", required=True, type=FILE, help="BSDF XML file, Klems full.")
+@click.option(
+    "--cfs", "system", type=FILE,
+    help="BSDF XML file of every window, Klems full or tensor tree; default: what the IFC holds.",
+)  # fmt: skip
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
 @click.option(
     "--method", type=click.Choice(METHODS), default=_DEFAULT.method, show_default=True,
@@ -44,13 +48,18 @@ _DEFAULT = JobOptions(Path(), Path(), Path())
     "--ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
     show_default=True, help="Outdoor air changes [1/h].",
 )  # fmt: skip
+@click.option(
+    "--operation", type=FILE,
+    help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
+)  # fmt: skip
+@click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
 @click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
 @click.option("--quick", is_flag=True, help="A tenth of the rays, for a first look.")
 def command(
     building: Path,
     weather: Path,
-    system: Path,
+    system: Path | None,
     out: Path,
     method: str,
     spaces: tuple[str, ...],
@@ -61,18 +70,26 @@ def command(
     spacing: float,
     height: float,
     ach: float,
+    operation: Path | None,
+    annual_glare: bool,
     seed: int,
     no_cache: bool,
     quick: bool,
 ) -> None:
     """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
+    if annual_glare and method == "point-in-time":
+        raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
+    if system is None and (u_value is not None or g_value is not None):
+        raise click.UsageError("--u and --g belong to --cfs")
     share = 10 if quick else 1
     run_to_folder(
         JobOptions(
             building,
             weather,
             system,
+            operation,
             method=method,
+            annual_glare=annual_glare,
             spaces=spaces,
             u_value=u_value,
             g_value=g_value,
@@ -120,12 +137,17 @@ def summary_line(room) -> str:
     """One line of headline figures of a room."""
     worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
     daylight, heat = room.daylight.room_metrics, room.thermal
+    direct = f"ASE {daylight['ase1000_250']:.0f} %, " if "ase1000_250" in daylight else ""
+    loads = ""
+    if room.operation is not None:
+        kwh = {name: room.operation.summary[f"{name}_kwh"] for name in LOADS}
+        loads = "".join(f", {name} {value:.0f} kWh" for name, value in kwh.items() if value > 0)
     return (
         f"{room.space.name or room.space.guid}: "
         f"sDA {daylight['sda300_50']:.0f} %, "
-        f"mean DA {daylight['da300']:.0f} %, "
+        f"{direct}mean DA {daylight['da300']:.0f} %, "
         f"worst DGP {worst:.2f}, "
         f"operative {heat.temperatures['operative_c'].min():.1f} "
         f"to {heat.temperatures['operative_c'].max():.1f} C, "
-        f"comfortable {heat.comfort_summary['within_80']:.0f} % of occupied hours"
+        f"comfortable {heat.comfort_summary['within_80']:.0f} % of occupied hours{loads}"
     )

@@ -99,18 +99,16 @@ def room_matrices(
     scene: RoomScene, options: RoomOptions, cache: MatrixCache | None, progress: Progress
 ) -> RoomMatrices:
     """Trace V and D, and for the five-phase method V_d and D_d, which are part of them."""
-    tracing = {"stopping": Stopping(batches=BATCHES), "seed": options.seed, "cache": cache}
     points, directions = scene.sensors()
 
     def daylight(depth: int, progress: Progress) -> Estimate:
         return daylight_matrix(
             scene.exterior,
             scene.groups,
-            subdivision=options.sky_subdivision,
-            samples=max(options.patch_samples // BATCHES, 1),
             max_depth=depth,
             progress=progress,
-            **tracing,
+            cache=cache,
+            **daylight_options(options),
         )
 
     def view(depth: int, progress: Progress) -> Estimate:
@@ -121,8 +119,10 @@ def room_matrices(
             directions,
             samples=max(options.sensor_samples // BATCHES, 1),
             max_depth=depth,
+            stopping=Stopping(batches=BATCHES),
+            seed=options.seed,
             progress=progress,
-            **tracing,
+            cache=cache,
         )
 
     def within(start: float, end: float) -> Progress:
@@ -135,6 +135,16 @@ def room_matrices(
     if not len(scene.exterior.triangles):  # nothing outdoors reflects
         return RoomMatrices(*whole, direct_view, whole[1].values)
     return RoomMatrices(*whole, direct_view, daylight(1, within(0.2, 0.3)).values)
+
+
+def daylight_options(options: RoomOptions) -> dict:
+    """The options of `daylight_matrix` that follow from those of the run."""
+    return {
+        "subdivision": options.sky_subdivision,
+        "samples": max(options.patch_samples // BATCHES, 1),
+        "stopping": Stopping(batches=BATCHES),
+        "seed": options.seed,
+    }
 
 
 @dataclass(frozen=True, slots=True)

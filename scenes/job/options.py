@@ -23,6 +23,7 @@ class RoomOptions:
     sensor_samples: int = 32_768  # paths for each sensor
     patch_samples: int = 16_384  # paths for each window patch
     sun_points: int = 1024  # places on each window group that the direct sun is taken at
+    annual_glare: bool = False  # rate every lit hour, not only the pictures
     path_samples: int = 2_048  # point-in-time: paths for each sensor and hour
     infiltration_ach: float = 0.5  # [1/h]
     equipment_w_m2: float = 8.0  # while occupied, half of it radiant
@@ -34,6 +35,8 @@ class RoomOptions:
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise ValueError(f"method: expected one of {METHODS}, got {self.method!r}")
+        if self.annual_glare and self.method == "point-in-time":
+            raise ValueError("annual glare needs the three-phase or the five-phase method")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,8 @@ class JobOptions(RoomOptions):
 
     building: Path
     weather: Path
-    system: Path
+    system: Path | None = None  # of every window; None: what the building's file holds
+    operation: Path | None = None
     spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence

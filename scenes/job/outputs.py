@@ -53,6 +53,11 @@ def _write_room(result: RunResult, room: SpaceResult, place: Path) -> None:
     _csv(glare_table(room.glare, result.times), place / "dgp.csv")
     heat = room.thermal
     _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
+    if room.operation is not None:
+        _csv(room.operation.hours, place / "operation.csv")
+        _csv(pd.DataFrame([room.operation.summary]), place / "loads.csv", index=False)
+    if room.annual_glare is not None:
+        _csv(room.annual_glare, place / "annual_glare.csv")
     _csv(pd.DataFrame([heat.comfort_summary]), place / "comfort.csv", index=False)
     for picture in room.glare.pictures:
         name = f"view_{result.times[picture.hour]:%m-%d_%Hh}"

@@ -12,24 +12,45 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
 
 from bim.model import Building, Space
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.phases import window_radiance
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.daylight import room_daylight, room_matrices, room_scene, state_light
+from scenes.heat.study import state_of
+from scenes.job.annual import glare_by_state, glare_of_year, worst_hours
+from scenes.job.daylight import (
+    RoomMatrices,
+    RoomScene,
+    StateLight,
+    room_daylight,
+    room_matrices,
+    room_scene,
+    state_light,
+)
 from scenes.job.glare import default_hours, room_glare, wanted_hours
+from scenes.job.inputs import System
+from scenes.job.operation import Operation, operated, shading_states
 from scenes.job.options import RoomOptions
-from scenes.job.pictures import picture_maker
+from scenes.job.pictures import PictureMaker, picture_maker
 from scenes.job.skies import Skies, year_of_skies
-from scenes.job.thermal import room_thermal
+from scenes.job.thermal import ThermalSystem, room_thermal, thermal_system
 from scenes.job.windows import States
-from scenes.results import GlareResults, SpaceResult
+from scenes.results import DaylightResult, GlareResults, OperationResult, SpaceResult, ThermalResult
+from thermal.balance import ZoneResult
+from thermal.zone import Zone
 
 T = TypeVar("T")
+WORST = 4  # pictures of an annual glare without hours asked for
 
 
 def skies_for(weather: Weather, options: RoomOptions) -> Skies:
@@ -45,6 +66,7 @@ def compute_room(
     weather: Weather,
     options: RoomOptions,
     *,
+    operation: Operation | None = None,
     skies: Skies | None = None,
     cache: MatrixCache | None = None,
     pictures: bool = True,
@@ -59,6 +81,8 @@ def compute_room(
         systems: by window GUID the `System` in each shading state, from open to closed; one tuple
             of one system is the usual case, see `scenes.job.windows.everywhere`.
         options: method, hours of pictures, sensors, samples, seed; `RoomOptions()` is a full run.
+        operation: shading control, gains, set points; without it the first state holds all year
+            and the room floats freely.
         skies: `skies_for(weather, options)`, where several rooms share them.
         cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
             and weather do not enter V and D: variants of them cost only algebra.
@@ -66,52 +90,171 @@ def compute_room(
 
     Raises: `ValueError` for a room that cannot be computed (no work plane, no system for a window).
     """
+    if operation is not None:
+        options = replace(options, occupied=operation.tables.gains.occupied)
+    else:
+        systems = {guid: states[:1] for guid, states in systems.items()}
     skies = skies or skies_for(weather, options)
+    room = _Room(building, space, systems, weather, options, operation, skies, cache, progress)
     hours = wanted_hours(options.picture_hours, weather.midpoints, skies.lit)
-    seconds: dict[str, float] = {}
+    daylight = room.timed("daylight", room.daylight)
+    year, rated = None, GlareResults(room.scene.view, ())
+    if options.annual_glare:
+        year = room.timed("annual glare", room.annual_glare)
+    if pictures:
+        rated = room.timed("glare", lambda: room.glare(hours, year))
+    heat, balance = room.timed("thermal", lambda: room.thermal(daylight))
+    ran = None if operation is None else room.operation_result(balance)
+    return SpaceResult(space, daylight, rated, heat, room.seconds, ran, year)
 
-    def timed(stage: str, work: Callable[[], T]) -> T:
+
+class _Room:
+    """A room on its way: each step keeps what the later ones need."""
+
+    def __init__(
+        self,
+        building: Building,
+        space: Space,
+        systems: Mapping[str, States],
+        weather: Weather,
+        options: RoomOptions,
+        operation: Operation | None,
+        skies: Skies,
+        cache: MatrixCache | None,
+        progress: Progress,
+    ) -> None:
+        self.building, self.space, self.weather, self.options = building, space, weather, options
+        self.operation, self.skies, self.cache, self.progress = operation, skies, cache, progress
+        self.scene: RoomScene = room_scene(building, space, systems, options)
+        self.seconds: dict[str, float] = {}
+        self.lamps = np.zeros(skies.hours)  # [H] power [W]
+
+    def timed(self, stage: str, work: Callable[[], T]) -> T:
+        """What the work gives; its time is noted."""
         start = time.monotonic()
         result = work()
-        seconds[stage] = round(time.monotonic() - start, 2)
+        self.seconds[stage] = round(time.monotonic() - start, 2)
         return result
 
-    scene = room_scene(building, space, systems, options)
+    @cached_property
+    def matrices(self) -> RoomMatrices:
+        """V and D."""
+        steps = part(self.progress, 0.0, 0.6, "daylight")
+        return room_matrices(self.scene, self.options, self.cache, steps)
 
-    def light():
-        matrices = room_matrices(scene, options, cache, part(progress, 0.0, 0.6, "daylight"))
-        J = scene.windows.states
-        lights = [
+    @cached_property
+    def lights(self) -> list[StateLight]:
+        """The light of the lit hours in every state [J]."""
+        J = self.scene.windows.states
+        return [
             state_light(
-                scene, matrices, j, skies, options, cache,
-                part(progress, 0.6 + 0.3 * j / J, 0.6 + 0.3 * (j + 1) / J, "daylight"),
+                self.scene, self.matrices, j, self.skies, self.options, self.cache,
+                part(self.progress, 0.6 + 0.3 * j / J, 0.6 + 0.3 * (j + 1) / J, "daylight"),
             )
             for j in range(J)
         ]  # fmt: skip
-        state = np.zeros(len(skies.lit), dtype=np.int64)
-        steps = part(progress, 0.9, 1.0, "daylight")
-        result = room_daylight(scene, lights, state, skies, weather, options, steps)
-        progress("daylight", 1.0)
-        return matrices, lights, state, result
 
-    matrices, lights, state, daylight = timed("daylight", light)
-
-    def glare() -> GlareResults:
-        if not pictures:
-            return GlareResults(scene.view, ())
-        maker = picture_maker(
-            scene, matrices, lights, state, skies, options, part(progress, 0.0, 0.5, "pictures")
+    @cached_property
+    def state(self) -> NDArray[np.int64]:
+        """The shading state of every hour [H]."""
+        if self.operation is None:
+            return np.zeros(self.skies.hours, dtype=np.int64)
+        omega = KLEMS_FULL.projected_solid_angles()[:, None]
+        incident = window_radiance(self.matrices.daylight.values, self.skies.solar) * omega
+        return shading_states(
+            self.operation.tables.control,
+            self.space,
+            self.weather,
+            len(self.lights),
+            irradiance=self.skies.whole_year(incident.sum(axis=1)).T,
+            eye=self.skies.whole_year(np.stack([light.eye for light in self.lights])),
+            dgp=lambda: glare_by_state(
+                self._maker(np.zeros(len(self.skies.lit), dtype=np.int64)), self.progress
+            ),
         )
-        eye = np.stack([li.eye for li in lights])[state, np.arange(len(state))]
-        chosen = hours or default_hours(weather.midpoints, skies.lit, eye)
-        return room_glare(maker, chosen, part(progress, 0.5, 1.0, "pictures"))
 
-    rated = timed("glare", glare)
-    heat = timed(
-        "thermal",
-        lambda: room_thermal(
-            building, space, scene, matrices.daylight, skies.whole_year(state), skies, weather,
-            options, cache, progress,
-        ),
-    )  # fmt: skip
-    return SpaceResult(space, daylight, rated, heat, seconds)
+    @property
+    def lit_state(self) -> NDArray[np.int64]:
+        """The shading state of every lit hour [L]."""
+        return self.state[self.skies.lit]
+
+    @cached_property
+    def maker(self) -> PictureMaker:
+        """What makes pictures of the year as it is operated."""
+        return self._maker(self.lit_state)
+
+    def _maker(self, state: NDArray[np.int64]) -> PictureMaker:
+        steps = part(self.progress, 0.0, 0.5, "pictures")
+        if "view" in self.__dict__:
+            return replace(self.view, state=state)
+        self.__dict__["view"] = picture_maker(
+            self.scene, self.matrices, self.lights, state, self.skies, self.options, steps
+        )
+        return self.__dict__["view"]
+
+    def daylight(self) -> DaylightResult:
+        """Illuminance of the work plane and its metrics."""
+        lights, state = self.lights, self.lit_state
+        steps = part(self.progress, 0.9, 1.0, "daylight")
+        found = room_daylight(
+            self.scene, lights, state, self.skies, self.weather, self.options, steps
+        )
+        self.progress("daylight", 1.0)
+        return found
+
+    def annual_glare(self) -> pd.DataFrame:
+        """Glare of every hour."""
+        return glare_of_year(self.maker, self.weather, self.progress)
+
+    def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
+        """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
+        if not hours and year is not None:
+            hours = worst_hours(year, WORST)
+        if not hours:
+            eye = np.stack([light.eye for light in self.lights])
+            eye = eye[self.lit_state, np.arange(eye.shape[1])]
+            hours = default_hours(self.weather.midpoints, self.skies.lit, eye)
+        return room_glare(self.maker, hours, part(self.progress, 0.5, 1.0, "pictures"))
+
+    def thermal(self, daylight: DaylightResult) -> tuple[ThermalResult, ZoneResult]:
+        """Temperatures and comfort."""
+        operate = None
+        if self.operation is not None:
+            operate = lambda zone: self._operated(zone, daylight)  # noqa: E731
+        return room_thermal(
+            self.building, self.space, self.scene, self.matrices.daylight, self.state, self.skies,
+            self.weather, self.options, self.cache, self.progress,
+            thermal_of=self._thermal_of, operate=operate,
+        )  # fmt: skip
+
+    def _operated(self, zone: Zone, daylight: DaylightResult) -> Zone:
+        mean = daylight.illuminance.mean(axis=1, dtype=float)
+        zone, self.lamps = operated(zone, self.operation.tables, self.space.floor_area, mean)
+        return zone
+
+    def _thermal_of(self, system: System) -> ThermalSystem:
+        table = None if self.operation is None else self.operation.table_of(system)
+        return thermal_system(system) if table is None else state_of(system, table)
+
+    def operation_result(self, balance: ZoneResult) -> OperationResult:
+        """What control, heating, cooling and lamps did."""
+        most = max(self.scene.windows.systems, key=len)
+        hours = pd.DataFrame(
+            {
+                "shading_state": self.state,
+                "heating_w": balance.heating,
+                "cooling_w": balance.cooling,
+                "lighting_w": self.lamps,
+            },
+            index=self.weather.midpoints,
+        ).rename_axis("time")
+        summary = {
+            "heating_kwh": balance.heating.sum() / 1e3,
+            "cooling_kwh": balance.cooling.sum() / 1e3,
+            "lighting_kwh": self.lamps.sum() / 1e3,
+            "peak_heating_w": balance.heating.max(),
+            "peak_cooling_w": balance.cooling.max(),
+        }
+        names = tuple(system.name for system in most)
+        summary = {key: float(value) for key, value in summary.items()}
+        return OperationResult(names, hours, summary, self.operation.tables.control.rule)

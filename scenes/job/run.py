@@ -1,10 +1,11 @@
-"""The main job from its three files to the results of every room."""
+"""The main job from its files to the results of every room."""
 
 from __future__ import annotations
 
 import platform
 import time
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 
@@ -12,21 +13,37 @@ import numpy as np
 
 from bim.model import Building, Problem, Space
 from bim.read_ifc import read_ifc
+from bim.templates import template_rooms
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from scenes.job.alike import as_room, same_light, same_systems
+from scenes.job.attached import attached_systems
 from scenes.job.glare import wanted_hours
 from scenes.job.inputs import System, chosen_spaces, read_system, read_weather, sha256
+from scenes.job.operation import Operation, check_states, read_operation
 from scenes.job.options import JobOptions
 from scenes.job.room import compute_room, skies_for
+from scenes.job.skies import Skies
 from scenes.job.thermal import thermal_system
-from scenes.job.windows import everywhere
+from scenes.job.windows import States, everywhere
 from scenes.results import RunResult, SpaceResult
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+
+
+@dataclass(frozen=True, slots=True)
+class JobInputs:
+    """What the files of a run hold."""
+
+    building: Building
+    spaces: list[Space]
+    weather: Weather
+    systems: Mapping[str, States]  # by window GUID
+    operation: Operation | None
 
 
 def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
@@ -35,51 +52,115 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     start = time.monotonic()
-    building, weather, system, spaces = _read(options, progress)
-    thermal = thermal_system(system)
-    cache = MatrixCache.of_user() if options.cache else None
+    inputs = read_inputs(options, progress)
+    building, weather = inputs.building, inputs.weather
+    used = used_systems(inputs)
+    thermal_notes = [note for system in used for note in thermal_system(system).notes]
     sun = sun_directions(weather)
     wanted_hours(options.picture_hours, weather.midpoints, np.flatnonzero(is_up(sun)))
     variant = variants.activate()
     progress("sky", 0.0)
     skies = skies_for(weather, options)
     progress("sky", 1.0)
-    results, problems = [], list(building.problems)
-    for space in spaces:
-        label = f"{space.name or space.guid}: "
-        try:
-            results.append(
-                compute_room(
-                    building, space, everywhere(space, system), weather, options,
-                    skies=skies, cache=cache, progress=_labelled(progress, label),
-                )
-            )  # fmt: skip
-        except (CfsError, ValueError) as error:
-            if isinstance(error, DataError):
-                raise
-            if len(spaces) == 1:
-                where = f"space {space.name or space.guid}"
-                raise DataError(str(error), file=options.building, element=where) from error
-            problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+    results, problems, notes = _rooms(inputs, skies, options, progress)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
-    manifest = _manifest(options, variant, building, weather, system, results)
+    manifest = _manifest(options, variant, inputs, used, results)
     manifest["seconds"] = round(time.monotonic() - start, 1)
-    notes = (*system.notes, *thermal.notes, *_site_notes(building, weather))
+    notes = [
+        *(note for system in used for note in system.notes),
+        *thermal_notes,
+        *_state_notes(inputs, options),
+        *notes,
+        *_site_notes(building, weather),
+    ]
     return RunResult(
-        building, weather.midpoints, sun, tuple(results), tuple(problems), manifest, notes
+        building,
+        weather.midpoints,
+        sun,
+        tuple(results),
+        (*building.problems, *problems),
+        manifest,
+        tuple(dict.fromkeys(notes)),
+        options.method,
     )
 
 
-def _read(options: JobOptions, progress: Progress) -> tuple[Building, Weather, System, list[Space]]:
+def read_inputs(options: JobOptions, progress: Progress) -> JobInputs:
     """The inputs, the quick ones first."""
-    system = read_system(options.system, u_value=options.u_value, g_value=options.g_value)
+    system, operation = None, None
+    if options.operation is not None:
+        operation = read_operation(options.operation)
+    if options.system is not None:
+        system = read_system(options.system, u_value=options.u_value, g_value=options.g_value)
     weather = read_weather(options.weather)
     progress("inputs", 0.1)
     building = read_ifc(options.building, progress=part(progress, 0.1, 1.0, "inputs"))
     spaces = chosen_spaces(building, options.spaces, options.building)
+    systems: dict[str, States] = {}
+    if operation is not None and operation.systems:
+        for space in spaces:
+            systems |= everywhere(space, *operation.systems)
+    elif system is not None:
+        for space in spaces:
+            systems |= everywhere(space, system)
+    else:
+        windows = [window for space in spaces for window in space.windows]
+        systems = attached_systems(options.building, windows)
+    if operation is not None:
+        check_states(operation, max(len(states) for states in systems.values()))
     progress("inputs", 1.0)
-    return building, weather, system, spaces
+    return JobInputs(building, spaces, weather, systems, operation)
+
+
+def used_systems(inputs: JobInputs) -> list[System]:
+    """Every system that the run may use, once."""
+    states = [s if inputs.operation else s[:1] for s in inputs.systems.values()]
+    return list({id(system): system for some in states for system in some}.values())
+
+
+def _rooms(
+    inputs: JobInputs, skies: Skies, options: JobOptions, progress: Progress
+) -> tuple[list[SpaceResult], list[Problem], list[str]]:
+    """The results of the rooms in their order, what was left out, and what was given twice."""
+    found: dict[str, SpaceResult] = {}
+    problems, notes = [], []
+    cache = MatrixCache.of_user() if options.cache else None
+    for group in template_rooms(inputs.spaces):
+        for space in group:
+            steps = _labelled(progress, f"{space.name or space.guid}: ")
+            try:
+                twin = next(
+                    (
+                        other
+                        for other in group
+                        if other.guid in found
+                        and not found[other.guid].like
+                        and same_systems(other, space, inputs.systems)
+                        and same_light(inputs.building, other, space, options, cache)
+                    ),
+                    None,
+                )
+                if twin is not None:
+                    found[space.guid] = as_room(found[twin.guid], space)
+                    name = space.name or space.guid
+                    notes.append(
+                        f"Room {name} is like {twin.name or twin.guid} in shape, orientation, "
+                        "materials, windows and in what shades it: its results are those."
+                    )
+                    continue
+                found[space.guid] = compute_room(
+                    inputs.building, space, inputs.systems, inputs.weather, options,
+                    operation=inputs.operation, skies=skies, cache=cache, progress=steps,
+                )  # fmt: skip
+            except (CfsError, ValueError) as error:
+                if isinstance(error, DataError):
+                    raise
+                if len(inputs.spaces) == 1:
+                    where = f"space {space.name or space.guid}"
+                    raise DataError(str(error), file=options.building, element=where) from error
+                problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+    return [found[s.guid] for s in inputs.spaces if s.guid in found], problems, notes
 
 
 def _labelled(progress: Progress, label: str) -> Progress:
@@ -90,24 +171,28 @@ def _labelled(progress: Progress, label: str) -> Progress:
 def _manifest(
     options: JobOptions,
     variant: str,
-    building: Building,
-    weather: Weather,
-    system: System,
+    inputs: JobInputs,
+    used: list[System],
     results: list[SpaceResult],
 ) -> dict:
     """What a reader needs to make the same numbers again."""
-    files = {"building": options.building, "weather": options.weather, "system": options.system}
-    beside = options.system.with_suffix(".toml")
-    if beside.is_file():
-        files["system_thermal"] = beside
+    files = {"building": options.building, "weather": options.weather}
+    if options.system is not None:
+        files["system"] = options.system
+        beside = options.system.with_suffix(".toml")
+        if beside.is_file():
+            files["system_thermal"] = beside
+    if inputs.operation is not None:
+        files["operation"] = inputs.operation.file
+        files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
         "inputs": {
             name: {"path": str(path), "sha256": sha256(path)} for name, path in files.items()
         },
-        "building": building.name,
-        "site": weather.site,
-        "system": system.name,
+        "building": inputs.building.name,
+        "site": inputs.weather.site,
+        "system": ", ".join(dict.fromkeys(system.name for system in used)),
         "options": {
             key: str(value) if isinstance(value, Path) else value
             for key, value in asdict(options).items()
@@ -120,6 +205,18 @@ def _manifest(
         },
         "rooms": {result.space.guid: result.seconds for result in results},
     }
+
+
+def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
+    """A sentence where windows have more states than are used."""
+    several = [states[0].name for states in inputs.systems.values() if len(states) > 1]
+    if inputs.operation is not None or not several:
+        return ()
+    names = ", ".join(dict.fromkeys(several))
+    return (
+        f"{options.building.name} holds several shading states; without --operation the first of "
+        f"each window ({names}) holds all year.",
+    )
 
 
 def _site_notes(building: Building, weather: Weather) -> tuple[str, ...]:

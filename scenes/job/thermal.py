@@ -59,7 +59,7 @@ def thermal_system(system: System) -> ThermalSystem:
     tau = solar.direct_hemispherical(solar.transmission_front)
     rho = solar.direct_hemispherical(solar.reflection_front)
     rho = np.minimum(rho, 1.0 - tau)
-    data = thermal_data(tau, rho, u_value=system.u_value, g_normal=system.g_value)
+    data = thermal_data(tau, rho, u_value=system.u_value, g_normal=system.g_value, item=system.name)
     g_value = data.g_value if system.g_by_patch is None else system.g_by_patch
     back_rho, back_tau = (
         _diffuse(solar, block) for block in (solar.reflection_back, solar.transmission_back)
@@ -93,15 +93,21 @@ def room_thermal(
     options: RoomOptions,
     cache: MatrixCache | None,
     progress: Progress,
-) -> ThermalResult:
-    """Temperatures of a year and adaptive comfort.
+    *,
+    thermal_of: Callable[[System], ThermalSystem] | None = None,
+    operate: Callable[[Zone], Zone] | None = None,
+) -> tuple[ThermalResult, ZoneResult]:
+    """Temperatures of a year and adaptive comfort, and the balance they come from.
 
     Args:
         daylight: D of the visible band, used again where the solar reflectances are the same.
         state: [H] shading state of the room's windows.
+        thermal_of: thermal data of a system; `thermal_system` by default.
+        operate: gives the zone its gains, air and set points; those of the options by default.
     """
     windows = scene.windows
-    thermals = [[thermal_system(s) for s in states] for states in windows.systems]
+    thermal_of = thermal_of or thermal_system
+    thermals = [[thermal_of(s) for s in states] for states in windows.systems]
     first = thermals[windows.group[0]][0]
     room = thermal_room(
         space,
@@ -110,6 +116,7 @@ def room_thermal(
         gains=internal_gains(space, skies.hours, options),
     )
     zone = with_states(room.zone, [thermals[g] for g in windows.group])
+    zone = zone if operate is None else operate(zone)
     sun = room_sun(building, space, scene, daylight, skies, options, cache,
                    room, part(progress, 0.0, 0.8, "heat"))  # fmt: skip
     suns = [solar_of_state(sun, scene, thermals, j, skies) for j in range(windows.states)]
@@ -122,13 +129,14 @@ def room_thermal(
     progress("heat", 1.0)
     times = weather.midpoints
     comfort, summary = _comfort(result, weather, options)
-    return ThermalResult(
+    found = ThermalResult(
         _temperatures(result, room, weather),
         pd.DataFrame(gains, index=times).rename_axis("time"),
         comfort,
         summary,
         tuple(fenestration_table(scene, thermals)),
     )
+    return found, result
 
 
 def with_states(zone: Zone, thermals: Sequence[Sequence[ThermalSystem]]) -> Zone:
@@ -252,6 +260,7 @@ def room_sun(
                 scene.groups,
                 window_reflectance=reflectance,
                 progress=part(progress, 0.6, 1.0),
+                cache=cache,
                 **tracing,
             ).values
         return known[key]

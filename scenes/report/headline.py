@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from mitsuba_cfs.glare.classes import hour_not_exceeded, protection_level
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded, significant
 from scenes.report.tables import glare_class, spoken, step_hours
@@ -16,6 +17,7 @@ from scenes.results import RunResult, SpaceResult
 
 WARM_C = 26.0  # operative temperature above which hours are counted
 LEVELS = ("none", "minimum", "medium", "high")  # of EN 17037
+PROTECTION = {"high": "0.35", "medium": "0.40", "minimum": "0.45"}  # DGP
 GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
 
 
@@ -41,6 +43,7 @@ def cards(result: RunResult, room: SpaceResult) -> tuple[Card, ...]:
         _autonomy(room),
         _provision(room),
         _glare(result, room),
+        _protection(room),
         _warm_hours(room),
         _comfort(room),
         _peak(room),
@@ -76,6 +79,15 @@ def occupied(room: SpaceResult) -> pd.Series:
     if "occupied" in comfort:
         return comfort["occupied"].astype(bool)
     return pd.Series(True, index=comfort.index)
+
+
+def heated(room: SpaceResult) -> str:
+    """Whether the room is heated and cooled, as a sentence."""
+    if room.operation is None:
+        return "Without heating and cooling."
+    energy = {name: room.operation.summary[f"{name}_kwh"] for name in ("heating", "cooling")}
+    used = " and ".join(name for name, value in energy.items() if value > 0)
+    return f"With {used}." if used else "Without heating and cooling."
 
 
 def applicable(comfort: pd.DataFrame) -> pd.Series:
@@ -167,6 +179,22 @@ def _glare(result: RunResult, room: SpaceResult) -> Card | None:
                 quantity("dgp").meaning, min(100 * dgp, 100))  # fmt: skip
 
 
+def _protection(room: SpaceResult) -> Card | None:
+    """EN 17037's protection from glare, of the year's occupied hours."""
+    if room.annual_glare is None or not occupied(room).any():
+        return None
+    dgp = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
+    level = protection_level(dgp)
+    grade = {"high": GOOD, "medium": GOOD, "minimum": FAIR}.get(level, POOR)
+    words = (
+        "protection from glare by EN 17037: DGP is above "
+        f"{rounded(hour_not_exceeded(dgp), 2)} in no more than 5 % of the occupied hours"
+    )
+    verdict = {"none": "above 0.45"}.get(level, f"{level}: at most {PROTECTION[level]}")
+    meaning = quantity("dgp").meaning
+    return Card("Protection from glare", level.capitalize(), "", words, verdict, grade, meaning)
+
+
 def _warm_hours(room: SpaceResult) -> Card | None:
     temperatures = room.thermal.temperatures
     if "operative_c" not in temperatures:
@@ -178,7 +206,7 @@ def _warm_hours(room: SpaceResult) -> Card | None:
     share = 100 * hours / total if total else float("nan")
     words = (
         f"with an operative temperature above {WARM_C:.0f} °C, {percent(share)} % of the "
-        f"{rounded(total, 0)} occupied hours, without cooling"
+        f"{rounded(total, 0)} occupied hours. {heated(room)}"
     )
     meaning = quantity("operative_c").meaning
     return Card("Warm hours", rounded(hours, 0), "h", words, meaning=meaning, meter=share)
@@ -215,8 +243,8 @@ def _peak(room: SpaceResult) -> Card | None:
     air, operative = temperatures["air_c"], temperatures["operative_c"]
     words = (
         f"highest operative temperature ({spoken(operative.idxmax())}); highest air temperature "
-        f"{rounded(float(air.max()), 1)} °C, lowest {rounded(float(air.min()), 1)} °C, "
-        "without heating and cooling"
+        f"{rounded(float(air.max()), 1)} °C, lowest {rounded(float(air.min()), 1)} °C. "
+        f"{heated(room)}"
     )
     return Card("Peak temperature", rounded(float(np.max(operative)), 1), "°C", words,
                 meaning=quantity("operative_c").meaning)  # fmt: skip

@@ -166,7 +166,12 @@ def _layer(key: str, values: NDArray) -> Layer:
     whole = q.unit == "%" and q.digits == 0
     high = 100.0 if whole else top_of_scale(values)
     scale = ColourScale(0.0, high, q.label, q.unit)
-    return Layer(key, scale, _base64(scale.rgba(values)[:, :3]), q.digits)
+    return Layer(key, scale, colour_bytes(scale, values), q.digits)
+
+
+def colour_bytes(scale: ColourScale, values: NDArray) -> str:
+    """The colours of values [S] as the viewer takes them."""
+    return _base64(scale.rgba(values)[:, :3])
 
 
 def _base64(array: NDArray) -> str:

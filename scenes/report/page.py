@@ -12,9 +12,10 @@ import jinja2
 from markupsafe import Markup
 
 from scenes.report import tables
+from scenes.report.method import method_words
 from scenes.report.model3d import model3d, room_name
 from scenes.report.names import glossary, option_words
-from scenes.report.numbers import rounded, share
+from scenes.report.numbers import rounded
 from scenes.report.room import room_page
 from scenes.results import RunResult
 
@@ -47,11 +48,7 @@ def report_html(result: RunResult) -> str:
         versions=tables.nested_table("Versions", manifest.get("versions", {})),
         rest=tables.nested_table("Run", remaining(manifest)),
         timings=timings_table(result),
-        worst_error=share(max(float(r.daylight.relative_error.max()) for r in result.spaces)),
-        mean_error=share(
-            sum(float(r.daylight.relative_error.mean()) for r in result.spaces)
-            / len(result.spaces)
-        ),
+        method=method_words(result),
         glossary=glossary(),
         style=Markup(TEMPLATES.joinpath("style.css").read_text("utf-8")),
         scripts=Markup("\n".join(TEMPLATES.joinpath(s).read_text("utf-8") for s in SCRIPTS)),
@@ -181,6 +178,7 @@ def _named(manifest: Mapping, name: str) -> str:
 def _title(name: str) -> str:
     known = {
         "system": "Fenestration system",
+        "operation": "Operation",
         "system_thermal": "Its thermal values",
         "building": "Model file",
     }

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from bim.model import Space
 from scenes.figures.chart import Chart
 from scenes.figures.plan import Plan
-from scenes.report import daylight_figures, glare_figures, tables, thermal_figures
+from scenes.report import (
+    daylight_figures,
+    glare_figures,
+    operation_figures,
+    tables,
+    thermal_figures,
+)
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards
 from scenes.report.model3d import room_name
@@ -32,12 +38,16 @@ class RoomPage:
     error_words: str
     glare: glare_figures.GlareGallery | None
     glare_table: tables.Table | None
+    glare_year: Chart | None
     temperature: Chart
     comfort: Chart | None
     duration: Chart
     weeks: tuple[Chart, ...]
     gains: Chart | None
     gains_table: tables.Table
+    states: Chart | None
+    loads: Chart | None
+    loads_table: tables.Table | None
     comfort_table: tables.Table
     fenestration: tuple[tables.Table, ...]
 
@@ -48,7 +58,7 @@ def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
     return RoomPage(
         anchor=f"room-{number}",
         name=room_name(room.space),
-        facts=facts(room.space),
+        facts=facts(room.space, room.like),
         cards=cards(result, room),
         plans=daylight_figures.plans(room),
         light=daylight_figures.illuminance_carpet(result, room),
@@ -61,12 +71,18 @@ def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
         glare_table=tables.glare_table(result.times, room.glare.pictures)
         if room.glare.pictures
         else None,
+        glare_year=operation_figures.glare_carpet(result, room),
         temperature=thermal_figures.temperature_carpet(result, room),
         comfort=thermal_figures.comfort_carpet(result, room),
         duration=thermal_figures.duration_curve(room),
         weeks=thermal_figures.extreme_weeks(room),
         gains=thermal_figures.gains_chart(monthly),
         gains_table=tables.gains_table(monthly),
+        states=operation_figures.state_carpet(result, room),
+        loads=operation_figures.loads_chart(room),
+        loads_table=None
+        if room.operation is None
+        else tables.values_table("Loads of the year", room.operation.summary),
         comfort_table=tables.values_table("Comfort", room.thermal.comfort_summary),
         fenestration=tuple(
             tables.values_table(
@@ -78,7 +94,7 @@ def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
     )
 
 
-def facts(space: Space) -> tuple[tuple[str, str], ...]:
+def facts(space: Space, like: str = "") -> tuple[tuple[str, str], ...]:
     """Size and windows of the room in words."""
     glass = sum(window.area for window in space.windows)
     count = len(space.windows)
@@ -91,6 +107,8 @@ def facts(space: Space) -> tuple[tuple[str, str], ...]:
     ]
     if space.storey:
         rows.append(("Storey", space.storey))
+    if like:
+        rows.append(("Results of", f"{like}, which is alike"))
     return tuple(rows)
 
 

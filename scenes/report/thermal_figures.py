@@ -10,7 +10,7 @@ import pandas as pd
 from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, Mark, Readout, box, line
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
-from scenes.report.headline import WARM_C, applicable, comfort_columns, occupied
+from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, occupied
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded
 from scenes.report.tables import step_hours
@@ -28,7 +28,7 @@ def temperature_carpet(result: RunResult, room: SpaceResult) -> Chart:
     scale = ColourScale(low, high, "Operative temperature", "°C", colours="cividis")
     return carpet(
         result.times, values, scale, title="Operative temperature", digits=1,
-        explanation=quantity("operative_c").meaning + " Without heating and cooling.",
+        explanation=f"{quantity('operative_c').meaning} {heated(room)}",
     )  # fmt: skip
 
 
@@ -133,7 +133,7 @@ def week(room: SpaceResult, start: pd.Timestamp, title: str) -> Chart:
     last = stop - pd.Timedelta(days=1)
     return Chart(
         f"{title}: {start.day} {start:%B} to {last.day} {last:%B}",
-        "Temperatures outdoors and in the room, without heating and cooling.",
+        f"Temperatures outdoors and in the room. {heated(room)}",
         "Day",
         "Temperature [°C]",
         tuple(ticks),

@@ -15,6 +15,7 @@ from scenes.results import (
     DaylightResult,
     GlareResults,
     LuminancePicture,
+    OperationResult,
     RunResult,
     SpaceResult,
     ThermalResult,
@@ -34,7 +35,7 @@ def run_result(*, picture_size: int = 320, pictures: int = 4) -> RunResult:
     )
     return RunResult(
         building, times, sun, rooms, problems(), manifest(),
-        ("The venetian blind stays at 45° all year; it is not moved.",),
+        ("The venetian blind stays at 45° all year; it is not moved.",), "five-phase",
     )  # fmt: skip
 
 
@@ -89,13 +90,41 @@ def space_result(space: Space, times, sun, size: int, pictures: int, seed: int) 
     facing = np.clip(sun @ space.windows[0].normal, 0, 1) * (sun[:, 2] > 0)
     daylight = daylight_result(space, outside, facing * cloud, rng)
     hours = np.argsort(-(facing * cloud * outside))[::400][:pictures]
+    operation, year = None, None
+    if seed:  # the second room has all there can be
+        operation = operation_result(times, facing * cloud, daylight)
+        year = annual_glare(times, sun, facing * cloud)
     return SpaceResult(
         space,
         daylight,
         glare_results(space, hours, daylight.illuminance, size),
         thermal_result(space, times, facing * cloud, cloud, rng),
         {"view matrix": 4.21, "daylight matrix": 11.8, "annual product": 0.92, "pictures": 8.3},
+        operation,
+        year,
     )
+
+
+def operation_result(times, beam, daylight) -> OperationResult:
+    """A blind that closes in the sun, heating in winter, cooling in summer."""
+    day, hour = times.day_of_year.to_numpy(), times.hour.to_numpy()
+    winter = np.cos(2 * np.pi * (day - 20) / 365)
+    used = (hour >= 7) & (hour < 19)
+    lamps = 200 * used * np.clip(1 - daylight.illuminance.mean(axis=1) / 500, 0, 1)
+    hours = pd.DataFrame(
+        {"shading_state": np.digitize(beam, [0.2, 0.5]),
+         "heating_w": 900 * np.clip(winter, 0, 1) * used,
+         "cooling_w": 700 * np.clip(-winter, 0, 1) * used, "lighting_w": lamps}, index=times,
+    )  # fmt: skip
+    summary = {f"{n}_kwh": float(hours[f"{n}_w"].sum() / 1e3) for n in ("heating", "cooling")}
+    summary |= {"lighting_kwh": float(lamps.sum() / 1e3), "peak_heating_w": 900.0}
+    return OperationResult(("open", "slats 40°", "closed <70°>"), hours, summary, "irradiance")
+
+
+def annual_glare(times, sun, beam) -> pd.DataFrame:
+    """Glare that follows the sun on the facade, missing at night."""
+    dgp = np.where(sun[:, 2] > 0, 0.2 + 0.35 * beam, np.nan)
+    return pd.DataFrame({"dgp": dgp, "ev": (dgp - 0.184) / 6.22e-5}, index=times)
 
 
 def daylight_result(space: Space, outside, beam, rng) -> DaylightResult:

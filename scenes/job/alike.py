@@ -1,0 +1,85 @@
+"""Rooms alike in shape that also get the same light: computed once, given for each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Building, Space
+from bim.to_tracer import exterior_surfaces, window_groups
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+from scenes.job.daylight import daylight_options
+from scenes.job.options import RoomOptions
+from scenes.job.windows import States
+from scenes.results import SpaceResult
+
+SAME_LIGHT = 0.005  # share of the light from anywhere that may come another way
+NEAR = 0.01  # [m] between the places of windows in their rooms
+
+
+def same_systems(a: Space, b: Space, systems: Mapping[str, States]) -> bool:
+    """Whether the windows at the same places of two rooms alike have the same systems."""
+    places = np.array([window.centre - corner(a) for window in a.windows])
+    for window in b.windows:
+        distance = np.linalg.norm(places - (window.centre - corner(b)), axis=1)
+        nearest = int(distance.argmin())
+        if distance[nearest] > NEAR:
+            return False
+        pair = systems[a.windows[nearest].guid], systems[window.guid]
+        if len({tuple(map(id, states)) for states in pair}) > 1:
+            return False
+    return True
+
+
+def same_light(
+    building: Building, a: Space, b: Space, options: RoomOptions, cache: MatrixCache | None
+) -> bool:
+    """Whether two rooms alike see the same outdoors, by their daylight matrices in both bands.
+
+    The matrices are traced with the same random numbers: where the same things stand outdoors they
+    differ by rounding only.
+    """
+    for band in ("visible", "solar"):
+        one, other = (_daylight(building, s, band, options, cache) for s in (a, b))
+        if one.shape != other.shape:
+            return False
+        if np.abs(one - other).sum() > SAME_LIGHT * one.sum():
+            return False
+    return True
+
+
+def as_room(result: SpaceResult, space: Space) -> SpaceResult:
+    """The results of a room for another one alike, moved to its place."""
+    shift = corner(space) - corner(result.space)
+    daylight, glare = result.daylight, result.glare
+    table = daylight.sensor_metrics.copy()
+    table[["x", "y", "z"]] += shift
+    place = tuple((np.asarray(glare.view.position) + shift).tolist())
+    return replace(
+        result,
+        space=space,
+        daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
+        glare=replace(glare, view=replace(glare.view, position=place)),
+        seconds={},
+        like=result.space.name or result.space.guid,
+    )
+
+
+def corner(space: Space) -> NDArray[np.float64]:
+    """The lowest corner [3] of a room."""
+    return space.shell.reshape(-1, 3).min(axis=0)
+
+
+def _daylight(
+    building: Building, space: Space, band: str, options: RoomOptions, cache: MatrixCache | None
+) -> NDArray[np.float64]:
+    return daylight_matrix(
+        exterior_surfaces(building, space, band),
+        window_groups(space),
+        cache=cache,
+        **daylight_options(options),
+    ).values

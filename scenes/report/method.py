@@ -1,0 +1,123 @@
+"""What was done, in words: the method of a run as the reader of its report is told."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenes.report.numbers import share
+from scenes.results import RunResult
+
+TRACED = (
+    "rays traced with Mitsuba 3 give how much of each direction of light leaving the window "
+    "reaches each sensor (view matrix V) and how much of each patch of sky and ground reaches the "
+    "window (daylight matrix D). With the transmission matrix T of the fenestration (from its "
+    "BSDF, the table of how it sends light on from every direction into every direction) and the "
+    "sky of each hour s, the illuminance is V T D s"
+)
+SKIES = (
+    "Skies follow Perez's all-weather model from the direct and diffuse irradiance of the weather "
+    "file."
+)
+LIGHT = {
+    "three-phase": f"The three-phase method: {TRACED}. {SKIES}",
+    "five-phase": (
+        f"The five-phase method: {TRACED}. What of it comes straight from the sun is taken out and "
+        "traced anew with the sun's true disc of 0.53 degrees through the window's BSDF, its "
+        "through beam kept apart: V T D s - V_d T D_d s_d + C_ds s_sun. " + SKIES
+    ),
+    "point-in-time": (
+        "Point-in-time path tracing: in every hour with daylight paths are traced with Mitsuba 3 "
+        "from each sensor through the window's BSDF to the sky and to the sun's true disc of 0.53 "
+        f"degrees, with all reflections, also from the window's back. {SKIES}"
+    ),
+}
+PICTURES = {
+    "three-phase": "by the same matrices, the sun spread over the directions of the BSDF's table",
+    "five-phase": (
+        "by the same method: the sun's disc, its beam on surfaces and its light scattered in the "
+        "window are looked for in each pixel"
+    ),
+    "point-in-time": "by paths from each pixel",
+}
+PATCHES = (
+    "or the 10 to 15 degrees over which the directions of the fenestration's table average the sun"
+)
+SCATTER = "or the directions over which the fenestration's table averages what it scatters"
+
+
+def method_words(result: RunResult) -> list[tuple[str, str]]:
+    """Heading and text of each part of the method."""
+    rooms = result.spaces
+    worst = share(max(float(r.daylight.relative_error.max()) for r in rooms))
+    mean = share(float(np.mean([r.daylight.relative_error.mean() for r in rooms])))
+    blurred = PATCHES if result.method == "three-phase" else SCATTER
+    found = [
+        ("Light", LIGHT[result.method]),
+        (
+            "Error bars",
+            "Traced numbers scatter; the spread of independent repetitions gives their relative "
+            "standard error: two times out of three the exact value is nearer than this, 19 times "
+            f"out of 20 nearer than twice this. For the annual mean illuminance it is {mean} % as "
+            f"a mean over all sensors and {worst} % at the worst. It covers the tracing only: not "
+            f"the weather file, the sky model, the reflectances taken, {blurred}.",
+        ),
+    ]
+    if any("ase1000_250" in room.daylight.room_metrics for room in rooms):
+        found.append(
+            (
+                "Direct sun",
+                "Annual sunlight exposure counts what comes straight from the sun through the "
+                "window, scattered in it or not, without reflections in the room"
+                + (", in the most open shading state." if _controlled(result) else "."),
+            )
+        )
+    found.append(("Glare", _glare(result)))
+    found.append(("Heat", _heat(result)))
+    twins = [room.space.name or room.space.guid for room in rooms if room.like]
+    if twins:
+        found.append(
+            (
+                "Rooms alike",
+                f"Of rooms alike in shape, orientation, materials, windows and surroundings one is "
+                f"computed; its results are given for the others too ({', '.join(twins)}).",
+            )
+        )
+    return found
+
+
+def _controlled(result: RunResult) -> bool:
+    return any(room.operation is not None and len(room.operation.states) > 1
+               for room in result.spaces)  # fmt: skip
+
+
+def _glare(result: RunResult) -> str:
+    text = (
+        "Luminance pictures of 180 degrees are made for the chosen hours, "
+        f"{PICTURES[result.method]}; bright areas found in them and the light at the eye give the "
+        "daylight glare probability (Wienold and Christoffersen 2006)."
+    )
+    if any(room.annual_glare is not None for room in result.spaces):
+        text += (
+            " The same was done for every hour with the sun up; EN 17037 asks that DGP exceeds its "
+            "limit in no more than 5 % of the hours of use."
+        )
+    return text
+
+
+def _heat(result: RunResult) -> str:
+    text = (
+        "The daylight matrix in the solar band gives the solar radiation passing into the room and "
+        "absorbed in the window, whose two layers take and give heat by its U and g (Kuhn's "
+        "Blackbox). A balance of the room's surfaces and air every ten minutes, "
+    )
+    if any(room.operation is not None for room in result.spaces):
+        text += "with the gains, outdoor air and set points of the operation file, "
+    else:
+        text += "without heating or cooling, "
+    text += (
+        "gives temperatures; comfort follows from the operative temperature and the running mean "
+        "of the outdoor temperature."
+    )
+    if _controlled(result):
+        text += " Each hour's shading state holds for light, glare and heat together."
+    return text

@@ -1,0 +1,105 @@
+"""Figures of how a room was operated: the shading state of every hour, and the loads by month."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from scenes.figures.carpet import carpet, class_carpet
+from scenes.figures.chart import Chart, Mark, Readout, box
+from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
+from scenes.report.headline import occupied
+from scenes.report.names import quantity
+from scenes.report.numbers import percent, rounded
+from scenes.report.tables import monthly_gains
+from scenes.results import RunResult, SpaceResult
+
+STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")
+LOADS = {"heating_w": "part0", "cooling_w": "part1", "lighting_w": "part2"}
+RULES = {
+    "always": "one state all year",
+    "schedule": "by the clock",
+    "irradiance": "by the irradiance of the windows",
+    "glare": "the most open state without glare at the view point",
+    "cut-off": "the most open slats that stop the direct sun",
+}
+
+
+def state_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
+    """The shading state of every hour with the sun up; None where there is only one."""
+    ran = room.operation
+    if ran is None or len(ran.states) < 2:
+        return None
+    state = ran.hours["shading_state"].to_numpy()
+    lit = result.sun[:, 2] > 0
+    count = np.bincount(state[lit], minlength=len(ran.states))
+    legend = tuple(
+        (STATE_COLOURS[i % len(STATE_COLOURS)], f"{name}: {percent(100 * n / lit.sum())} %")
+        for i, (name, n) in enumerate(zip(ran.states, count, strict=True))
+    )
+    return class_carpet(
+        result.times,
+        np.where(lit, state, -1),
+        legend,
+        title="Shading state",
+        explanation=f"Control: {RULES.get(ran.rule, ran.rule)}. Hours with the sun up; optics and "
+        "heat of the windows change together.",
+    )
+
+
+def loads_chart(room: SpaceResult) -> Chart | None:
+    """Heating, cooling and light by month, beside one another; None without any."""
+    if room.operation is None:
+        return None
+    monthly = monthly_gains(room.operation.hours)
+    names = [name for name in LOADS if monthly[name].sum() > 0]
+    if not names:
+        return None
+    top = max(round_limits([0, monthly[names].to_numpy().max()])[1], 1.0)
+    x_range, y_range = (0.0, float(len(monthly))), (0.0, top)
+    width = 0.8 / len(names)
+    marks = []
+    for number, name in enumerate(names):
+        path = "".join(
+            box(i + 0.1 + number * width, i + 0.1 + (number + 0.92) * width, 0, v,
+                x_range, y_range)
+            for i, v in enumerate(monthly[name])
+        )  # fmt: skip
+        marks.append(Mark(path, LOADS[name], quantity(name).label, filled=True))
+    ticks = tuple(
+        Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)
+        for i, m in enumerate(monthly.index)
+    )
+    return Chart(
+        "Heating, cooling and light by month",
+        "Heat that an ideal system gives or takes to keep the set points, and the lamps' energy "
+        "that daylight leaves to be given.",
+        "Month", "Energy [kWh]", ticks, axis_ticks(*y_range), tuple(marks),
+        readout=Readout(
+            tuple(f"{m:%B}" for m in monthly.index),
+            tuple((quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n]))
+                  for n in names),
+        ),
+    )  # fmt: skip
+
+
+def glare_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
+    """DGP of every hour of the year; None where it was not computed."""
+    year = room.annual_glare
+    if year is None:
+        return None
+    dgp = year["dgp"].to_numpy(dtype=float)
+    used = dgp_in_use(room)
+    text = quantity("dgp").meaning + " Nights are left empty."
+    if len(used):
+        text += f" It is above 0.40 in {percent(100 * float(np.mean(used > 0.40)))} % of the "
+        text += f"{rounded(len(used), 0)} occupied hours."
+    scale = ColourScale(0.2, 0.6, "Daylight glare probability", "", colours="inferno")
+    return carpet(result.times, dgp, scale, title="Glare through the year", explanation=text,
+                  digits=2)  # fmt: skip
+
+
+def dgp_in_use(room: SpaceResult) -> np.ndarray:
+    """DGP of the occupied hours; of dark ones it is 0, for nothing dazzles then."""
+    year: pd.DataFrame = room.annual_glare
+    return year["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]

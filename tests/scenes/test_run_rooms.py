@@ -1,0 +1,310 @@
+"""The main job on a small box: methods against each other, states, kept matrices, rooms alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bim.model import Building, Element
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.bsdf.evaluate import direct_hemispherical
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.sky.weather import Weather, read_epw
+from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.job.alike import as_room, same_light, same_systems
+from scenes.job.annual import worst_hours
+from scenes.job.inputs import System, read_system
+from scenes.job.operation import check_states, read_operation, shading_states
+from scenes.job.options import RoomOptions
+from scenes.job.room import compute_room, skies_for
+from scenes.job.skies import Skies, Sun
+from scenes.job.windows import everywhere, room_windows
+
+HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
+SMALL = RoomOptions(
+    sensor_spacing=1.0, sensor_samples=8192, patch_samples=4096, sun_points=512,
+    path_samples=16384, picture_size=96, picture_samples=8, sky_subdivision=1,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def weather() -> Weather:
+    return read_epw(WEATHER)
+
+
+@pytest.fixture(scope="module")
+def blind() -> System:
+    return read_system(VENETIAN_BLIND)
+
+
+@pytest.fixture(scope="module")
+def glass() -> System:
+    return clear("clear", 0.8)
+
+
+def clear(name: str, tau: float) -> System:
+    """A pane that passes the share `tau` of all light straight on and reflects a tenth."""
+    omega = KLEMS_FULL.projected_solid_angles()
+    through, back = np.diag(tau / omega), np.diag(0.1 / omega)
+    klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, back, back)
+    return System(name, klems, klems, u_value=2.0, g_value=min(tau + 0.05, 0.87))
+
+
+@pytest.fixture(scope="module")
+def milk() -> System:
+    """A pane that scatters the same to all sides."""
+    even = np.full((KLEMS_FULL.size, KLEMS_FULL.size), 0.5 / np.pi)
+    nothing = np.zeros_like(even)
+    klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, even, even, nothing, nothing)
+    return System("milk", klems, klems, u_value=2.0)
+
+
+@pytest.fixture(scope="module")
+def skies(weather) -> Skies:
+    """The skies of a few hours, as if the others were dark."""
+    return only(skies_for(weather, SMALL), HOURS)
+
+
+def only(skies: Skies, hours: tuple[int, ...]) -> Skies:
+    chosen = np.searchsorted(skies.lit, hours)
+    assert np.array_equal(skies.lit[chosen], hours)
+    s = skies.sun
+    sun = Sun(s.patches[:, chosen], s.direction[chosen], s.illuminance[chosen])
+    return Skies(
+        skies.visible[:, chosen], skies.solar[:, chosen], np.array(hours), skies.hours, sun
+    )
+
+
+BOX = shoebox(
+    3.0, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5),),
+    reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
+)  # fmt: skip
+ROOM = BOX.spaces[0]
+
+
+def light(method: str, system: System, weather, skies, **more) -> np.ndarray:
+    """Illuminance [hours, S] by a method."""
+    result = compute_room(
+        BOX, ROOM, everywhere(ROOM, system), weather, replace(SMALL, method=method),
+        skies=skies, pictures=False, **more,
+    )  # fmt: skip
+    print(method, result.daylight.relative_error)
+    return result.daylight.illuminance[list(HOURS)]
+
+
+@pytest.mark.parametrize("name", ["milk", "glass"])
+def test_five_phase_is_what_paths_find(variant, name, weather, skies, milk, glass) -> None:
+    """Systems that are even over the Klems patches; paths have 1 to 2 % noise at a sensor."""
+    system = {"milk": milk, "glass": glass}[name]
+    five, paths = (light(m, system, weather, skies) for m in ("five-phase", "point-in-time"))
+    np.testing.assert_allclose(five.mean(axis=1), paths.mean(axis=1), rtol=0.03)
+
+
+def test_three_phase_blurs_the_sun_through_glass(variant, weather, skies, glass) -> None:
+    """Sun falls on some sensors and not on others; the three-phase method spreads it."""
+    five, three = (light(m, glass, weather, skies) for m in ("five-phase", "three-phase"))
+    assert five[3].max() / five[3].min() > 3 * three[3].max() / three[3].min()  # low winter sun
+    assert five.min() >= 0
+
+
+def test_kept_matrices_serve_other_systems(variant, tmp_path, weather, skies, blind, glass) -> None:
+    cache = MatrixCache(tmp_path)
+    fresh = light("five-phase", glass, weather, skies)
+    light("five-phase", blind, weather, skies, cache=cache)
+    traced = {path.name for path in tmp_path.iterdir()}
+    kept = light("five-phase", glass, weather, skies, cache=cache)
+    added = {path.name.rsplit("-", 1)[0] for path in tmp_path.iterdir() if path.name not in traced}
+    assert added <= {"direct-sun", "absorption-matrix"}, "V and D do not depend on the system"
+    np.testing.assert_array_equal(kept, fresh)
+
+
+def test_windows_with_their_own_systems(variant, weather, skies, blind, glass) -> None:
+    """Two windows in one wall, one system each: the light of each alone adds up."""
+    both = shoebox(
+        3.0, 4.0, 2.8,
+        windows=(WindowRectangle(0.2, 0.9, 1.2, 1.5), WindowRectangle(1.6, 0.9, 1.2, 1.5)),
+    )  # fmt: skip
+    space = both.spaces[0]
+    left, right = (window.guid for window in space.windows)
+    dark = clear("dark", 1e-9)
+    options = replace(SMALL, method="five-phase", sensor_samples=2048)
+
+    def mean(one: System, other: System) -> float:
+        systems = {left: (one,), right: (other,)}
+        found = compute_room(both, space, systems, weather, options, skies=skies, pictures=False)
+        assert len(room_windows(space, systems).groups) == 2
+        return found.daylight.illuminance.astype(float).sum()
+
+    assert mean(glass, blind) == pytest.approx(mean(glass, dark) + mean(dark, blind), rel=1e-4)
+
+
+OPERATION = """
+[[system]]
+bsdf = "open.xml"
+u_value = 1.1
+[[system]]
+bsdf = "shut.xml"
+u_value = 0.9
+[control]
+rule = "schedule"
+schedule = [{}]
+[gains]
+lighting_w_m2 = 10.0
+[loads]
+heating_c = 20.0
+cooling_c = 26.0
+"""
+
+
+def operation_file(folder: Path, text: str) -> Path:
+    """An operation whose two states are the demo's blind under two names."""
+    for name in ("open", "shut"):
+        (folder / f"{name}.xml").write_bytes(VENETIAN_BLIND.read_bytes())
+    path = folder / "operation.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_states_switch_light_and_heat_together(
+    variant, tmp_path, weather, skies, blind, glass
+) -> None:
+    """Glass in the morning, blind from noon: each hour has the light and the gains of its state."""
+    day = ", ".join("0" if hour < 12 else "1" for hour in range(24))
+    operation = read_operation(operation_file(tmp_path, OPERATION.format(day)))
+    operation = replace(operation, systems=(glass, blind))
+    options = replace(SMALL, method="five-phase", sensor_samples=2048)
+
+    def run(*states: System, operation=None):
+        return compute_room(
+            BOX, ROOM, everywhere(ROOM, *states), weather, options, operation=operation,
+            skies=skies, pictures=False,
+        )  # fmt: skip
+
+    opened, shut, switched = run(glass), run(blind), run(glass, blind, operation=operation)
+    for hour in HOURS:
+        one = opened if hour % 24 < 12 else shut
+        np.testing.assert_allclose(
+            switched.daylight.illuminance[hour], one.daylight.illuminance[hour], rtol=1e-5
+        )
+        gains = switched.thermal.gains.iloc[hour], one.thermal.gains.iloc[hour]
+        assert gains[0].to_numpy() == pytest.approx(gains[1].to_numpy(), rel=1e-6)
+    ran = switched.operation
+    assert ran.hours["shading_state"].tolist()[:24] == [0] * 12 + [1] * 12
+    air = switched.thermal.temperatures["air_c"]
+    assert air.min() > 19.5 and air.max() < 26.5
+    assert ran.summary["heating_kwh"] > 0 and ran.summary["lighting_kwh"] > 0
+
+
+BAD_OPERATION = {
+    "no TOML": ("[control", "TOML"),
+    "unknown table": ("[blinds]\nup = 1", "blinds"),
+    "no such file": ('[[system]]\nbsdf = "none.xml"', "none.xml"),
+    "crossed set points": ("[loads]\nheating_c = 25\ncooling_c = 22", "heating_c"),
+    "unknown rule": ('[control]\nrule = "mood"', "control.rule"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD_OPERATION)
+def test_bad_operations_are_named(fault, tmp_path) -> None:
+    text, word = BAD_OPERATION[fault]
+    with pytest.raises(DataError, match=word) as caught:
+        read_operation(operation_file(tmp_path, text))
+    assert "operation.toml" in str(caught.value)
+
+
+def test_states_that_windows_lack_are_named(tmp_path) -> None:
+    for text in ("[control]\nstate = 3", '[control]\nrule = "schedule"\nschedule = [0, 1]'):
+        operation = read_operation(operation_file(tmp_path, text))
+        with pytest.raises(DataError, match="control"):
+            check_states(operation, 2)
+
+
+def test_rules_of_the_control(tmp_path, weather) -> None:
+    """Irradiance of the brightest window; the eye; DGP only where a limit of it is given."""
+    hours, H = weather.times, len(weather.times)
+    bright = np.zeros((H, 2))
+    bright[100, 1] = 500.0
+    eye = np.zeros((3, H))
+    eye[0, 200], eye[1, 200] = 9000.0, 5000.0
+
+    def states(text: str, dgp=None):
+        control = read_operation(operation_file(tmp_path, text)).tables.control
+        return shading_states(
+            control, ROOM, weather, 3, irradiance=bright, eye=eye, dgp=dgp or pytest.fail
+        )
+
+    by_sun = states('[control]\nrule = "irradiance"\nclose_above = 300')
+    assert np.flatnonzero(by_sun).tolist() == [100] and by_sun[100] == 2
+    by_eye = states('[control]\nrule = "glare"\nlimit_lx = 3000')
+    assert np.flatnonzero(by_eye).tolist() == [200] and by_eye[200] == 2
+    picture = np.full((3, H), 0.2)
+    picture[0, 300] = 0.5
+    by_dgp = states('[control]\nrule = "glare"\nlimit_dgp = 0.4', lambda: picture)
+    assert np.flatnonzero(by_dgp).tolist() == [300] and by_dgp[300] == 1
+    assert len(by_dgp) == len(hours)
+
+
+def moved(building: Building, offset: tuple[float, float, float], name: str):
+    """The building's room somewhere else, under another name."""
+    space = building.spaces[0]
+    faces = tuple(replace(f, triangles=f.triangles + offset) for f in space.faces)
+    windows = tuple(
+        replace(w, triangles=w.triangles + offset, guid=f"{w.guid}-{name}") for w in space.windows
+    )
+    return replace(space, faces=faces, windows=windows, guid=f"{name}-guid", name=name)
+
+
+def test_a_room_alike_has_the_results_of_its_twin(variant, weather, skies, glass, blind) -> None:
+    """Shifted, the room is computed anew to the same numbers; what shades one alone tells them."""
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    building = replace(BOX, spaces=(ROOM, twin))
+    systems = everywhere(ROOM, glass) | everywhere(twin, glass)
+    assert same_systems(ROOM, twin, systems)
+    assert not same_systems(ROOM, twin, everywhere(ROOM, glass) | everywhere(twin, blind))
+    assert same_light(building, ROOM, twin, SMALL, None)
+    wall = np.array([[[8, -2, 0], [14, -2, 0], [14, -2, 6]]], dtype=float)
+    shaded = replace(building, elements=(Element("w", "wall", "IfcWall", wall, 0.2, 0.2),))
+    assert not same_light(shaded, ROOM, twin, SMALL, None)
+
+    options = replace(SMALL, sensor_samples=2048)
+    one, other = (
+        compute_room(building, s, systems, weather, options, skies=skies, pictures=False)
+        for s in (ROOM, twin)
+    )
+    given = as_room(one, twin)
+    assert given.like == "room" and given.space is twin
+    np.testing.assert_allclose(given.daylight.points, other.daylight.points, atol=1e-9)
+    np.testing.assert_allclose(given.glare.view.position, other.glare.view.position, atol=1e-9)
+    mean = given.daylight.illuminance.mean(axis=0)
+    # the same random numbers; single paths go another way by rounding of coordinates
+    np.testing.assert_allclose(mean, other.daylight.illuminance.mean(axis=0), rtol=0.03)
+
+
+def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glass) -> None:
+    options = replace(SMALL, annual_glare=True, picture_hours=("06-20 12", "12-19 12"))
+    found = compute_room(BOX, ROOM, everywhere(ROOM, glass), weather, options, skies=skies)
+    year = found.annual_glare["dgp"].to_numpy()
+    assert np.flatnonzero(np.isfinite(year)).tolist() == list(HOURS)
+    for picture in found.glare.pictures:
+        assert year[picture.hour] == pytest.approx(picture.glare["dgp"], abs=1e-6)
+    assert worst_hours(found.annual_glare, 2) == np.argsort(-np.nan_to_num(year))[:2].tolist()
+    with pytest.raises(ValueError, match="annual glare"):
+        replace(options, method="point-in-time")
+
+
+def test_a_tensor_tree_is_taken_for_its_klems_matrix(real_data) -> None:
+    path = real_data / "bsdf" / "tensortree" / "pyradiance_room_blindsT3.xml"
+    system = read_system(path)
+    tree = read_bsdf_xml(path).band("Visible")
+    assert system.fine is system.tree and system.solar is system.visible
+    towards = KLEMS_FULL.incident_directions()[[0, 20, 60]]
+    expected = direct_hemispherical(tree, "transmission_front", towards)
+    klems = system.visible
+    share = klems.direct_hemispherical(klems.transmission_front)[[0, 20, 60]]
+    assert share == pytest.approx(expected, abs=0.02)  # the patch's mean against its middle
