@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -60,7 +61,7 @@ def reference_skies(quality: Quality, count: int = 16) -> Skies:
 def reference_costs(
     *, size: int = 800, quality: Quality | None = None, progress: Progress = silent, **options
 ) -> list[Cost]:
-    """Costs of this machine; options `methods` and `metrics` of `measure`."""
+    """Costs of this machine; options `methods`, `metrics`, `clock` of `measure`."""
     variants.activate()
     quality = quality or Quality()
     return measure(
@@ -75,12 +76,14 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=800, help="pixels of a side")
     parser.add_argument("--method", choices=METHODS, action="append")
     parser.add_argument("--metric", choices=METRICS, action="append")
+    parser.add_argument("--processor", action="store_true", help="processor seconds of all threads")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     costs = reference_costs(
         size=options.size,
         methods=options.method or METHODS,
         metrics=options.metric or METRICS,
+        clock=time.process_time if options.processor else time.perf_counter,
         progress=lambda stage, done: print(f"{stage} {100 * done:.0f} %", file=sys.stderr),
     )
     print(f"{'method':14} {'metric':12} {'scene [s]':>10} {'system [s]':>10} {'step [s]':>10}")
