@@ -64,8 +64,8 @@ def command(
 
 def _tell(case, result, ready: int, total: int) -> None:
     """One line for each case that is ready."""
-    name = f"{case.room} / {case.space_name}" if case.space_name != case.room else case.room
-    label = f"[{ready}/{total}] {name}, {case.system}, {case.climate}, {case.orientation_deg:g} deg"
+    label = f"[{ready}/{total}] {case.place}, {case.system}, {case.climate}"
+    label += f", {case.orientation_deg:g} deg"
     if result.error:
         click.echo(f"{label}: failed: {result.error}")
         return

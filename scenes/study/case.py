@@ -70,6 +70,11 @@ class Case:
         )[:32]
 
     @property
+    def place(self) -> str:
+        """The room in words: entry and space, where they differ."""
+        return self.room if self.space_name == self.room else f"{self.room} {self.space_name}"
+
+    @property
     def scene(self) -> str:
         """A hash of the room alone: cases that have it share traced matrices."""
         building = self.building

@@ -1,0 +1,263 @@
+"""`cfs study`: its file, its grid, what is shared, what is kept, and what is written."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mitsuba_cfs.errors import DataError
+from scenes.cli import run
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.study.plan import plan_of
+from scenes.study.schedule import computed
+from scenes.study.store import CaseResult, Store
+from scenes.study.study import run_study
+from scenes.study.study_file import read_study
+from tests.conftest import REPOSITORY
+from tests.scenes.study_files import BOX, CLIMATE, FEW_RAYS, SYSTEM, study_file
+from tests.scenes.study_noted import noted
+
+SECOND = f"""
+[[system]]
+name = "brighter"
+bsdf = "{VENETIAN_BLIND}"
+g_value = 0.3
+"""
+WRONG = {
+    "no system": ("", BOX + CLIMATE, "system: Field required"),
+    "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: Extra inputs"),
+    "unknown method": (
+        'methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: Input should be",
+    ),
+    "no number": (
+        'orientations_deg = ["south"]\n', BOX + SYSTEM + CLIMATE, "orientations_deg.0: Input",
+    ),
+    "one orientation twice": (
+        "orientations_deg = [0, 360]\n", BOX + SYSTEM + CLIMATE, "orientations_deg: 0.0 comes",
+    ),
+    "one name twice": ("", BOX + SYSTEM + SYSTEM + CLIMATE, "system: 'blind' comes twice"),
+    "box and building": (
+        "", BOX.replace("[room.box]", f'building = "{OFFICE}"\n[room.box]') + SYSTEM + CLIMATE,
+        "room.0: give either `building` or `box`",
+    ),
+    "no such file": ("", BOX + SYSTEM.replace(".xml", ".xlm") + CLIMATE, "system.0.bsdf: no such"),
+    "negative option": (
+        "", BOX + SYSTEM + CLIMATE + "[options]\nsensor_spacing = -1\n", "options.sensor_spacing:",
+    ),
+    "no time": (
+        "", BOX + SYSTEM + CLIMATE + '[auto]\ntime_budget = "soon"\n',
+        "auto.time_budget: expected a time such as",
+    ),
+    "not TOML": ("", BOX + SYSTEM + CLIMATE + "[[", "is not TOML"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("head, body, words", WRONG.values(), ids=WRONG.keys())
+def test_a_wrong_file_is_one_line_that_names_the_key(tmp_path, capsys, head, body, words):
+    path = tmp_path / "study.toml"
+    path.write_text(head + body)
+    assert run(["study", str(path), "--out", str(tmp_path / "out")]) == 1
+    line = capsys.readouterr().err
+    assert len(line.splitlines()) == 1 and words in line and str(path) in line
+    assert not (tmp_path / "out").exists()
+
+
+def grid(folder: Path):
+    """2 systems x 3 orientations x 1 climate x 2 methods in a box."""
+    head = 'orientations_deg = [0, 90, 180]\nmethods = ["three-phase", "five-phase"]\n'
+    return plan_of(read_study(study_file(folder, head, system=SYSTEM + SECOND)))
+
+
+def test_the_grid_holds_every_combination_once(tmp_path):
+    cases = grid(tmp_path).cases
+    seen = {(c.system, c.orientation_deg, c.climate, c.options.method) for c in cases}
+    assert len(cases) == len(seen) == len({c.key for c in cases}) == 12
+    assert len({c.scene for c in cases}) == 1
+
+
+def test_a_case_is_known_by_what_its_numbers_depend_on(tmp_path):
+    case = grid(tmp_path).cases[0]
+    twin = replace(case, room="other name", system="x", climate="y", chosen="why")
+    assert twin.key == case.key
+    for other in (
+        {"orientation_deg": 1.0},
+        {"u_value": 2.0},
+        {"weather": replace(case.weather, sha256="0")},
+        {"options": replace(case.options, seed=1)},
+        {"glare": "sDGP"},
+        {"space": "another"},
+        {"program": "newer"},
+    ):
+        assert replace(case, **other).key != case.key, other
+
+
+@pytest.fixture(scope="module", autouse=True)
+def own_cache(tmp_path_factory):
+    """A cache of matrices of these tests alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CFS_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A study of two orientations and two systems that are computed, as the command does it."""
+    folder = tmp_path_factory.mktemp("study")
+    head = 'title = "Blinds"\norientations_deg = [0, 90]\nmethods = ["three-phase"]\n'
+    path = study_file(folder, head + 'glare = "sDGP"\n', system=SYSTEM + SECOND)
+    assert run(["study", str(path), "--out", str(folder / "out")]) == 0
+    return path, folder / "out"
+
+
+def test_one_row_a_case_with_all_its_figures(done):
+    table = pd.read_parquet(done[1] / "results.parquet")
+    assert list(table["status"]) == ["done"] * 4
+    assert list(table["facing"]) == ["south", "south", "west", "west"]
+    assert not table.drop(columns=["why", "error"]).isna().any().any()
+    assert table.shape == pd.read_csv(done[1] / "results.csv").shape
+    for column in ("da300", "sda300_50", "udi_300_3000", "operative_max_c", "comfortable_80_h"):
+        assert np.isfinite(table[column]).all()
+    hours = [f"glare_{c}_h" for c in ("imperceptible", "perceptible", "disturbing", "intolerable")]
+    assert (table[hours].sum(axis=1) == 3650).all()
+    # the second system differs in heat alone
+    by_system = table.groupby("system")
+    assert by_system["da300"].apply(list)["blind"] == by_system["da300"].apply(list)["brighter"]
+    warmer = by_system["operative_max_c"].mean()
+    assert warmer["brighter"] > warmer["blind"] + 1
+    assert not list(done[1].rglob(".*")), "temporary files are gone"
+
+
+def test_a_turned_model_is_a_room_that_faces_elsewhere(done, tmp_path):
+    """By 90 degrees: as a box whose front looks west, traced for itself."""
+    west = BOX.replace("width = 3.0", "facing_deg = 270\nwidth = 3.0", 1)
+    path = tmp_path / "west.toml"
+    head = 'methods = ["three-phase"]\nglare = "sDGP"\n'
+    path.write_text(head + west + SYSTEM + CLIMATE + FEW_RAYS)
+    found = run_study(read_study(path), Store(tmp_path / "out")).results[0].figures
+    turned = pd.read_parquet(done[1] / "results.parquet").iloc[2]
+    # the same numbers but for noise: V and D have other random numbers; five standard errors
+    noise = 5 * np.hypot(turned["illuminance_error_mean"], found["illuminance_error_mean"]) / 100
+    assert found["mean_illuminance_lx"] == pytest.approx(turned["mean_illuminance_lx"], rel=noise)
+    assert found["operative_mean_c"] == pytest.approx(turned["operative_mean_c"], abs=0.3)
+
+
+def test_finished_cases_are_not_computed_again(done, capsys):
+    path, out = done
+    before = {f: f.stat().st_mtime_ns for f in (out / "cases").iterdir()}
+    assert run(["study", str(path), "--out", str(out)]) == 0
+    assert "4 were there, 0 failed" in capsys.readouterr().out
+    assert {f: f.stat().st_mtime_ns for f in (out / "cases").iterdir()} == before
+
+
+def test_a_damaged_case_file_is_computed_again(done, tmp_path):
+    path, out = done
+    shutil.copytree(out, tmp_path / "out")
+    store = Store(tmp_path / "out")
+    study = read_study(path)
+    victim = plan_of(study).cases[1]
+    place = tmp_path / "out" / "cases" / f"{victim.key}.npz"
+    place.write_bytes(place.read_bytes()[:2000])
+    asked = []
+
+    def compute(case):
+        asked.append(case.key)
+        return CaseResult(case.key, {"da300": 1.0})
+
+    run_study(study, store, compute=compute)
+    assert asked == [victim.key]
+
+
+def test_shared_matrices_are_traced_once(tmp_path, monkeypatch):
+    """Two systems, two orientations: V and D of the room are in the cache once."""
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path / "cache"))
+    head = 'orientations_deg = [0, 135]\nmethods = ["three-phase"]\nglare = "none"\n'
+    study = read_study(study_file(tmp_path, head, system=SYSTEM + SECOND))
+    run_study(study, Store(tmp_path / "out"))
+    found = [f.name.rpartition("-")[0] for f in (tmp_path / "cache").glob("*.npz")]
+    assert found.count("view-matrix") == 1, found
+    assert found.count("daylight-matrix") == 1, found
+
+
+def test_one_failed_case_leaves_the_others(tmp_path):
+    study = read_study(study_file(tmp_path, "orientations_deg = [0, 13, 20]\n"))
+    room = study.room[0].model_copy(update={"name": str(tmp_path / "log")})
+    study = study.model_copy(update={"room": (room,)})
+    store = Store(tmp_path / "out")
+    table = pd.DataFrame(run_study(study, store, compute=noted).rows())
+    assert list(table["status"]) == ["done", "failed", "done"]
+    assert table["error"][1] == "this one fails" and np.isnan(table["angle"][1])
+    assert len(list((tmp_path / "out" / "cases").iterdir())) == 2  # a failure is tried again
+
+
+def test_a_file_that_changed_since_the_plan_is_said(tmp_path):
+    weather = tmp_path / "w.epw"
+    shutil.copy(WEATHER, weather)
+    climate = CLIMATE.replace(str(WEATHER), str(weather))
+    path = tmp_path / "study.toml"
+    path.write_text(BOX + SYSTEM + climate + FEW_RAYS)
+    plan = plan_of(read_study(path))
+    weather.write_text(weather.read_text() + "\n")
+    from scenes.study.one_case import compute_case
+
+    (result,) = computed(plan.cases, compute_case)
+    assert "is not the file that it was" in result.error and "w.epw" in result.error
+
+
+def test_a_folder_with_other_things_is_left_alone(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(DataError, match="--out: holds other files"):
+        Store(tmp_path)
+    assert [f.name for f in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_processes_beside_each_other_give_every_case(tmp_path):
+    study = read_study(study_file(tmp_path, "orientations_deg = [0, 13, 20, 30]\n"))
+    room = study.room[0].model_copy(update={"name": str(tmp_path / "log")})
+    cases = plan_of(study.model_copy(update={"room": (room,)})).cases
+    found = {r.key: r for r in computed(cases, noted, processes=2)}
+    assert [found[c.key].error for c in cases] == ["", "this one fails", "", ""]
+    assert [found[c.key].figures.get("angle") for c in cases] == [0, None, 20, 30]
+
+
+def test_an_interrupted_study_goes_on(tmp_path):
+    """Ctrl-C midway: exit code 130, finished cases kept; the same command does the rest."""
+    angles = list(range(0, 40, 2))
+    path = study_file(tmp_path, f"orientations_deg = {angles}\n")
+    code = (
+        "import sys\n"
+        "from scenes.study import one_case\n"
+        "from tests.scenes.study_noted import noted\n"
+        "one_case.compute_case = noted\n"
+        "from scenes.cli import main\n"
+        "main(['study', *sys.argv[1:]])\n"
+    )
+    text = path.read_text().replace('name = "box"', f'name = "{tmp_path / "log"}"')
+    path.write_text(text)
+    command = [sys.executable, "-c", code, str(path), "--out", str(tmp_path / "out")]
+    process = subprocess.Popen(
+        command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    cases = tmp_path / "out" / "cases"
+    end = time.monotonic() + 120
+    while time.monotonic() < end and len(list(cases.glob("*.npz"))) < 3:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130 and errors.splitlines()[-1] == "interrupted"
+    kept = len(list(cases.glob("*.npz")))
+    assert 3 <= kept < len(angles)
+    log = (tmp_path / "log").read_text()
+    study = read_study(path)
+    again = run_study(study, Store(tmp_path / "out"), compute=noted)
+    assert again.reused == kept and not again.failed
+    more = (tmp_path / "log").read_text()[len(log) :]
+    assert more.count("end") == len(angles) - kept
