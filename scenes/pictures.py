@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -76,21 +77,35 @@ def tone_mapped(pixels: NDArray, *, white: float | None = None) -> NDArray[np.ui
 
     Source: Reinhard et al. (2002), Photographic tone reproduction, global operator (4).
     """
-    grey = pixels.ndim == 2
-    luminance = pixels if grey else EFFICACY * (pixels @ np.asarray(LUMINANCE_WEIGHTS))
-    lit = luminance[luminance > 0]
-    if not lit.size:
-        return np.zeros((*luminance.shape, 3), dtype=np.uint8)
-    middle = np.exp(np.mean(np.log(np.maximum(lit, lit.max() * 1e-9))))
-    scaled = KEY / middle * luminance
-    white = max(float(np.percentile(scaled, 99.5)), 1.0) if white is None else white
-    mapped = scaled * (1 + scaled / white**2) / (1 + scaled)
-    if grey:
+    luminance = _luminance(pixels)
+    curve = _tone_curve(luminance, white)
+    mapped = curve(luminance)
+    if pixels.ndim == 2:
         linear = np.repeat(mapped[..., None], 3, axis=-1)
     else:
         ratio = np.divide(mapped, luminance, where=luminance > 0, out=np.zeros_like(mapped))
         linear = EFFICACY * pixels * ratio[..., None]
     return _srgb(linear)
+
+
+def _luminance(pixels: NDArray) -> NDArray:
+    return pixels if pixels.ndim == 2 else EFFICACY * (pixels @ np.asarray(LUMINANCE_WEIGHTS))
+
+
+def _tone_curve(luminance: NDArray, white: float | None = None) -> Callable[[NDArray], NDArray]:
+    """What luminance becomes in a print of the picture, 0..1; see `tone_mapped`."""
+    lit = luminance[luminance > 0]
+    if not lit.size:
+        return np.zeros_like
+    factor = KEY / np.exp(np.mean(np.log(np.maximum(lit, lit.max() * 1e-9))))
+    if white is None:
+        white = max(float(np.percentile(factor * luminance, 99.5)), 1.0)
+
+    def curve(values: NDArray) -> NDArray:
+        scaled = factor * values
+        return np.minimum(scaled * (1 + scaled / white**2) / (1 + scaled), 1.0)
+
+    return curve
 
 
 def _srgb(linear: NDArray) -> NDArray[np.uint8]:
@@ -100,9 +115,33 @@ def _srgb(linear: NDArray) -> NDArray[np.uint8]:
     return (255 * curve + 0.5).astype(np.uint8)
 
 
-def write_tone_mapped(path: Path, pixels: NDArray) -> None:
-    """Write radiance [ny, nx, 3] or luminance [ny, nx] as a picture for the eye (PNG)."""
-    _try(lambda: imsave(path, tone_mapped(pixels)), path)
+def write_tone_mapped(path: Path, pixels: NDArray, *, scale: bool = False, title: str = "") -> None:
+    """Write radiance [ny, nx, 3] or luminance [ny, nx] as a picture for the eye (PNG).
+
+    Args:
+        scale: with a bar of greys that tells their luminance, and a title.
+    """
+    if not scale:
+        _try(lambda: imsave(path, tone_mapped(pixels)), path)
+        return
+    luminance = _luminance(pixels)
+    low, high = scale_limits(luminance)
+    steps = np.geomspace(high, low, 256)
+    greys = np.repeat(_tone_curve(luminance)(steps)[:, None, None], 3, axis=2)
+    figure = _figure(luminance.shape)
+    axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
+    axes.imshow(tone_mapped(pixels), interpolation="nearest")
+    axes.set_axis_off()
+    axes.set_title(title, fontsize=9, loc="left")
+    bar = figure.add_axes((0.83, 0.08, 0.035, 0.78))
+    bar.set_title("cd/m²", fontsize=9, loc="left")
+    bar.imshow(_srgb(greys), extent=(0, 1, 0, 1), aspect="auto")
+    marks = 10.0 ** np.arange(np.log10(low), np.log10(high) + 0.5)
+    bar.set_yticks(np.log(marks / low) / np.log(high / low), [f"{m:,.6g}" for m in marks])
+    bar.set_xticks([])
+    bar.yaxis.tick_right()
+    bar.tick_params(labelsize=8)
+    _save(figure, path)
 
 
 def source_colours(count: int) -> NDArray[np.float64]:

@@ -24,6 +24,7 @@ MAY_IMPORT = {
 TRACING = (
     "mitsuba_cfs/variants.py",
     "mitsuba_cfs/trace/",
+    "mitsuba_cfs/images/exr.py",
     "mitsuba_cfs/bsdf/plugin",
     "mitsuba_cfs/bsdf/generate.py",
     "mitsuba_cfs/bsdf/tensor_plugin.py",

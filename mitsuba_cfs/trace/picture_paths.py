@@ -79,6 +79,24 @@ def point_in_time_picture(
     return picture.astype(np.float32).reshape(view.height, view.width)
 
 
+def colour_picture(
+    rooms: Sequence[Room], skies: Sequence[Sky], view: View, **options
+) -> NDArray[np.float32]:
+    """Radiance picture [ny, nx, 3] [W/m2/sr] of red, green and blue.
+
+    Args:
+        rooms, skies: for each band, with its reflectances, systems and sky; the shapes are equal.
+        options: of `point_in_time_picture`; the bands share their random numbers, so that noise
+            is grey.
+    """
+    if not len(rooms) == len(skies) == 3:
+        raise ValueError(f"{len(rooms)} rooms and {len(skies)} skies: expected three bands")
+    bands = [
+        point_in_time_picture(r, s, view, **options) for r, s in zip(rooms, skies, strict=True)
+    ]
+    return np.stack(bands, axis=-1)
+
+
 def _add_shared(picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence, windows: int):
     """Add to each pixel the smoothed light of the faces that it shows."""
     key, total, count = (np.concatenate(part) for part in zip(*rows, strict=True))

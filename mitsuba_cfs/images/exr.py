@@ -1,0 +1,62 @@
+"""OpenEXR pictures: float luminance or radiance for programs that do not read Radiance's `.hdr`."""
+
+from __future__ import annotations
+
+import os
+from os import PathLike
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.view import View, format_view, parse_view
+
+
+def write_exr(
+    path: str | PathLike[str], pixels: ArrayLike, view: View | None = None, *, comment: str = ""
+) -> None:
+    """Write a picture in 32-bit floats, whole or not at all, with its VIEW as an attribute.
+
+    Args: pixels: luminance [ny, nx] [cd/m2] (channel Y) or radiance [ny, nx, 3] [W/m2/sr] (R G B).
+    """
+    variants.activate()
+    values = np.asarray(pixels, dtype=np.float32)
+    if values.ndim not in (2, 3) or values.shape[2:] not in ((), (3,)):
+        raise ValueError(f"pixels of shape {values.shape}: expected [ny, nx] or [ny, nx, 3]")
+    grey = values.ndim == 2
+    kind = mi.Bitmap.PixelFormat.Y if grey else mi.Bitmap.PixelFormat.RGB
+    bitmap = mi.Bitmap(np.ascontiguousarray(values[..., None] if grey else values), kind)
+    about = bitmap.metadata()
+    about["UNIT"] = "cd/m2" if grey else "W/m2/sr"
+    if view is not None:
+        about["VIEW"] = format_view(view)
+    if comment:
+        about["COMMENT"] = comment
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.touch()  # tells why not, if it cannot be
+        bitmap.write(str(part), mi.Bitmap.FileFormat.OpenEXR)
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise DataError(f"cannot be written ({error.strerror})", file=path) from None
+
+
+def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | None]:
+    """Pixels [ny, nx] or [ny, nx, 3] of an EXR file, and the view that it was written with."""
+    variants.activate()
+    if not Path(path).is_file():
+        raise DataError("cannot be read (no such file)", file=path)
+    try:
+        bitmap = mi.Bitmap(str(path), mi.Bitmap.FileFormat.OpenEXR)
+    except RuntimeError as error:
+        raise DataError(f"not an EXR picture ({error})", file=path) from None
+    values = np.array(bitmap.convert(component_format=mi.Struct.Type.Float32))
+    height, width = values.shape[:2]
+    about = bitmap.metadata()
+    view = parse_view(about["VIEW"], width, height) if "VIEW" in about else None
+    return (values[..., 0] if values.shape[2:] == (1,) else values), view

@@ -1,0 +1,41 @@
+"""EXR files: what is written comes back, bit by bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.view import View, fisheye
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3)])
+def test_pixels_and_view_come_back(tmp_path, shape):
+    from mitsuba_cfs.images.exr import read_exr, write_exr
+
+    pixels = np.random.default_rng(1).lognormal(5, 4, shape).astype(np.float32)
+    pixels.flat[0] = 1e9  # the sun
+    view = fisheye((1.5, 2.25, 1.2), (0.6, -0.8, 0.0), width=7, height=5)
+    write_exr(tmp_path / "a.exr", pixels, view, comment="made by a test")
+    found, seen = read_exr(tmp_path / "a.exr")
+    assert np.array_equal(found, pixels)
+    assert seen == view
+    assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
+    write_exr(tmp_path / "b.exr", pixels)
+    assert read_exr(tmp_path / "b.exr")[1] is None
+
+
+def test_what_cannot_be_is_told_in_a_line(tmp_path):
+    from mitsuba_cfs.images.exr import read_exr, write_exr
+
+    with pytest.raises(ValueError, match="shape"):
+        write_exr(tmp_path / "a.exr", np.ones((3, 3, 2)))
+    with pytest.raises(DataError, match="cannot be written"):
+        write_exr(tmp_path / "none" / "a.exr", np.ones((3, 3)), View("angular"))
+    with pytest.raises(DataError, match="no such file"):
+        read_exr(tmp_path / "a.exr")
+    (tmp_path / "a.exr").write_bytes(b"#?RADIANCE\n")
+    with pytest.raises(DataError, match="not an EXR"):
+        read_exr(tmp_path / "a.exr")
