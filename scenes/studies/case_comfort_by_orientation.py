@@ -21,15 +21,9 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs import variants
-from mitsuba_cfs.bsdf.blinds import venetian_blind
-from mitsuba_cfs.bsdf.generate import generate_klems
-from mitsuba_cfs.bsdf.glazing import specular_klems
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
-from scenes.demo.make_blind import BLIND, PANES, thermal_values
 from scenes.heat.study import RoomYear, run_study
 from scenes.heat.study_file import StudyFile
+from scenes.studies.systems import blind_before_glazing
 from scenes.validation.reference_room import (
     EXTERIOR_FINISH,
     FINISH,
@@ -41,27 +35,9 @@ from scenes.validation.reference_room import (
 from thermal.zone import Layer
 
 TILT_DEG = 55.0
-PATHS = 16384  # of the goniophotometer, for each incident patch and side
 HOURS = (8, 18)
 BANDS = {"80 %": "ASHRAE 55 80 %", "90 %": "ASHRAE 55 90 %"}
 WINDOW = {"x": 0.0, "sill": 0.9, "width": 4.0, "height": 1.5}  # half of 4 m x 3 m
-
-
-def blind_before_glazing(folder: Path, tilt_deg: float = TILT_DEG) -> Path:
-    """The BSDF file of the blind before its glazing, with U and g beside it."""
-    layer = venetian_blind(
-        BLIND, depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(tilt_deg)
-    )
-    blind = generate_klems(layer, samples=PATHS, seed=1).bsdf[0]
-    systems = {
-        band: combine_layers([blind, *(specular_klems(pane, KLEMS_FULL) for pane in panes)])
-        for band, panes in PANES.items()
-    }
-    path = folder / f"blind_{tilt_deg:.0f}.xml"
-    bands = {band: system.bsdf for band, system in systems.items()}
-    write_bsdf_xml(BsdfFile(bands, name=f"exterior blind at {tilt_deg:.0f} degrees"), path)
-    path.with_suffix(".toml").write_text(thermal_values(systems["Solar"]), encoding="utf-8")
-    return path
 
 
 def study(weather: Path, bsdf: Path, facing_deg: float, samples: int) -> StudyFile:
@@ -110,7 +86,7 @@ def shares(year: RoomYear) -> dict[str, float]:
 def compare(weather: Path, out: Path, *, samples: int = 4096) -> pd.DataFrame:
     """One row per orientation."""
     variants.activate()
-    bsdf = blind_before_glazing(out)
+    bsdf = blind_before_glazing(out, TILT_DEG)
     rows = []
     for name, facing in ORIENTATIONS.items():
         (year,), _ = run_study(study(weather, bsdf, facing, samples), lambda label, share: None)
