@@ -16,58 +16,43 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.shoebox import WindowRectangle, shoebox
-from bim.to_tracer import interior_surfaces, window_groups
 from mitsuba_cfs import phases, variants
-from mitsuba_cfs.bsdf.blinds import venetian_blind
-from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.generate import generate_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
-from mitsuba_cfs.bsdf.plugin import klems_plugin
-from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
+from mitsuba_cfs.matrices.fine_basis import fine_basis
+from mitsuba_cfs.phases import PhaseMatrices
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
-from mitsuba_cfs.sky.sun import is_up
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather, read_epw
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.direct_sun import (
-    SUN_SOLID_ANGLE,
-    KlemsScattering,
-    PluginScattering,
-    Scattering,
-    direct_sun_matrix,
-)
-from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.lit_room import AngularBeam, PatchBeam, Room, Sky, System
+from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.five_phase import SunlitRoom, SunSeries, SystemState, five_phase_states
+from mitsuba_cfs.trace.lit_room import Room, Sky, System
 from mitsuba_cfs.trace.point_in_time import point_in_time
+from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 from mitsuba_cfs.trace.view_matrix import view_matrix
-from thermal.glazing import roos_angular_factor
+from scenes.validation.blind_room import (
+    TILTS,
+    Scene,
+    blind_layer,
+    empty,
+    glass_klems,
+    slats,
+    test_room,
+)
+from scenes.validation.glare_room import glazing, known_system
 
-GLASS_TRANSMITTANCE, GLASS_BACK, GLASS_FRONT = 0.55, 0.17, 0.19  # Table 1, at normal incidence
-SLAT = {"depth": 0.080, "radius": 0.104, "spacing": 0.072}
-SLAT_REFLECTANCE = 0.55
-BLIND_OFFSET = 0.06  # [m] middle of the slats before the glass
-MARGIN = 1.5  # [m] that the slats reach beyond the window: a BSDF knows no edges
-TILTS = {"glass": None, "5 degrees": 5.0, "40 degrees": 40.0, "70 degrees": 70.0}
 DIM = 50.0  # [lx] hours below this at the reference count no relative error
 SUBDIVISION = 4
-TREE_LEVELS = 5  # 1,024 cells a hemisphere
-
-
-@dataclass(frozen=True)
-class Scene:
-    """The room and its sensors."""
-
-    interior: Surfaces
-    groups: list[WindowGroup]
-    points: NDArray[np.float64]  # [S, 3]
-    up: NDArray[np.float64]  # [S, 3]
+FINE = fine_basis(3)  # 1,321 patches
+COEFFICIENT_PATHS = 65_536  # of a sensor in each of 16 batches
 
 
 @dataclass(frozen=True)
@@ -79,84 +64,6 @@ class Hours:
     sun: NDArray[np.float64]  # [P, H] the sun alone
     direction: NDArray[np.float64]  # [H, 3]
     luminance: NDArray[np.float64]  # [H] of the disc [cd/m2]
-
-
-def test_room() -> Scene:
-    """The room of Table 1, its facade to the south-west."""
-    building = shoebox(
-        3.65, 4.60, 3.00,
-        windows=(WindowRectangle(0.30, 0.90, 3.05, 1.70),),
-        facing_deg=225.0,
-        reflectance={"wall": 0.50, "ceiling": 0.80, "roof": 0.80, "floor": 0.34},
-    )  # fmt: skip
-    space = building.spaces[0]
-    groups = window_groups(space)
-    inward = -groups[0].frame[2]
-    middle = groups[0].windows[0].triangles.reshape(-1, 3).mean(axis=0) * [1, 1, 0]
-    points = middle + np.arange(0.6, 4.2, 0.6)[:, None] * inward + [0, 0, 0.85]
-    return Scene(
-        interior_surfaces(space), groups, points, np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    )
-
-
-def glass_transmittance(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Transmittance [...] of the double glazing at the cosine of incidence."""
-    return GLASS_TRANSMITTANCE * roos_angular_factor(np.arccos(np.clip(cosine, 0, 1)))
-
-
-def glass_reflectance(cosine: NDArray[np.float64], normal: float) -> NDArray[np.float64]:
-    """Reflectance [...], which rises from its `normal` value as the transmittance falls."""
-    tau = glass_transmittance(cosine)
-    return np.minimum(normal + (1 - normal) * (1 - tau / GLASS_TRANSMITTANCE), 1 - tau)
-
-
-def glass_klems() -> KlemsBsdf:
-    """Klems matrices of the double glazing; reflectance rises as the transmittance falls."""
-    omega = KLEMS_FULL.projected_solid_angles()
-    cosine = KLEMS_FULL.incident_directions()[:, 2]
-    tau = glass_transmittance(cosine)
-    front, back = (np.diag(glass_reflectance(cosine, r) / omega) for r in (GLASS_FRONT, GLASS_BACK))
-    return KlemsBsdf(
-        KLEMS_FULL, KLEMS_FULL, np.diag(tau / omega), np.diag(tau / omega), front, back
-    )
-
-
-def slats(group: WindowGroup, tilt_deg: float) -> Surfaces:
-    """The blind as geometry before the window, larger than it, and the wall round the window.
-
-    The wall reflects as much as the glass, for a BSDF knows neither edges nor a wall.
-    """
-    local = group.windows[0].triangles.reshape(-1, 3) @ group.frame.T
-    low, high = local.min(axis=0), local.max(axis=0)
-    width = high[0] - low[0] + 2 * MARGIN
-    layer = venetian_blind(
-        plastic("slat", SLAT_REFLECTANCE), tilt=np.radians(tilt_deg), width=width, **SLAT
-    )
-    count = int(np.ceil((high[1] - low[1] + 2 * MARGIN) / SLAT["spacing"]))
-    corner = np.array([low[0] - MARGIN, low[1] - MARGIN, high[2] + BLIND_OFFSET])
-    steps = corner + np.arange(count)[:, None] * [0, SLAT["spacing"], 0]
-    triangles = (layer.triangles[None] + steps[:, None, None]).reshape(-1, 3, 3)
-    wall = _wall(low, high)
-    reflectance = np.repeat([SLAT_REFLECTANCE, GLASS_FRONT], [len(triangles), len(wall)])
-    return Surfaces(
-        np.concatenate([triangles, wall]) @ group.frame,
-        reflectance,
-        np.zeros(len(reflectance), dtype=np.int64),
-    )
-
-
-def _wall(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Triangles [8, 3, 3] of the plane round the rectangle from `low` to `high`, 3 m wide."""
-    (x0, y0, z), (x1, y1, _) = low, high
-    far = 3.0
-    strips = [
-        (x0 - far, y0 - far, x1 + far, y0),
-        (x0 - far, y1, x1 + far, y1 + far),
-        (x0 - far, y0, x0, y1),
-        (x1, y0, x1 + far, y1),
-    ]
-    corners = [[(a, b, z), (c, b, z), (c, d, z), (a, d, z)] for a, b, c, d in strips]
-    return np.array([[q[i] for i in order] for q in corners for order in ((0, 1, 2), (0, 2, 3))])
 
 
 def chosen_hours(weather: Weather, every: int) -> Hours:
@@ -176,58 +83,69 @@ def chosen_hours(weather: Weather, every: int) -> Hours:
     )
 
 
-def empty() -> Surfaces:
-    """Nothing outdoors."""
-    return Surfaces(np.empty((0, 3, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+def known_klems(tilt_deg: float | None, basis: KlemsBasis, samples: int) -> KlemsBsdf:
+    """Matrices of the glazing, behind the blind where there is one."""
+    glass = glass_klems(basis)
+    if tilt_deg is None:
+        return glass
+    blind = generate_klems(blind_layer(tilt_deg), basis, samples=samples, seed=1).bsdf[0]
+    return combine_layers([blind, glass]).bsdf
 
 
-class BehindBlind:
-    """A blind's tensor tree before the glazing: what comes through both without reflections."""
-
-    def __init__(self, layer: PeriodicLayer) -> None:
-        tree, _ = generate_tensor_tree(layer, TREE_LEVELS, samples=4096, seed=1)
-        self._blind = PluginScattering(mi.load_dict(tensor_tree_plugin(tree[0], up=(0, 1, 0))))
-        self._glass = AngularBeam(glass_transmittance(np.linspace(0, 1, 64)))
-
-    def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
-        """See `mitsuba_cfs.trace.direct_sun.Scattering`."""
-        return self._blind.scattered(sun, outward) * self._glass.at(outward)
-
-    def through(self, sun: mi.Vector3f) -> mi.Float:
-        """See `mitsuba_cfs.trace.direct_sun.Scattering`."""
-        return self._blind.through(sun)
+def traced(
+    scene: Scene, basis: KlemsBasis, depth: int = 32, samples: int = 2048
+) -> tuple[Estimate, Estimate]:
+    """V and D, or their direct parts with a depth of 1."""
+    view = view_matrix(
+        scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=depth,
+        basis=basis,
+    )  # fmt: skip
+    daylight = daylight_matrix(
+        empty(), scene.groups, subdivision=SUBDIVISION, samples=samples, max_depth=depth,
+        basis=basis,
+    )  # fmt: skip
+    return view, daylight
 
 
 def by_phases(
-    scene: Scene, system: KlemsBsdf, tree: Scattering | None, hours: Hours
-) -> dict[str, NDArray[np.float64]]:
-    """Illuminance [S, H] by the three-phase and the five-phase method.
+    scene: Scene, system: KlemsBsdf, ways: dict[str, Scattering], hours: Hours
+) -> tuple[dict[str, NDArray[np.float64]], float]:
+    """Illuminance [S, H] by the three-phase and the five-phase method, and V's share of its error.
 
-    Args: tree: what passes the sun in the five-phase method; the Klems matrix and its peak if None.
+    Args: ways: what passes the sun in the five-phase method, by name.
     """
-    matrices = {}
-    for depth in (32, 1):
-        view = view_matrix(
-            scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=depth
-        )
-        daylight = daylight_matrix(
-            empty(), scene.groups, subdivision=SUBDIVISION, samples=2048, max_depth=depth
-        )
-        matrices[depth] = view.values, daylight.values
-    transmission = [system.transmission_matrix()]
-    whole = phases.three_phase(matrices[32][0], transmission, matrices[32][1], hours.whole)
-    direct = phases.three_phase(matrices[1][0], transmission, matrices[1][1], hours.sun)
-    peak = through_peak(system.filled().transmission_front, KLEMS_FULL)
-    ways = {"five-phase, Klems": KlemsScattering(KLEMS_FULL, peak.scattered, peak.transmittance)}
-    if tree is not None:
-        ways["five-phase, tensor tree"] = tree
+    (view, daylight), (direct_view, direct_daylight) = (
+        traced(scene, KLEMS_FULL, depth) for depth in (32, 1)
+    )
+    matrices = PhaseMatrices(
+        view.values, daylight.values, direct_view.values, direct_daylight.values
+    )
+    T = system.transmission_matrix()
+    states = {f"five-phase, {name}": SystemState(T, way) for name, way in ways.items()}
+    room = SunlitRoom(scene.interior, empty(), scene.groups, scene.points, scene.up)
+    sun = SunSeries(hours.sun, hours.direction, hours.luminance * SUN_SOLID_ANGLE)
+    whole = phases.three_phase(view.values, [T], daylight.values, hours.whole)
     found = {"three-phase": whole}
-    for name, way in ways.items():
-        exact = direct_sun_matrix(
-            scene.interior, empty(), scene.groups, [way], scene.points, scene.up, hours.direction
-        )
-        found[name] = phases.five_phase(whole, direct, exact.values, hours.luminance)
-    return found
+    found |= five_phase_states(room, matrices, [states], hours.whole, sun)[0]
+    mean = phases.room_side_radiance([T], daylight.values, hours.whole.mean(axis=1, keepdims=True))
+    noise = view.error_of(mean[..., 0])[:, 0] / whole.mean(axis=1)
+    return found, float(noise.max())
+
+
+def by_fine_matrix(scene: Scene, tilt_deg: float | None, hours: Hours) -> NDArray[np.float64]:
+    """Illuminance [S, H] by three phases with matrices of high resolution."""
+    view, daylight = traced(scene, FINE, samples=512)
+    T = known_klems(tilt_deg, FINE, 8192).transmission_matrix()
+    return phases.three_phase(view.values, [T], daylight.values, hours.whole)
+
+
+def by_coefficients(scene: Scene, system: System, hours: Hours) -> NDArray[np.float64]:
+    """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
+    room = Room(scene.interior, empty(), scene.groups, [system])
+    coefficients = daylight_coefficients(
+        room, scene.points, scene.up, subdivision=SUBDIVISION, samples=COEFFICIENT_PATHS
+    )
+    return coefficients.values @ hours.whole
 
 
 def by_paths(
@@ -263,39 +181,30 @@ def errors(found: NDArray, reference: NDArray) -> dict[str, float]:
         "rRMSE of the sensors' mean": 100 * float(np.sqrt(np.mean(mean**2))),
         "rMBE of sums": 100 * float(found.sum() / reference.sum() - 1),
         "lowest [lx]": float(found.min()),
+        "highest ratio of the sensors' mean": 1 + float(mean.max()),
+        "hours above 1.05 [%]": 100 * float(np.mean(mean > 0.05)),
     }
 
 
 def one_case(scene: Scene, hours: Hours, tilt_deg: float | None, samples: int) -> dict:
     """All methods against the explicit geometry for one system."""
-    cosine = np.linspace(0, 1, 64)
-    mirrors = [AngularBeam(glass_reflectance(cosine, r)) for r in (GLASS_FRONT, GLASS_BACK)]
-    straight = System(None, AngularBeam(glass_transmittance(cosine)), tuple(mirrors))
-    glass = glass_klems()
-    exterior, system, tree = empty(), glass, None
+    exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
+    klems = known_klems(tilt_deg, KLEMS_FULL, 65536)
+    ways, systems = {"Klems": sun_scattering(klems)}, {"Klems": lit_system(klems)}
     if tilt_deg is not None:
-        exterior = slats(scene.groups[0], tilt_deg)
-        layer = venetian_blind(plastic("slat", SLAT_REFLECTANCE), tilt=np.radians(tilt_deg), **SLAT)
-        blind = generate_klems(layer, samples=65536, seed=1).bsdf[0]
-        system = combine_layers([blind, glass]).bsdf
-        tree = BehindBlind(layer)
+        tree = known_system(blind_layer(tilt_deg))
+        ways["tensor tree"], systems["tensor tree"] = tree.scattering, tree.system
     start = time.monotonic()
-    reference, noise = by_paths(scene, exterior, straight, hours, samples)
+    reference, noise = by_paths(scene, exterior, glazing(), hours, samples)
     seconds = time.monotonic() - start
-    found = by_phases(scene, system, tree, hours)
-    peak = through_peak(system.filled().transmission_front, KLEMS_FULL)
-    # the peak of the block towards the room stands for that of the other direction too
-    full = system.filled()
-    back = through_peak(full.transmission_back, KLEMS_FULL)
-    scattering = KlemsBsdf(
-        KLEMS_FULL, KLEMS_FULL, peak.scattered, back.scattered,
-        full.reflection_front, full.reflection_back,
-    )  # fmt: skip
-    beam = PatchBeam(KLEMS_FULL, peak.transmittance)
-    klems_system = System(mi.load_dict(klems_plugin(scattering)), beam)
-    found["point in time, Klems"] = by_paths(scene, empty(), klems_system, hours, samples)[0]
+    found, view_noise = by_phases(scene, klems, ways, hours)
+    found["three-phase, fine matrix"] = by_fine_matrix(scene, tilt_deg, hours)
+    for name, system in systems.items():
+        found[f"two-phase, {name}"] = by_coefficients(scene, system, hours)
+        found[f"point in time, {name}"] = by_paths(scene, empty(), system, hours, samples)[0]
     return {
         "noise of the reference [%]": 100 * float(np.mean(noise / np.maximum(reference, DIM))),
+        "noise of V, worst sensor [%]": 100 * view_noise,
         "seconds of the reference": round(seconds, 1),
         "hours": reference.shape[1],
         **{name: errors(values, reference) for name, values in found.items()},
@@ -308,14 +217,15 @@ def main() -> None:
     parser.add_argument("--weather", type=Path, required=True)
     parser.add_argument("--every", type=int, default=10, help="days from one to the next")
     parser.add_argument("--samples", type=int, default=8192, help="paths of a sensor in a batch")
+    parser.add_argument("--only", choices=TILTS, action="append", help="system, all by default")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     variants.activate()
     hours = chosen_hours(read_epw(options.weather), options.every)
     scene, results = test_room(), {}
-    for name, tilt in TILTS.items():
-        results[name] = one_case(scene, hours, tilt, options.samples)
-        print(name, json.dumps(results[name], indent=1))
+    for name in options.only or TILTS:
+        results[name] = one_case(scene, hours, TILTS[name], options.samples)
+        print(name, json.dumps(results[name], indent=1), flush=True)
     if options.json:
         options.json.write_text(json.dumps(results, indent=1))
 
