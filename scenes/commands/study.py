@@ -20,6 +20,10 @@ FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 @click.option("--method", type=click.Choice(["auto"]), help="Choose by cost and error.")
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
+@click.option(
+    "--write-ifc", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT.ifc",
+    help="The study's building with each case's results in property sets.",
+)  # fmt: skip
 def command(
     study: Path,
     out: Path,
@@ -28,6 +32,7 @@ def command(
     method: str | None,
     time_budget: str | None,
     dgp_error: str | None,
+    write_ifc: Path | None,
 ) -> None:
     """Every room of a study with every system, orientation, climate and method.
 
@@ -41,6 +46,8 @@ def command(
     from scenes.study.store import Store
     from scenes.study.study import run_study
     from scenes.study.study_file import read_study
+    from scenes.study.write_ifc import building_file, write_study_ifc
+    from scenes.study_report import write_study_report
 
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
@@ -48,6 +55,8 @@ def command(
     plan = settled(parsed, plan_of(parsed))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
+    if write_ifc is not None:
+        building_file(plan)  # or one line that there is none
     store = Store(out)
     with ProgressBar() as progress:
         result = run_study(
@@ -60,6 +69,12 @@ def command(
     )
     if result.failed == len(result.results):
         raise click.ClickException("no case could be computed")
+    store.write("report.html", lambda path: write_study_report(result, path))
+    click.echo(f"report: {out / 'report.html'}")
+    if write_ifc is not None:
+        for problem in write_study_ifc(result, write_ifc):
+            click.echo(f"note: {problem.where}: {problem.what}")
+        click.echo(f"building with results: {write_ifc}")
 
 
 def _tell(case, result, ready: int, total: int) -> None:

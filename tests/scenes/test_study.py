@@ -261,3 +261,32 @@ def test_an_interrupted_study_goes_on(tmp_path):
     assert again.reused == kept and not again.failed
     more = (tmp_path / "log").read_text()[len(log) :]
     assert more.count("end") == len(angles) - kept
+
+
+def test_results_go_back_into_the_ifc(tmp_path, capsys):
+    """A property set for each case on the space and its windows; the table has the same numbers."""
+    import ifcopenshell
+    from ifcopenshell.util.element import get_psets
+
+    room = f'[[room]]\nbuilding = "{OFFICE}"\nspaces = ["A"]\n'
+    head = 'orientations_deg = [0, 90]\nmethods = ["three-phase"]\nglare = "none"\n'
+    path = tmp_path / "study.toml"
+    path.write_text(head + room + SYSTEM + CLIMATE + FEW_RAYS)
+    target = tmp_path / "with results.ifc"
+    arguments = ["study", str(path), "--out", str(tmp_path / "out"), "--write-ifc", str(target)]
+    assert run(arguments) == 0
+    table = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    case = plan_of(read_study(path)).cases[0]
+    model = ifcopenshell.open(target)
+    sets = get_psets(model.by_guid(case.space))
+    for _, row in table.iterrows():
+        name = f"CFS results: blind, Chicago, {row['orientation_deg']:g} deg, three-phase"
+        assert sets[name]["da300"] == pytest.approx(row["da300"])
+        assert sets[name]["system"] == "blind"
+    windows = [w for w in model.by_type("IfcWindow") if name in get_psets(w)]
+    assert windows and get_psets(windows[0])[name]["u_value"] == pytest.approx(row["u_value"])
+    assert (tmp_path / "out" / "report.html").is_file()
+
+    path.write_text(head + BOX + SYSTEM + CLIMATE + FEW_RAYS)
+    assert run(arguments) == 1
+    assert "--write-ifc: needs a study of one building file" in capsys.readouterr().err

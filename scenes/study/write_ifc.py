@@ -1,0 +1,81 @@
+"""A study's results written back into its building model, case by case."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from bim.ifc.results_write import SET_NAME, write_results
+from bim.model import Problem, Space
+from mitsuba_cfs.errors import DataError
+from scenes.study.case import Case, Source
+from scenes.study.plan import Plan
+from scenes.study.store import CaseResult
+from scenes.study.study import StudyResult
+
+OF_WINDOWS = ("u_value", "g_value", "visible_transmittance", "solar_transmittance")
+
+
+def building_file(plan: Plan) -> Path:
+    """The one building file of a study.
+
+    Raises: `DataError` where its rooms are boxes, or of several files.
+    """
+    files = {case.building.path for case in plan.cases if isinstance(case.building, Source)}
+    if len(files) != 1 or any(not isinstance(case.building, Source) for case in plan.cases):
+        message = f"needs a study of one building file; this one has {len(files)}, or boxes"
+        raise DataError(message, field="--write-ifc")
+    return files.pop()
+
+
+def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
+    """Write `out`: the building with a property set for each case on its space and windows.
+
+    A set is named after its case, "CFS results: system, climate, angle, method".
+    """
+    source = building_file(study.plan)
+    done = [
+        (case, result)
+        for case, result in zip(study.plan.cases, study.results, strict=True)
+        if not result.error
+    ]
+    problems: dict[tuple[str, str], Problem] = {}
+    handle, part = tempfile.mkstemp(dir=out.absolute().parent, prefix=".", suffix=".ifc")
+    os.close(handle)
+    try:
+        for name, cases in _by_variant(done).items():
+            values = {}
+            for case, result in cases:
+                _, space = study.plan.rooms[case.scene]
+                values |= _values(space, case, result)
+            found = write_results(source, values, part, set_name=f"{SET_NAME}: {name}")
+            problems |= {(p.where, p.what): p for p in found}
+            source = Path(part)
+        os.chmod(part, 0o644)
+        os.replace(part, out)
+    except BaseException:
+        Path(part).unlink(missing_ok=True)
+        raise
+    return tuple(problems.values())
+
+
+def _by_variant(
+    done: Sequence[tuple[Case, CaseResult]],
+) -> dict[str, list[tuple[Case, CaseResult]]]:
+    """The cases of all rooms by what they are besides the room."""
+    found: dict[str, list[tuple[Case, CaseResult]]] = {}
+    for case, result in done:
+        angle = f"{case.orientation_deg:g} deg"
+        name = ", ".join((case.system, case.climate, angle, case.options.method))
+        found.setdefault(name, []).append((case, result))
+    return found
+
+
+def _values(space: Space, case: Case, result: CaseResult) -> dict[str, dict]:
+    """Every figure on the space, the fenestration's on the windows."""
+    figures = {k: v for k, v in result.figures.items() if v is not None}
+    about = {"system": case.system, "method": case.options.method, "glare_metric": case.glare}
+    window = about | {k: figures[k] for k in OF_WINDOWS if k in figures}
+    return {space.guid: about | figures} | {w.guid: window for w in space.windows}

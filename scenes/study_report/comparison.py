@@ -1,0 +1,183 @@
+"""All cases at one look: daylight against glare, classes of glare side by side, one table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mitsuba_cfs.glare.classes import CLASSES
+from scenes.figures.scale import Tick, axis_ticks, round_limits
+from scenes.report import tables
+from scenes.report.names import quantity
+from scenes.report.numbers import cell, percent, rounded
+from scenes.study.store import CaseResult
+from scenes.study.study import StudyResult
+from scenes.study_report.case_page import case_label, label_of
+
+# colours and outlines that stay apart for all colour visions; the shape goes on where they end
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f98")
+SHAPES = ("round", "square", "diamond", "ring")
+COLUMNS = (
+    "sda300_50", "ase1000_250", "da300", "udi_300_3000", "daylight_factor", "dgp_max",
+    "glare_perceptible_h", "glare_disturbing_h", "glare_intolerable_h", "glare_protection",
+    "comfortable_80_h", "warm_h", "operative_max_c", "illuminance_error_mean", "seconds",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Dot:
+    """One case in the scatter."""
+
+    x: float  # [%] of the axis
+    y: float
+    colour: str
+    shape: str
+    number: int
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """Daylight against glare, or against comfort where no glare was rated."""
+
+    title: str
+    explanation: str
+    x_label: str
+    y_label: str
+    x_ticks: tuple[Tick, ...]
+    y_ticks: tuple[Tick, ...]
+    dots: tuple[Dot, ...]
+    systems: tuple[tuple[str, str, str], ...]  # colour, shape, name
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """The occupied hours of one case by class of glare, and its daylight."""
+
+    number: int
+    label: str
+    shares: tuple[tuple[str, float], ...]  # class and its share [%]
+    daylight: float  # mean daylight autonomy [%]
+    words: str
+
+
+def finished(study: StudyResult) -> list[tuple[int, object, CaseResult]]:
+    """Number from 1, case and result of the cases that have one."""
+    pairs = zip(study.plan.cases, study.results, strict=True)
+    return [(i, case, r) for i, (case, r) in enumerate(pairs, 1) if not r.error]
+
+
+def scatter(study: StudyResult) -> Scatter:
+    """Every case as a dot: better lies to the right and further down."""
+    cases = finished(study)
+    rated = all("glare_disturbing_h" in result.figures for _, _, result in cases)
+    names = list(dict.fromkeys(case.system for _, case, _ in cases))
+    looks = {
+        name: (COLOURS[i % len(COLOURS)], SHAPES[i // len(COLOURS) % len(SHAPES)])
+        for i, name in enumerate(names)
+    }
+    x = [result.figures["da300"] for _, _, result in cases]
+    y = [glare_share(result) if rated else warm_share(result) for _, _, result in cases]
+    (x0, x1), (y0, y1) = round_limits([*x, 0.0, 100.0]), round_limits([*y, 0.0, 1.0])
+    what = "disturbing glare" if rated else "too warm"
+    dots = tuple(
+        Dot(
+            100 * (a - x0) / (x1 - x0),
+            100 * (b - y0) / (y1 - y0),
+            *looks[case.system],
+            number,
+            f"{case_label(study, case)}: daylight {percent(a)} %, {what} {percent(b)} %",
+        )
+        for (number, case, _), a, b in zip(cases, x, y, strict=True)
+    )
+    return Scatter(
+        "Daylight against glare" if rated else "Daylight against warmth",
+        "Each case is a mark in the colour of its system; further right is more daylight, further "
+        "down less " + ("glare" if rated else "heat") + ". A click shows the case.",
+        "Daylight autonomy: mean over the work plane of the occupied hours above 300 lx [%]",
+        "Occupied hours with DGP above 0.40 [%]" if rated else "Occupied hours above 26 °C [%]",
+        axis_ticks(x0, x1),
+        axis_ticks(y0, y1),
+        dots,
+        tuple((*looks[name], name) for name in names),
+    )
+
+
+def bars(study: StudyResult) -> tuple[Bar, ...]:
+    """Classes of glare of the cases that were rated."""
+    found = []
+    for number, case, result in finished(study):
+        hours = [result.figures.get(f"glare_{name}_h") for name in CLASSES]
+        if None in hours:
+            continue
+        shares = tuple((n, 100 * h / sum(hours)) for n, h in zip(CLASSES, hours, strict=True))
+        words = ", ".join(f"{name} {percent(share)} %" for name, share in shares)
+        label = case_label(study, case)
+        found.append(Bar(number, label, shares, result.figures["da300"], words))
+    return tuple(found)
+
+
+def glare_share(result: CaseResult) -> float:
+    """Occupied hours with a DGP above 0.40 [%]."""
+    hours = [result.figures[f"glare_{name}_h"] for name in CLASSES]
+    return 100.0 * sum(hours[2:]) / sum(hours)
+
+
+def warm_share(result: CaseResult) -> float:
+    """Occupied hours above 26 degC [%]."""
+    used = result.arrays["comfort/occupied"].sum()
+    return 100.0 * result.figures["warm_h"] / max(used, 1)
+
+
+def comparison_table(study: StudyResult) -> tables.Table:
+    """One row a case with its main figures."""
+    present = {name for result in study.results for name in result.figures}
+    columns = [c for c in COLUMNS if c in present]
+    headings = (
+        tables.Column("Case", meaning="Number of the case; choose it below."),
+        tables.Column("What", numeric=False),
+        tables.Column("Method", numeric=False, short=True),
+        *(label_of(c) for c in columns),
+    )
+    rows = []
+    for number, case, result in finished(study):
+        values = [_shown(c, result.figures.get(c)) for c in columns]
+        method = case.options.method + ("" if case.glare == "none" else f", {case.glare}")
+        rows.append((str(number), case_label(study, case), method, *values))
+    return tables.Table("All cases", headings, tuple(rows))
+
+
+def _shown(column: str, value: float | str | None) -> str:
+    if isinstance(value, str):
+        return value
+    digits = 0 if column.endswith("_h") or quantity(column).unit == "%" else 2
+    digits = 1 if column in ("operative_max_c", "seconds", "illuminance_error_mean") else digits
+    return cell(value, 1 if column == "daylight_factor" else digits)
+
+
+def failures_table(study: StudyResult) -> tables.Table:
+    """The cases without a result, and why."""
+    pairs = enumerate(zip(study.plan.cases, study.results, strict=True), 1)
+    columns = (
+        tables.Column("Case"),
+        tables.Column("What", numeric=False),
+        tables.Column("What went wrong", numeric=False),
+    )
+    rows = [(str(i), case_label(study, c), r.error) for i, (c, r) in pairs if r.error]
+    return tables.Table("Cases without a result", columns, tuple(rows))
+
+
+def clock_table(study: StudyResult) -> tables.Table:
+    """Time taken by the cases together, stage by stage."""
+    stages = ("daylight_s", "glare_s", "thermal_s", "seconds")
+    names = ("Daylight", "Glare", "Heat", "All, with reading the files")
+    rows = []
+    for stage, name in zip(stages, names, strict=True):
+        values = [float(r.figures.get(stage, 0.0)) for r in study.results if not r.error]
+        if values:
+            mean, most = sum(values) / len(values), max(values)
+            rows.append((name, rounded(sum(values), 1), rounded(mean, 1), rounded(most, 1)))
+    columns = (
+        tables.Column("Part", numeric=False),
+        *(tables.Column(n, "s") for n in ("All cases", "Mean of a case", "Longest")),
+    )
+    return tables.Table("Time taken", columns, tuple(rows))

@@ -1,0 +1,119 @@
+"""The page of a study: its template filled with figures and tables."""
+
+from __future__ import annotations
+
+from importlib import metadata
+from importlib.resources import files
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup
+
+from scenes.report import page as run_page
+from scenes.report import tables
+from scenes.report.names import glossary
+from scenes.report.numbers import rounded, share
+from scenes.study.study import StudyResult
+from scenes.study_report.case_page import case_page
+from scenes.study_report.comparison import (
+    bars,
+    clock_table,
+    comparison_table,
+    failures_table,
+    finished,
+    scatter,
+)
+from scenes.study_report.model import study_model
+
+TEMPLATES = files(__package__) / "templates"
+MOST_CASES = 60  # that have a section of their own: some 200 kB each
+
+
+def write_study_report(study: StudyResult, path: Path) -> None:
+    """Write the report of a study as one self-contained HTML file."""
+    Path(path).write_text(study_report_html(study), encoding="utf-8")
+
+
+def study_report_html(study: StudyResult) -> str:
+    """The report as text: no script, font or picture is fetched from anywhere."""
+    done = finished(study)
+    if not done:
+        raise ValueError("a report needs at least one case with a result")
+    pages = tuple(case_page(study, number, case, r) for number, case, r in done[:MOST_CASES])
+    errors = [r.figures["illuminance_error_mean"] for _, _, r in done]
+    worst = max(r.figures["illuminance_error_max"] for _, _, r in done)
+    loaders = [jinja2.PackageLoader("scenes.study_report"), jinja2.PackageLoader("scenes.report")]
+    environment = run_page.environment()
+    environment.loader = jinja2.ChoiceLoader(loaders)
+    styles = (run_page.TEMPLATES.joinpath("style.css"), TEMPLATES.joinpath("study.css"))
+    scripts = [run_page.TEMPLATES.joinpath(name) for name in run_page.SCRIPTS]
+    scripts.append(TEMPLATES.joinpath("study.js"))
+    return environment.get_template("study.html.j2").render(
+        study=study,
+        title=study.title or "Study of fenestration systems",
+        facts=facts(study),
+        scatter=scatter(study),
+        bars=bars(study),
+        table=comparison_table(study),
+        failures=failures_table(study),
+        clock=clock_table(study),
+        choices=tuple(dict.fromkeys(case.chosen for case in study.plan.cases if case.chosen)),
+        pages=pages,
+        left_out=len(done) - len(pages),
+        model=study_model(study),
+        has_outdoors=any(b.elements for b, _ in study.plan.rooms.values()),
+        problems=problems_table(study),
+        inputs=inputs_table(study),
+        mean_error=share(sum(errors) / len(errors) / 100),
+        worst_error=share(worst / 100),
+        version=metadata.version("mitsuba-cfs"),
+        glossary=glossary(),
+        style=Markup("\n".join(style.read_text("utf-8") for style in styles)),
+        scripts=Markup("\n".join(script.read_text("utf-8") for script in scripts)),
+    )  # fmt: skip
+
+
+def facts(study: StudyResult) -> tuple[tuple[str, str], ...]:
+    """The study in a few facts."""
+    cases = study.plan.cases
+
+    def named(values) -> str:
+        values = list(dict.fromkeys(values))
+        return ", ".join(values) if len(values) <= 4 else f"{len(values)}"
+
+    return (
+        ("Cases", f"{len(cases)}" + (f", {study.failed} failed" if study.failed else "")),
+        ("Rooms", named(c.place for c in cases)),
+        ("Systems", named(c.system for c in cases)),
+        ("Climates", named(c.climate for c in cases)),
+        ("Turned by", named(f"{c.orientation_deg:g}°" for c in cases)),
+        ("Methods", named(c.options.method for c in cases)),
+        ("Computed in", f"{rounded(study.seconds, 0)} s, {study.reused} cases from before"),
+    )
+
+
+def problems_table(study: StudyResult) -> tables.Table:
+    """What is wrong with the building files and what was done about it."""
+    columns = tuple(
+        tables.Column(label, numeric=False) for label in ("Where", "What", "Consequence and repair")
+    )
+    return tables.Table(
+        "By element", columns, tuple((p.where, p.what, p.consequence) for p in study.problems)
+    )
+
+
+def inputs_table(study: StudyResult) -> tables.Table:
+    """The files of the study with their hashes."""
+    found = {}
+    for case in study.plan.cases:
+        for kind, source in (
+            ("Building", case.building),
+            ("Fenestration", case.bsdf),
+            ("Its thermal values", case.thermal),
+            ("Weather", case.weather),
+        ):
+            if path := getattr(source, "path", None):
+                found[kind, path] = source.sha256
+    columns = tuple(tables.Column(c, numeric=False) for c in ("Input", "File", "SHA-256"))
+    rows = tuple((kind, path.name, digest) for (kind, path), digest in found.items())
+    return tables.Table("Input files", columns, rows)
