@@ -124,6 +124,36 @@ def coupled_rooms(
     return found, tuple(notes)
 
 
+def shared_constructions(spaces: Sequence[Space]) -> list[Space]:
+    """The rooms with one construction for both faces of every wall that two of them share.
+
+    Each room's faces were looked through on their own, and the layers found may differ: the second
+    of two faces that lie opposite, alike in area, takes the first one's layers turned round.
+    """
+    index = {space.guid: number for number, space in enumerate(spaces)}
+    faces = [list(space.faces) for space in spaces]
+    taken: set[tuple[int, int]] = set()
+    for a, own in enumerate(faces):
+        for i, face in enumerate(own):
+            b = index.get(face.neighbour, -1) if face.neighbour else -1
+            if b < 0 or (a, i) in taken:
+                continue
+            gaps = {
+                j: float(np.linalg.norm(centroid(other.triangles) - centroid(face.triangles)))
+                for j, other in enumerate(faces[b])
+                if other.neighbour == spaces[a].guid
+                and (b, j) not in taken
+                and face.normal @ other.normal < OPPOSITE
+                and abs(other.area - face.area) <= SAME_AREA * face.area
+            }
+            if gaps:
+                j = min(gaps, key=gaps.__getitem__)
+                taken |= {(a, i), (b, j)}
+                turned = replace(face.construction, layers=face.construction.layers[::-1])
+                faces[b][j] = replace(faces[b][j], construction=turned)
+    return [replace(space, faces=tuple(f)) for space, f in zip(spaces, faces, strict=True)]
+
+
 def door_links(spaces: Sequence[Space], flow: float) -> NDArray[np.float64]:
     """Air exchanged between rooms [Z, Z] [m3/s] through the open doors that join them.
 

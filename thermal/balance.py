@@ -278,6 +278,7 @@ def _work(net: Network, zones: int) -> records.Work:
         matrix=np.zeros((n + zones, n + zones)),
         right=np.zeros(n + zones),
         unknown=np.zeros(n + zones),
+        column=np.zeros(n + zones, dtype=np.int64),
         still=np.zeros(m),
         film=np.zeros(n),
         outdoor=np.zeros((n, 5)),

@@ -88,6 +88,7 @@ class Work(NamedTuple):
     matrix: NDArray[np.float64]  # [N + Z, N + Z] lower triangle
     right: NDArray[np.float64]  # [N + Z]
     unknown: NDArray[np.float64]  # [N + Z]
+    column: NDArray[np.int64]  # [N + Z] rows of a column that are not zero
     still: NDArray[np.float64]  # [M] node temperatures that the step before alone would give
     film: NDArray[np.float64]  # [N] inside film plus extra conductance [W/(m2 K)]
     # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T

@@ -233,17 +233,27 @@ def _assemble(
 
 @inlined
 def _solve(net: Network, work: Work, state: State, drive: Drive, t: int) -> None:
-    """Eliminate the faces (symmetric, diagonally dominant: no pivoting), then the air."""
-    a, b, x = work.matrix, work.right, work.unknown
+    """Eliminate the faces (symmetric, diagonally dominant: no pivoting), then the air.
+
+    A face touches its own room, the other sides of its room's walls and little else: only the rows
+    that are not zero in its column take part.
+    """
+    a, b, x, column = work.matrix, work.right, work.unknown, work.column
     n, total = net.faces.area.size, work.right.size
     for k in range(n):
         inverse = 1.0 / a[k, k]
+        count = 0
         for i in range(k + 1, total):
+            if a[i, k] != 0.0:
+                column[count] = i
+                count += 1
+        for p in range(count):
+            i = column[p]
             f = a[i, k] * inverse
-            if f != 0.0:
-                for j in range(k + 1, i + 1):
-                    a[i, j] -= f * a[j, k]
-                b[i] -= f * b[k]
+            for q in range(p + 1):
+                j = column[q]
+                a[i, j] -= f * a[j, k]
+            b[i] -= f * b[k]
     _solve_air(work, state, drive, t, n)
     for k in range(n - 1, -1, -1):
         s = b[k]

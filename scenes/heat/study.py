@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from bim.model import Building, Construction, MaterialLayer, Space
 from bim.read_ifc import read_ifc
 from bim.shoebox import WindowRectangle, shoebox
-from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, thermal_room
+from bim.to_thermal import (
+    ThermalRoom,
+    coupled_rooms,
+    door_links,
+    shared_constructions,
+    thermal_room,
+)
 from mitsuba_cfs import variants
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.errors import DataError
@@ -174,7 +180,8 @@ def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
         return building, list(building.spaces)
     building = read_ifc(study.building)
     if study.couple:
-        return building, coupled_spaces(building, study.spaces, study.building)
+        spaces = coupled_spaces(building, study.spaces, study.building)
+        return building, shared_constructions(spaces)
     return building, chosen_spaces(building, study.spaces, study.building)
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bim.model import Construction, MaterialLayer
 from bim.read_ifc import read_ifc
-from bim.to_thermal import coupled_rooms, door_links, thermal_room
+from bim.to_thermal import coupled_rooms, door_links, shared_constructions, thermal_room
 from tests.thermal.rooms import PLASTER, box, climate, sun
 from thermal.balance import BalanceOptions, simulate_zones
 from thermal.blackbox import Fenestration
@@ -126,6 +127,26 @@ def test_wall_without_its_other_face_is_told():
     assert len(notes) == 1 and "door" in notes[0] and "1.9 m2" in notes[0]
     door = next(s for s in rooms[0].zone.surfaces if s.name.startswith("door"))
     assert door.outside == "twin"
+
+
+def test_both_faces_of_a_wall_get_one_construction():
+    first, second = read_ifc(OFFICE).spaces
+    thin = MaterialLayer("glass", 0.01, 1.0, 2500.0, 800.0)
+    other = Construction("other", (thin, MaterialLayer("air", 0.02, 0.1, 2.0, 1000.0)))
+    faces = tuple(
+        replace(f, construction=other) if f.neighbour == first.guid else f for f in second.faces
+    )
+    one, two = shared_constructions([first, replace(second, faces=faces)])
+    pairs = 0
+    for face in one.faces:
+        for back in two.faces:
+            if face.neighbour == second.guid and back.neighbour == first.guid:
+                if back.kind == face.kind:
+                    assert back.construction.layers == face.construction.layers[::-1]
+                    pairs += 1
+    assert pairs == 2
+    outside = [f.construction for f in two.faces if f.adjacency == "outside"]
+    assert outside == [f.construction for f in second.faces if f.adjacency == "outside"]
 
 
 @pytest.mark.peer
