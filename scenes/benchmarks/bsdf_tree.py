@@ -1,38 +1,50 @@
-"""Time to equal error of a traced tensor tree: this project against genBSDF's `-t4`.
+"""The blind of `bsdf_generate` as a tensor tree of rank 4: this project against genBSDF's `-t4 5`.
 
-    python -m scenes.benchmarks.bsdf_tree [--levels 5] [--samples N]
-
-The blind of `bsdf_generate`, 90 % of the cells merged away by either program, processor time of one
-run.  Errors are root mean squares over random pairs of directions, even in projected solid angle,
-over the mean value, against a long run of ours that merges only noise.
+90 % of the cells are merged away by either program.  Errors are over random pairs of directions,
+even in projected solid angle, against a long run of ours that merges only noise.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.evaluate import bsdf_values
-from mitsuba_cfs.bsdf.generate import generate_tensor_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf, square_to_disk
-from scenes.benchmarks.bsdf_generate import BLOCKS, TUNED, Run, blind, clocks, report, run_genbsdf
+from mitsuba_cfs.progress import Progress
+from scenes.benchmarks import radiance
+from scenes.benchmarks.bsdf_generate import BLOCKS, TUNED, blind, genbsdf, hardest_block
+from scenes.benchmarks.harness import THREADS, Comparison, Run, rms_error, timed
 
-PAIRS, OURS_PATHS, TRUTH_PATHS = 400_000, 2048, 16_384
-
-
-def errors(bsdf: TensorTreeBsdf, truth: TensorTreeBsdf) -> tuple[float, ...]:
-    """Root mean square error of each block over its mean value."""
-    found = []
-    for name in BLOCKS:
-        incident, outgoing = random_pairs(name, seed=1)
-        ours, true = (bsdf_values(b, incident, outgoing) for b in (bsdf, truth))
-        found.append(float(np.sqrt(((ours - true) ** 2).mean()) / true.mean()))
-    return tuple(found)
+LEVELS, SAMPLES = 5, 100
+PAIRS, PATHS, REFERENCE_PATHS = 400_000, 2048, 16_384
 
 
-def random_pairs(name: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def ours(paths: int = PATHS, *, levels: int = LEVELS, cull: float = 0.9, seed: int = 2):
+    """Our tensor tree of the blind."""
+    from mitsuba_cfs.bsdf.generate import generate_tensor_tree
+
+    (tree,), _ = generate_tensor_tree(blind(), levels, samples=paths, cull=cull, seed=seed)
+    return tree
+
+
+@cache
+def reference() -> NDArray[np.float64]:
+    """Values [4, N] of the converged tree."""
+    tree = ours(REFERENCE_PATHS, cull=0.0, seed=9)
+    return np.array([bsdf_values(tree, *random_pairs(name)) for name in BLOCKS])
+
+
+def relative_values(tree: TensorTreeBsdf) -> NDArray[np.float64]:
+    """Values [4, N] of each block at random pairs, over the reference's mean."""
+    values = np.array([bsdf_values(tree, *random_pairs(name)) for name in BLOCKS])
+    return values / reference().mean(axis=1, keepdims=True)
+
+
+def random_pairs(name: str, seed: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Incident and outgoing directions [N, 3] of a block, even in projected solid angle."""
     kind, side = name.split("_")
     disk = square_to_disk(np.random.default_rng(seed).uniform(size=(2, PAIRS, 2)))
@@ -41,23 +53,29 @@ def random_pairs(name: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return incident, outgoing * [1, 1, 1 if kind == "reflection" else -1]
 
 
-def main() -> None:
-    """Run both and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--levels", type=int, default=5)
-    parser.add_argument("--samples", type=int, default=100, help="genBSDF's -c")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
-    options = parser.parse_args()
-    (truth,), _ = generate_tensor_tree(
-        blind(), options.levels, samples=TRUTH_PATHS, cull=0.0, seed=9
+def compare(name: str, progress: Progress) -> Comparison:
+    """Both programs' time and error."""
+    radiance.environment()
+    variants.activate()
+    progress(name, 0.0)
+    found, seconds, processor = timed(ours, repeat=2)
+    progress(name, 0.2)
+    peer, peer_seconds, peer_processor = timed(
+        lambda: genbsdf(SAMPLES, TUNED, levels=LEVELS), repeat=1, warm=False
     )
-    start = clocks()
-    (ours,), _ = generate_tensor_tree(blind(), options.levels, samples=OURS_PATHS, seed=2)
-    own = Run(f"ours, {OURS_PATHS} paths", *(clocks() - start), errors(ours, truth))
-    theirs, seconds = run_genbsdf(options.samples, options.processes, TUNED, levels=options.levels)
-    name = f"genBSDF -t4 {options.levels} -c {options.samples}"
-    print(report(own, [Run(name, *seconds, errors(theirs, truth))]))
+    progress(name, 0.6)
+    values, peers = relative_values(found), relative_values(peer)
+    truth = reference() / reference().mean(axis=1, keepdims=True)
+    progress(name, 1.0)
+    command = f"genBSDF -t4 {LEVELS} -n {THREADS} -c {SAMPLES} +f +b -r '{' '.join(TUNED)}'"
+    call = f"generate_tensor_tree(levels={LEVELS}, samples={PATHS})"
+    return Comparison(
+        name,
+        f"tensor tree of 4^{LEVELS} cells a hemisphere of a venetian blind [each block's mean]",
+        Run("mitsuba-cfs", call, seconds, processor, rms_error(values, truth)),
+        Run("Radiance", command, peer_seconds, peer_processor, rms_error(peers, truth)),
+        note=hardest_block(values, peers, truth, processor, peer_processor),
+    )
 
 
-if __name__ == "__main__":
-    main()
+BENCHMARKS = {"bsdf-tree": lambda progress: compare("bsdf-tree", progress)}

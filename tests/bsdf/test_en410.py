@@ -118,3 +118,28 @@ def test_data_that_do_not_reach_are_refused():
         solar_value(WHOLE[50:], np.ones(len(WHOLE) - 50))
     with pytest.raises(ValueError, match="rising"):
         visible_value(WHOLE[::-1], np.ones(len(WHOLE)))
+
+
+def test_colour_rendering_is_that_of_colour_science():
+    """A tint off the daylight locus whose nearest daylight is D65, CIE 1995's reference then."""
+    import colour
+    from colour.models import UCS_to_uv, XYZ_to_UCS
+    from colour.temperature import uv_to_CCT_Robertson1968
+    from scipy.optimize import brentq
+
+    nm, shape = np.arange(380, 781, 5.0), colour.SpectralShape(380, 780, 5)
+    d65 = colour.SDS_ILLUMINANTS["D65"].copy().align(shape).values
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape).values
+
+    def kelvins(light):
+        return uv_to_CCT_Robertson1968(UCS_to_uv(XYZ_to_UCS(light @ observer)))[0]
+
+    def tint(red):
+        blue = 0.4 * np.exp(-(((nm - 450) / 40) ** 2))
+        return 1 - blue - red * np.exp(-(((nm - 650) / 50) ** 2))
+
+    red = brentq(lambda red: kelvins(d65 * tint(red)) - kelvins(d65), 0, 0.95)
+    theirs = colour.colour_rendering_index(colour.SpectralDistribution(d65 * tint(red), nm))
+    assert 70 < theirs < 85
+    # 0.02: their D65 is that of a formula, 0.007 of R_a from the table's
+    assert colour_rendering_index(nm, tint(red)) == pytest.approx(theirs, abs=0.02)

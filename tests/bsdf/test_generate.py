@@ -201,15 +201,12 @@ class Centres:
 
 
 @pytest.mark.parametrize(
-    "reflectance, tilt_deg, depth, spacing", [(0.1, 45, 0.016, 0.012), (0.2, 30, 0.0225, 0.0175)]
+    "reflectance, tilt_deg, depth, spacing", [(0.1, 45, 0.016, 0.012), (0.2, 30, 0.018, 0.014)]
 )
 def test_flat_diffuse_slats_are_those_of_window(
     variant, real_data, reflectance, tilt_deg, depth, spacing
 ):
-    """WINDOW's engine (Windows-CalcEngine's own test values).
-
-    The second case's sizes are not given: its direct value at normal incidence, 0.3573, tells them.
-    """
+    """WINDOW's engine: Windows-CalcEngine's own test values (`VenetianDirectionalMatrix`)."""
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis
     from mitsuba_cfs.bsdf.traced_layer import TracedLayer
 

@@ -105,6 +105,18 @@ def test_panes_keep_their_normal_values_and_energy(coated):
     assert np.all(np.diff(tau[20:]) < 0)
 
 
+def test_a_coated_pane_at_60_degrees_is_as_published():
+    """Clear shape at cos 0.5, by hand: t = 0.9003, t + r = 0.977625."""
+    pane = Pane("coated", 0.7, 0.08, 0.2, coated=True)
+    tau, front, back = pane_values(pane, np.radians(60))
+    assert (tau, front, back) == pytest.approx(
+        (0.7 * 0.9003, 0.08 * (1 - 0.077325) + 0.077325, 0.2 * (1 - 0.077325) + 0.077325), abs=1e-5
+    )
+    bronze = pane_values(Pane("dark", 0.4, 0.08, 0.2, coated=True), np.radians(60))[0]
+    # -0.002 + 1.4065 - 0.58525 - 0.00715625 + 0.0374375
+    assert bronze == pytest.approx(0.4 * 0.84953, abs=1e-5)
+
+
 def test_a_pane_passes_light_straight_on():
     klems = specular_klems(Pane("clear", 0.9, 0.08, 0.08), KLEMS_FULL)
     share = klems.direct_hemispherical(klems.transmission_front)
