@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -52,8 +53,9 @@ def read_states(
                         cache[pset.id()] = _state(pset, file, element.GlobalId)
                     states[cache[pset.id()].name] = cache[pset.id()]
                 for path in _referenced(source, Path(folder)):
-                    bands = read_bsdf_xml(path).bands
-                    states.setdefault("", ShadingState("", bands))
+                    known = states.get("", ShadingState())
+                    if not known.bands:
+                        states[""] = replace(known, bands=read_bsdf_xml(path).bands)
             if states:
                 found[element.GlobalId] = tuple(states.values())
     return found

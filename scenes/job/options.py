@@ -15,7 +15,7 @@ class RoomOptions:
     method: str = "five-phase"  # one of METHODS
     picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.job.glare.default_hours`
     picture_size: int = 600  # pixels of a side of the fisheye picture
-    picture_samples: int = 32  # paths for each pixel
+    picture_samples: int = 8  # paths for each pixel; 4 x 4 of them share what is reflected
     sky_subdivision: int = 4  # Reinhart's MF
     sensor_spacing: float = 0.5  # [m]
     sensor_height: float = 0.8  # above the floor [m]

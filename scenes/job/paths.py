@@ -64,7 +64,7 @@ def path_picture(
         lit_room(scene, state),
         sky_of_hour(skies, hour),
         scene.view,
-        samples=options.picture_samples,
+        samples=2 * options.picture_samples,  # nothing is averaged over hours here
         seed=options.seed,
         progress=progress,
     )
