@@ -17,15 +17,23 @@ def disc_reach(pixel_size: float) -> float:
 
 
 def disc_rays(
-    view: View, pixels: NDArray[np.int64], suns: NDArray[np.float64], pixel_size: float
+    view: View,
+    pixels: NDArray[np.int64],
+    suns: NDArray[np.float64],
+    pixel_size: float,
+    *,
+    step: float = SUBPIXEL,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], float]:
     """Rays of pixels [n] that meet the disc of a sun [n, 3] each, and the share of one of them.
 
-    Args: pixel_size: the largest angle [rad] across a pixel of the view.
+    Args:
+        pixel_size: the largest angle [rad] across a pixel of the view.
+        step: between rays [rad]; pieces are counted whole, by which the disc of 360 pieces can be
+            off by 2 %, one of 9,000 by 0.2 %.
 
     Returns: number [m] of the pixel that a ray belongs to; its direction [m, 3]; its share.
     """
-    count = int(np.clip(np.ceil(pixel_size / SUBPIXEL), 4, 64))
+    count = int(np.clip(np.ceil(pixel_size / step), 4, 64 * SUBPIXEL / step))
     inner = (np.arange(count) + 0.5) / count
     dx, dy = (a.ravel()[None] for a in np.meshgrid(inner, inner))
     number = pixels[:, None]

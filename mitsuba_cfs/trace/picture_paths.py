@@ -38,6 +38,7 @@ from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 BLOCK = 2**19  # paths traced at a time
 TILE = 4  # [px]
+DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
 SURFACE_STEPS, WINDOW_STEPS = (1, 2), (1,)  # [tiles] of the smoothing, one after the other
 
 
@@ -117,7 +118,7 @@ def _add_disc(picture: NDArray, shown: NDArray, room: Room, sky: Sky, view: View
     size = float(np.sqrt(pixel_solid_angles(view).max()))
     directions = pixel_directions(view)[0].reshape(-1, 3)[shown]
     near = shown[directions @ sun > np.cos(disc_reach(size))]
-    pixel, way, share = disc_rays(view, near, np.tile(sun, (len(near), 1)), size)
+    pixel, way, share = disc_rays(view, near, np.tile(sun, (len(near), 1)), size, step=DISC_STEP)
     if not len(pixel) or not sky.sun_radiance.numpy()[0]:
         return
     towards = mi.Vector3f(way.T.astype(np.float32))
