@@ -1,18 +1,20 @@
 """The dissertation's Tables 4, 7 and 10 remade: DGP, eDGP, sDGP of three methods against slats.
 
-    python -m scenes.validation.glare_methods --weather CITY.epw --system "40 degrees" --json FILE
-    python -m scenes.validation.glare_methods --table FILE FILE ...
+    python -m scenes.validation.glare_methods --weather CITY.epw --json FILE [--system "5 degrees"]
+    python -m scenes.validation.glare_methods --table FILE
 
-Every third hour of sunny days in June and September (the dissertation measured from 3 to 6 June
-and on 4 and 5 September).  The "measurement" is the DGP of a path-traced picture of the room with
-its slats as geometry; the methods know a blind by its Klems matrices and its tensor tree only.
+Hours of sunny days in June and September (the dissertation measured from 3 to 6 June behind blinds
+and on 4 and 5 September without).  The "measurement" is the DGP of a path-traced picture of the
+room with its slats as geometry; the methods know a blind by Klems matrices and a tensor tree only.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +23,13 @@ from numpy.typing import NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.surfaces import Surfaces
 from scenes.methods.methods import METHODS, method_scene
-from scenes.methods.place import Place, Quality, Skies, skies_of
+from scenes.methods.place import Fenestration, Place, Quality, Skies, skies_of
 from scenes.pictures import write_falsecolour
-from scenes.validation import blind_room as daylight
+from scenes.validation.blind_room import TILTS, blind_layer, empty, slats
 from scenes.validation.glare_room import (
-    blind,
     glare_place,
     known_system,
     lit_hours,
@@ -50,56 +52,78 @@ DISSERTATION = {  # Tables 4, 7, 10: rMBE, rRMSE, largest and least relative err
 }
 
 
+@dataclass(frozen=True)
+class Case:
+    """A system as geometry and as the methods know it, and the skies it is rated under."""
+
+    name: str
+    exterior: Surfaces
+    system: Fenestration
+    skies: Skies
+    times: tuple[str, ...]
+    raised: tuple[float, ...] = (0.0,)  # [m] eyes of the measurement above the view's, for a mean
+
+
 def measured(
-    place: Place, exterior, skies: Skies, quality: Quality, pictures: Path | None
+    place: Place, case: Case, quality: Quality, pictures: Path | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """DGP and illuminance [lx] of the room with everything as geometry [H]."""
-    room = measurement(place, exterior, "DGP", quality)
-    geometry, dgp, lux = GlareView(place.view), [], []
-    for hour in range(skies.hours):
-        picture = room.picture(skies, hour, seed=SEED)
-        found = evaluate(picture, geometry)
-        dgp.append(found.dgp)
-        lux.append(found.Ev)
-        if pictures is not None:
-            title = f"measurement, hour {hour}: DGP {found.dgp:.3f}, {found.count} sources"
-            write_falsecolour(pictures / f"measured_{hour:02d}.png", picture, title=title)
-    return np.array(dgp), np.array(lux)
+    geometry, rows = GlareView(place.view), []
+    for height in case.raised:
+        eye = np.add(place.view.position, [0, 0, height])
+        raised = replace(place, view=replace(place.view, position=tuple(eye)))
+        room, row = measurement(raised, case.exterior, "DGP", quality), []
+        for hour in range(case.skies.hours):
+            picture = room.picture(case.skies, hour, seed=SEED)
+            found = evaluate(picture, geometry)
+            row.append((found.dgp, found.Ev))
+            if pictures is not None:
+                title = f"{case.name}, {case.times[hour]}: DGP {found.dgp:.3f}"
+                name = f"{case.name.replace(' ', '_')}_{hour:02d}.png"
+                write_falsecolour(pictures / name, picture, title=title)
+        rows.append(row)
+    dgp, lux = np.mean(rows, axis=0).T
+    return dgp, lux
 
 
-def one_system(options, place: Place, quality: Quality) -> dict:
-    """The measurement and all methods for one system."""
-    weather = read_epw(options.weather)
-    tilt = daylight.TILTS[options.system]
+def rated(place: Place, cases: list[Case], quality: Quality, pictures: Path | None) -> list[dict]:
+    """The measurement and all methods for all cases; a method's scene is traced once."""
+    found = []
+    for case in cases:
+        dgp, lux = measured(place, case, quality, pictures)
+        found.append(
+            {"system": case.name, "times": list(case.times), "Ev": lux.round(1).tolist(),
+             "measured": dgp.round(5).tolist(), "methods": {}}
+        )  # fmt: skip
+        print(case.name, "measured", dgp.round(3), file=sys.stderr, flush=True)
+    geometry = GlareView(place.view)
+    for method in METHODS:
+        for metric in GLARE:
+            start = time.monotonic()
+            scene = method_scene(method, metric, place, quality, geometry=geometry)
+            for case, run in zip(cases, found, strict=True):
+                values = scene.behind(case.system).values(case.skies)
+                run["methods"][f"{method} {metric}"] = values.round(5).tolist()
+            seconds = time.monotonic() - start
+            print(f"{method} {metric}: {seconds:.0f} s", file=sys.stderr, flush=True)
+    return found
+
+
+def weather_case(name: str, weather: Weather, place: Place, options) -> Case:
+    """A system of `TILTS` in the hours that the options choose."""
+    tilt = TILTS[name]
     days = [sunny_days(weather, 9, 4, options.days)]
     if tilt is not None:
         days.append(sunny_days(weather, 6, 4, options.days))
     hours = lit_hours(weather, np.sort(np.concatenate(days)), options.every)
-    skies = skies_of(weather, hours, subdivision=quality.subdivision)
-    slats = None if tilt is None else blind(place, tilt)
-    exterior = daylight.empty() if slats is None else slats.exterior
-    start = time.monotonic()
-    dgp, lux = measured(place, exterior, skies, quality, options.pictures)
-    seconds = {"measurement": time.monotonic() - start}
-    system = known_system(None if slats is None else slats.layer, levels=options.levels)
-    found = {}
-    for method in METHODS:
-        for metric in GLARE:
-            start = time.monotonic()
-            scene = method_scene(method, metric, place, quality)
-            values = scene.behind(system).values(skies)
-            seconds[f"{method} {metric}"] = time.monotonic() - start
-            found[f"{method} {metric}"] = values.round(5).tolist()
-            print(options.system, method, metric, errors(values, dgp), flush=True)
-    return {
-        "system": options.system,
-        "times": [str(t) for t in weather.midpoints[hours]],
-        "sun_on_facade": (skies.direction @ place.groups[0].frame[2] > 0).tolist(),
-        "Ev": lux.round(1).tolist(),
-        "measured": dgp.round(5).tolist(),
-        "methods": found,
-        "seconds": {name: round(s, 1) for name, s in seconds.items()},
-    }
+    layer = None if tilt is None else blind_layer(tilt)
+    return Case(
+        name,
+        empty() if tilt is None else slats(place.groups[0], tilt),
+        known_system(layer, levels=options.levels),
+        skies_of(weather, hours),
+        tuple(f"{t:%m-%d %H:%M}" for t in weather.midpoints[hours]),
+    )
 
 
 def errors(found, reference) -> tuple[float, float, float, float]:
@@ -109,16 +133,13 @@ def errors(found, reference) -> tuple[float, float, float, float]:
     return tuple(round(float(part), 1) for part in parts)
 
 
-def table(files: list[Path]) -> str:
+def table(runs: list[dict]) -> str:
     """The tables of all systems together, and of each, as Markdown."""
-    runs = [json.loads(file.read_text()) for file in files]
     dgp = np.concatenate([run["measured"] for run in runs])
     lines = [
         f"{len(dgp)} hours, measured DGP {dgp.min():.2f} to {dgp.max():.2f}",
         "",
-        "| method, metric | "
-        + " | ".join(run["system"] for run in runs)
-        + " | all | dissertation |",
+        " | ".join(["| method, metric", *(r["system"] for r in runs), "all", "dissertation |"]),
         "|" + "---|" * (len(runs) + 3),
     ]
     for method in METHODS:
@@ -137,32 +158,35 @@ def _cell(found: tuple[float, ...]) -> str:
 
 
 def main() -> None:
-    """Run one system, or print the table of runs."""
+    """Run the systems and print their table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--table", type=Path, nargs="+", help="files of runs to put together")
+    parser.add_argument("--table", type=Path, help="file of a run, to print its table again")
     parser.add_argument("--weather", type=Path)
-    parser.add_argument("--system", choices=daylight.TILTS, default="40 degrees")
+    parser.add_argument("--system", choices=TILTS, action="append", help="default: all")
     parser.add_argument("--days", type=int, default=2, help="in each month")
     parser.add_argument("--every", type=int, default=3, help="hours from one to the next")
-    parser.add_argument("--size", type=int, default=240, help="pixels of a side")
-    parser.add_argument("--samples", type=int, default=16, help="paths of a pixel")
+    parser.add_argument("--size", type=int, default=180, help="pixels of a side")
+    parser.add_argument("--samples", type=int, default=8, help="paths of a pixel")
     parser.add_argument("--levels", type=int, default=5, help="4^levels cells of the tree")
     parser.add_argument("--pictures", type=Path, help="folder for the measurement's pictures")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     if options.table:
-        print(table(options.table))
+        print(table(json.loads(options.table.read_text())))
         return
     if options.weather is None:
         parser.error("--weather is needed")
     variants.activate()
     if options.pictures:
         options.pictures.mkdir(parents=True, exist_ok=True)
-    place = glare_place(options.size)
-    quality = Quality(path_samples=options.samples, pixel_samples=options.samples)
-    found = one_system(options, place, quality)
+    place, weather = glare_place(options.size), read_epw(options.weather)
+    quality = Quality(path_samples=options.samples, pixel_samples=2 * options.samples)
+    names = options.system or list(TILTS)
+    cases = [weather_case(name, weather, place, options) for name in names]
+    found = rated(place, cases, quality, options.pictures)
     if options.json:
         options.json.write_text(json.dumps(found, indent=1))
+    print(table(found))
 
 
 if __name__ == "__main__":

@@ -6,17 +6,14 @@ facade, and looks at it.  The "measurement" is the same room with the slats as g
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.blinds import venetian_blind
 from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
+from mitsuba_cfs.bsdf.periodic import PeriodicLayer
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
@@ -24,7 +21,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.lit_room import AngularBeam, Room, System
 from scenes.methods.paths import PathSystem, path_scene
 from scenes.methods.place import Fenestration, Place, Quality, fenestration
-from scenes.validation import blind_room as daylight
+from scenes.validation import blind_room
 from scenes.validation.glare_systems import tree_fenestration
 
 EYE_HEIGHT = 1.2  # [m]
@@ -32,39 +29,23 @@ DIFFUSE = 5_000.0  # [lx] horizontal: hours below it are left out
 COSINE = np.linspace(0, 1, 64)
 
 
-@dataclass(frozen=True)
-class Blind:
-    """A slat blind before the glazing, as geometry and as what the methods know of it."""
-
-    layer: PeriodicLayer
-    exterior: Surfaces
-
-
 def glare_place(size: int, distance: float = 1.5) -> Place:
     """The room, seen from `distance` [m] before the facade at 1.2 m above the floor."""
-    scene = daylight.test_room()
+    scene = blind_room.test_room()
     inward = -scene.groups[0].frame[2]
     middle = scene.groups[0].windows[0].triangles.reshape(-1, 3).mean(axis=0) * [1, 1, 0]
     eye = middle + distance * inward + [0, 0, EYE_HEIGHT]
     view = fisheye(eye, -inward, size)
-    return Place(scene.interior, daylight.empty(), scene.groups, view, scene.points, scene.up)
-
-
-def blind(place: Place, tilt_deg: float) -> Blind:
-    """The blind of 3.1.1.2 at a tilt."""
-    layer = venetian_blind(
-        plastic("slat", daylight.SLAT_REFLECTANCE), tilt=np.radians(tilt_deg), **daylight.SLAT
-    )
-    return Blind(layer, daylight.slats(place.groups[0], tilt_deg))
+    return Place(scene.interior, blind_room.empty(), scene.groups, view, scene.points, scene.up)
 
 
 def glazing() -> System:
     """The double glazing alone: a beam and two mirrors."""
     mirrors = tuple(
-        AngularBeam(daylight.glass_reflectance(COSINE, normal))
-        for normal in (daylight.GLASS_FRONT, daylight.GLASS_BACK)
+        AngularBeam(blind_room.glass_reflectance(COSINE, normal))
+        for normal in (blind_room.GLASS_FRONT, blind_room.GLASS_BACK)
     )
-    return System(None, AngularBeam(daylight.glass_transmittance(COSINE)), mirrors)
+    return System(None, AngularBeam(blind_room.glass_transmittance(COSINE)), mirrors)
 
 
 def measurement(place: Place, exterior: Surfaces, metric: str, quality: Quality) -> PathSystem:
@@ -73,18 +54,20 @@ def measurement(place: Place, exterior: Surfaces, metric: str, quality: Quality)
     return PathSystem(scene, Room(place.interior, exterior, place.groups, [glazing()]))
 
 
-def known_system(layer: PeriodicLayer | None, *, levels: int = 5) -> Fenestration:
+def known_system(
+    layer: PeriodicLayer | None, *, levels: int = 5, samples: int = 4096
+) -> Fenestration:
     """What the methods know: Klems matrices, and the layer's tensor tree before the glazing.
 
     The light that layer and glazing throw at each other, which the matrices hold, is added to the
     tree in proportion, for each incident patch.
     """
-    glass = daylight.glass_klems()
+    glass = blind_room.glass_klems()
     if layer is None:
         return fenestration(glass)
-    klems = generate_klems(layer, samples=65536, seed=1).bsdf[0]
+    klems = generate_klems(layer, samples=16 * samples, seed=1).bsdf[0]
     both = combine_layers([klems, glass]).bsdf
-    tree, _ = generate_tensor_tree(layer, levels, samples=4096, seed=1)
+    tree, _ = generate_tensor_tree(layer, levels, samples=samples, seed=1)
     system = glazing()
     return tree_fenestration(
         both, tree[0], system.beam, _gain(klems, both), (None, system.mirrors[1])
@@ -94,7 +77,7 @@ def known_system(layer: PeriodicLayer | None, *, levels: int = 5) -> Fenestratio
 def _gain(layer: KlemsBsdf, both: KlemsBsdf) -> NDArray[np.float64]:
     """Scattered light through layer and glazing over that without their reflections [K]."""
     omega = KLEMS_FULL.projected_solid_angles()
-    tau = daylight.glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
+    tau = blind_room.glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
     scattered = through_peak(layer.transmission_front, KLEMS_FULL).scattered
     alone = (omega * tau) @ scattered
     extra = omega @ both.transmission_front - (omega * tau) @ layer.transmission_front
