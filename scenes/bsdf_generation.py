@@ -19,6 +19,7 @@ from mitsuba_cfs.bsdf.screens import (
     prism_panel,
     woven_screen,
 )
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent
 
 BASES = {"full": klems.KLEMS_FULL, "half": klems.KLEMS_HALF, "quarter": klems.KLEMS_QUARTER}
@@ -39,7 +40,12 @@ def generated_file(
     """The layer's BSDF file (Visible and Solar), and how exact it is in words."""
     from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
 
-    layer = described_layer(**options)
+    try:
+        layer = described_layer(**options)
+    except DataError:
+        raise
+    except ValueError as error:  # sizes that do not go together
+        raise click.UsageError(str(error)) from None
     if tensor_tree is None:
         result = generate_klems(layer, BASES[basis], samples=paths, seed=seed, progress=progress)
         systems, area = result.bsdf, BASES[basis].projected_solid_angles()[:, None]
@@ -60,7 +66,8 @@ def generated_file(
             progress=progress,
         )
         leaves = sum(len(tree.values) for tree in systems[0].blocks().values())
-        exact = f"{leaves} leaves, merged within {100 * bound:.0f} % and three standard errors"
+        merged = f"{100 * bound:.0f} % and three" if bound else "three"
+        exact = f"{leaves} leaves, merged within {merged} standard errors of a cell's value"
     bands = dict(zip(("Visible", "Solar"), systems, strict=True))
     return BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness), exact
 

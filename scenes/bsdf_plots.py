@@ -42,13 +42,16 @@ def plot_hemispheres(bsdf: Bsdf, incident: NDArray[np.float64], title: str) -> F
         )
         axis.set_title(f"{kind}: {100 * share:.1f} %")
         axis.set_yticks([30, 60, 90], ["30°", "60°", "90°"], color="grey")
+        axis.set_xticks(np.radians([0, 90, 180, 270]), ["right", "up", "left", "down"])
         axis.grid(alpha=0.3)
-        if kind == "reflected":
-            at = np.arctan2(incident[1], incident[0]), np.degrees(np.arccos(abs(incident[2])))
-            axis.plot(*at, "o", mfc="none", mec="cyan", ms=9, label="light")
-            axis.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.1))
+        toward = 1 if kind == "reflected" else -1  # the light, or straight on
+        at = np.arctan2(toward * incident[1], toward * incident[0])
+        marker, label = ("o", "the light") if kind == "reflected" else ("x", "straight on")
+        theta_deg = np.degrees(np.arccos(abs(incident[2])))
+        axis.plot(at, theta_deg, marker, mfc="none", mec="cyan", ms=9, label=label)
+        axis.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.1))
     figure.colorbar(shown, ax=axes, label="BSDF [1/sr]", shrink=0.85)
-    figure.suptitle(title)
+    figure.suptitle(f"{title}; seen from outside")
     return figure
 
 

@@ -169,6 +169,7 @@ def trace_bins(
         lanes = min(LANES, total - start)
         _count(work, sums, start, lanes)
         dr.eval(sums)
+        dr.sync_thread()  # what is reported is done
         progress("goniophotometer", (start + lanes) / total)
     return [np.array(each).reshape(shape) for each in sums], per_row
 

@@ -19,7 +19,22 @@ INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
 SHAPES = ("venetian", "louvre", "perforated", "woven", "pleated", "prism", "radiance")
 FILE = click.Path(path_type=Path)
-ANGLES = (float, float)
+
+
+class Number(click.FloatRange):
+    """A finite number within bounds."""
+
+    def convert(self, value, param, ctx) -> float:
+        """The number; a usage error where it is none."""
+        number = super().convert(value, param, ctx)
+        if not np.isfinite(number):
+            self.fail(f"{value!r} is not a finite number.", param, ctx)
+        return number
+
+
+ANGLES = (Number(), Number())
+LENGTH, SHARE = Number(min=0, min_open=True), Number(0, 1)
+PERIOD = (LENGTH, LENGTH)
 
 
 @click.group("bsdf")
@@ -163,33 +178,44 @@ def plot(file: Path, incident: tuple[float, float], band: str, output: Path) -> 
     if band not in data.bands:
         raise DataError(f"has no {band} band", file=file)
     direction = _from_radiance(np.array([[*incident, 0.0, 0.0]]))[0][0]
-    title = f"{data.name or file.name}, {band}, light from ({incident[0]:g}°, {incident[1]:g}°)"
-    plot_hemispheres(data.bands[band], direction, title).savefig(output)
+    title = f"{file.name}, {band}, light from theta {incident[0]:g}°, phi {incident[1]:g}°"
+    figure = plot_hemispheres(data.bands[band], direction, title)
+    known = figure.canvas.get_supported_filetypes()
+    if output.suffix.lstrip(".").lower() not in known:
+        raise click.UsageError(
+            f"--out {output}: expected a file name that ends in .png, .pdf, .svg"
+        )
+    figure.savefig(output)
 
 
 @command.command()
 @click.option("--shape", type=click.Choice(SHAPES), default="venetian", show_default=True)
-@click.option("--depth-mm", type=float, help="Width of a slat along its chord; depth of a pleat.")
-@click.option("--spacing-mm", type=float, help="From one slat, hole, thread or pleat to the next.")
-@click.option("--openness", type=float, help="Share of a perforated or woven sheet that is hole.")
+@click.option("--depth-mm", type=LENGTH, help="Width of a slat along its chord; of a pleat.")
+@click.option("--spacing-mm", type=LENGTH, help="From one slat, hole, thread or pleat to the next.")
+@click.option("--openness", type=SHARE, help="Share of a perforated or woven sheet that is hole.")
 @click.option("--geometry", type=FILE, help="Radiance scene of one cell, in genBSDF's frame.")
-@click.option("--period-mm", type=ANGLES, metavar="WIDTH HEIGHT", help="Size of that cell.")
-@click.option("--tilt-deg", type=float, default=0.0, help="Lowers the exterior edge.")
-@click.option("--radius-mm", type=float, default=None, help="Radius of curvature; flat without.")
-@click.option("--thickness-mm", type=float, default=0.0)
+@click.option("--period-mm", type=PERIOD, metavar="WIDTH HEIGHT", help="Size of that cell.")
+@click.option("--tilt-deg", type=Number(-90, 90), default=0.0, help="Lowers the exterior edge.")
+@click.option("--radius-mm", type=LENGTH, help="Radius of curvature; flat without.")
+@click.option("--thickness-mm", type=Number(min=0), default=0.0)
 @click.option(
-    "--index", type=float, help="Refractive index of a prism panel; --tilt-deg its angle."
+    "--index", type=Number(min=1), help="Refractive index of a prism panel; --tilt-deg its angle."
 )
-@click.option("--visible", type=float, help="Colour (Radiance plastic), visible.")
-@click.option("--solar", type=float, default=None, help="Colour, solar; the visible's without.")
-@click.option("--specular", type=float, default=0.0)
-@click.option("--roughness", type=float, default=0.0)
+@click.option("--visible", type=SHARE, help="Colour (Radiance plastic), visible.")
+@click.option("--solar", type=SHARE, help="Colour, solar; the visible's without.")
+@click.option("--specular", type=SHARE, default=0.0)
+@click.option("--roughness", type=Number(min=0), default=0.0)
 @click.option("--basis", type=click.Choice(["full", "half", "quarter"]), default="full")
 @click.option("--tensor-tree", type=click.IntRange(1, 6), help="4^N cells a hemisphere instead.")
 @click.option("--isotropic", is_flag=True, help="Tensor tree of rank 3: the mean over azimuths.")
-@click.option("--cull", type=float, default=0.9, help="Share of a tree's cells to merge away.")
-@click.option("--paths", type=int, default=32_768, help="For each direction and side.")
-@click.option("--seed", type=int, default=0)
+@click.option(
+    "--cull", type=Number(0, 1, max_open=True), default=0.9,
+    help="Share of a tree's cells to merge away.",
+)  # fmt: skip
+@click.option(
+    "--paths", type=click.IntRange(min=1), default=32_768, help="For each direction and side."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0)
 @click.option("--name", default="", help="Name to write into the file.")
 @click.option("--out", "output", type=FILE, required=True, help="XML file to write.")
 def generate(output: Path, **options) -> None:
@@ -197,6 +223,8 @@ def generate(output: Path, **options) -> None:
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
 
+    if not output.absolute().parent.is_dir():
+        raise click.UsageError(f"--out {output}: no such folder")
     with ProgressBar() as progress:
         file, exact = generated_file(progress=progress, **options)
     write_bsdf_xml(file, output)

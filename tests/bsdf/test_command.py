@@ -92,6 +92,38 @@ def test_plot_writes_a_picture(real_data, tmp_path, name):
     assert out.read_bytes().startswith(b"\x89PNG") and out.stat().st_size > 20_000
 
 
+def test_a_picture_of_no_known_kind_is_refused(dummy_back, tmp_path):
+    answer = run("plot", dummy_back, "--in", 140, 90, "--out", tmp_path / "plot.xyz")
+    assert answer.exit_code == 2 and "expected a file name that ends in .png" in answer.output
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ("--depth-mm -80 --spacing-mm 72 --visible 0.5", "--depth-mm"),
+        ("--depth-mm 80 --spacing-mm 72 --visible 1.5", "--visible"),
+        ("--depth-mm 80 --spacing-mm 72 --visible 0.5 --tilt-deg nan", "finite"),
+        ("--depth-mm 80 --spacing-mm 72 --visible 0.5 --paths 0", "--paths"),
+        ("--depth-mm 80 --spacing-mm 72 --visible 0.5 --cull 1", "--cull"),
+        ("--depth-mm 80 --spacing-mm 72 --visible 0.5 --radius-mm 30", "at least half the depth"),
+        ("--shape perforated --spacing-mm 5 --visible 0.5 --openness 0.9", "pi / 4"),
+        ("--shape woven --spacing-mm 5 --visible 0.5 --openness 1", "below 1"),
+        ("--shape prism --spacing-mm 5 --index 0.5", "--index"),
+        ("--shape venetian --spacing-mm 72 --visible 0.5", "needs --depth-mm"),
+    ],
+)
+def test_generate_refuses_what_cannot_be(tmp_path, options, message):
+    answer = run("generate", *options.split(), "--out", tmp_path / "x.xml")
+    assert answer.exit_code == 2 and message in answer.output
+    assert "Traceback" not in answer.output and not (tmp_path / "x.xml").exists()
+
+
+def test_generate_wants_a_folder_to_write_to(tmp_path):
+    options = "--depth-mm 80 --spacing-mm 72 --visible 0.5".split()
+    answer = run("generate", *options, "--out", tmp_path / "no" / "x.xml")
+    assert answer.exit_code == 2 and "no such folder" in answer.output
+
+
 def test_generate_writes_a_file_that_reads(variant, tmp_path):
     out = tmp_path / "blind.xml"
     options = "--depth-mm 80 --spacing-mm 72 --tilt-deg 30 --visible 0.6 --solar 0.5".split()

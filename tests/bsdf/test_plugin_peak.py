@@ -127,6 +127,23 @@ def test_the_peak_of_an_isotropic_tree_is_taken_out_whole():
     np.testing.assert_array_equal(through_peak(isotropic_glass(depth=2))[1], 0)  # cells too wide
 
 
+@pytest.mark.parametrize("rank", [3, 4])
+@pytest.mark.parametrize("times, share", [(1.9, 0.0), (2.5, 1.5)])
+def test_a_peak_is_more_than_twice_what_surrounds_it(rank, times, share):
+    cells, level = 8, 0.1
+    grid = np.full((cells,) * rank, level)
+    for i in range(cells):
+        if rank == 4:
+            grid[i, range(cells), i, range(cells)] = times * level
+        elif i < cells // 2:
+            grid[i, cells - 1 - i, cells // 2 - 1 : cells // 2 + 1] = times * level
+    order = np.argsort(morton(np.stack(np.indices(grid.shape), -1), 3).ravel())
+    rest, beams = through_peak(TensorTree(rank, np.full(grid.size, 3), grid.ravel()[order]))
+    leaves = 1 if rank == 4 else 2
+    assert beams.max() == pytest.approx(leaves * share * level * np.pi / cells**2)
+    assert rest.values.max() == pytest.approx(level if share else times * level)
+
+
 @pytest.mark.parametrize("mode", ["Radiance", "Importance"])
 @pytest.mark.parametrize("side", [-1, 1])
 def test_isotropic_glass_lets_the_view_through_undisturbed(variant, mode, side):
