@@ -67,6 +67,8 @@ def command(
         f"{len(result.results)} cases: {result.reused} were there, {result.failed} failed, "
         f"{result.seconds:.0f} s; table: {out / 'results.parquet'}"
     )
+    if result.clock:
+        click.echo(f"auto: {result.clock}")
     if result.failed == len(result.results):
         raise click.ClickException("no case could be computed")
     store.write("report.html", lambda path: write_study_report(result, path))

@@ -42,7 +42,8 @@ def settled(study: StudyFile, plan: Plan, calibration: Calibration | None = None
             metric = "none" if case.glare == "none" else choice.metric
             case = with_method(case, choice.method, metric, choice.why)
         cases.append(case)
-    return replace(plan, cases=tuple(cases))
+    predicted = sum(choice.seconds for choice in chosen.values())
+    return replace(plan, cases=tuple(cases), predicted=predicted)
 
 
 def work_of(cases: list[Case]) -> Work:

@@ -50,6 +50,7 @@ class Case:
     weather: Source
     orientation_deg: float  # the model is turned clockwise by it
     options: RoomOptions  # the method with them
+    operation: Source | None  # the file of the room's control, gains and set points
     program: str  # `program_version()` of the plan
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
@@ -57,7 +58,7 @@ class Case:
     @property
     def key(self) -> str:
         """A hash of what the numbers depend on: not of names, paths or reasons."""
-        files = [s.sha256 for s in (self.bsdf, self.thermal, self.weather) if s is not None]
+        files = [s.sha256 if s is not None else None for s in self.files[:4]]
         return digest(
             self.program,
             self.scene,
@@ -68,6 +69,11 @@ class Case:
             _plain(asdict(self.options)),
             self.glare,
         )[:32]
+
+    @property
+    def files(self) -> tuple[Source | BoxTable | None, ...]:
+        """What it is read from; the building last."""
+        return (self.bsdf, self.thermal, self.weather, self.operation, self.building)
 
     @property
     def place(self) -> str:

@@ -20,6 +20,7 @@ from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.study import box_building
 from scenes.job.inputs import System, read_system, read_weather
+from scenes.job.operation import read_operation
 from scenes.job.room import compute_room, skies_for
 from scenes.job.skies import Skies
 from scenes.job.windows import everywhere
@@ -48,7 +49,7 @@ def _computed(case: Case) -> CaseResult:
     start = time.monotonic()
     if case.program != program_version():
         raise DataError("this process runs another version of the program than the study's")
-    for source in (case.bsdf, case.thermal, case.weather, case.building):
+    for source in case.files:
         if isinstance(source, Source) and Source.of(source.path) != source:
             raise DataError("is not the file that it was when the study began", file=source.path)
     variants.activate()
@@ -59,10 +60,10 @@ def _computed(case: Case) -> CaseResult:
     cache = MatrixCache.of_user()
     room = compute_room(
         building, space, everywhere(space, system), weather, case.options,
+        operation=None if case.operation is None else read_operation(case.operation.path),
         skies=skies, cache=cache, pictures=False,
     )  # fmt: skip
-    figures, arrays = _figures(room, case)
-    arrays["times"] = weather.midpoints.to_numpy().astype("datetime64[s]").astype(np.int64)
+    figures, arrays = room_figures(room)
     if case.glare != "none":
         begin = time.monotonic()
         hours = _rated_hours(weather, case.options.occupied)
@@ -137,7 +138,7 @@ def glare_figures(
     return found
 
 
-def _figures(room: SpaceResult, case: Case) -> tuple[dict[str, float | str], dict[str, NDArray]]:
+def room_figures(room: SpaceResult) -> tuple[dict[str, float | str], dict[str, NDArray]]:
     """Daylight, temperatures and comfort as figures of the table and arrays of the report."""
     daylight, heat = room.daylight, room.thermal
     figures: dict[str, float | str] = {k: float(v) for k, v in daylight.room_metrics.items()}
@@ -147,8 +148,12 @@ def _figures(room: SpaceResult, case: Case) -> tuple[dict[str, float | str], dic
     figures |= {k: float(v) for k, v in heat.comfort_summary.items()}
     window = heat.fenestration[0]
     figures |= {k: float(v) for k, v in window.items() if not isinstance(v, str)}
+    if room.operation is not None:
+        figures |= {k: float(v) for k, v in room.operation.summary.items()}
     figures |= {f"{stage}_s": seconds for stage, seconds in room.seconds.items()}
+    times = heat.temperatures.index.to_numpy().astype("datetime64[s]")
     arrays: dict[str, NDArray] = {
+        "times": times.astype(np.int64),
         "points": daylight.points,
         "relative_error": daylight.relative_error,
         "mean_illuminance": daylight.illuminance.mean(axis=0),

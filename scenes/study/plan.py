@@ -20,6 +20,7 @@ class Plan:
 
     cases: tuple[Case, ...]
     rooms: dict[str, tuple[Building, Space]]  # by `Case.scene`
+    predicted: float | None = None  # time of the cases whose method `auto` chose [s]
 
 
 def plan_of(study: StudyFile) -> Plan:
@@ -40,6 +41,7 @@ def plan_of(study: StudyFile) -> Plan:
             }
         )
     climates = [{"climate": c.name, "weather": Source.of(c.weather)} for c in study.climate]
+    operation = None if study.operation is None else Source.of(study.operation)
     found: list[Case] = []
     rooms = {}
     for room in study.room:
@@ -52,6 +54,7 @@ def plan_of(study: StudyFile) -> Plan:
                 "space_name": room.name if room.box else space.name or space.guid,
                 "building": source,
                 "specular": room.specular,
+                "operation": operation,
             }
             of_space = list(_of_space(study, about, systems, climates))
             rooms[of_space[0].scene] = building, space

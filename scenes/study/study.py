@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from bim.model import Problem, Space
 from mitsuba_cfs.progress import Progress, silent
+from scenes.calibration.durations import spoken_time
 from scenes.report.glare_figures import compass
 from scenes.study.case import Case
 from scenes.study.one_case import compute_case
@@ -28,12 +29,24 @@ class StudyResult:
     results: tuple[CaseResult, ...]  # of each case of the plan
     reused: int  # cases that an earlier run had finished
     seconds: float
-    notes: tuple[str, ...] = field(default=())
 
     @property
     def failed(self) -> int:
         """How many cases have no result."""
         return sum(bool(result.error) for result in self.results)
+
+    @property
+    def clock(self) -> str:
+        """Predicted and actual time of the cases whose method `auto` chose, in words."""
+        pairs = zip(self.plan.cases, self.results, strict=True)
+        seconds = [r.figures["seconds"] for case, r in pairs if case.chosen and not r.error]
+        if self.plan.predicted is None or not seconds:
+            return ""
+        taken, predicted = sum(seconds), self.plan.predicted
+        return (
+            f"predicted {spoken_time(predicted)}, took {spoken_time(taken)}: "
+            f"{taken / predicted:.2f} times the prediction"
+        )
 
     @property
     def problems(self) -> tuple[Problem, ...]:
@@ -128,7 +141,7 @@ def manifest(study: StudyFile, plan: Plan) -> dict:
     """What makes the same table again: the study, and the hashes of its files."""
     files = {}
     for case in plan.cases:
-        for source in (case.bsdf, case.thermal, case.weather, case.building):
+        for source in case.files:
             if path := getattr(source, "path", None):
                 files[str(path)] = source.sha256
     return {

@@ -20,8 +20,10 @@ from pydantic import (
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
+from scenes.job.operation import read_operation
 from scenes.job.options import RoomOptions
 
+OF_THE_GRID = ("method", "annual_glare")
 Name = Annotated[str, Field(min_length=1)]
 
 
@@ -71,11 +73,11 @@ class AutoTable(_Table):
 
 
 def _options_table() -> type[BaseModel]:
-    """The options of a room without its method, which the grid has; no number is negative."""
+    """The options of a room without those that the study has keys for; no number is negative."""
     hints = get_type_hints(RoomOptions)
     columns: dict[str, Any] = {}
     for field in fields(RoomOptions):
-        if field.name != "method":
+        if field.name not in OF_THE_GRID:
             kind = hints[field.name]
             if kind in (int, float):
                 kind = Annotated[kind, Field(ge=0)]
@@ -99,6 +101,7 @@ class StudyFile(_Table):
         Field(min_length=1),
     ] = (RoomOptions().method,)
     glare: Literal["DGP", "eDGP", "sDGP", "none"] = "DGP"  # of every occupied hour with sun
+    operation: Path | None = None  # control, gains, air, set points: as for `cfs run`
     auto: AutoTable = AutoTable()
     options: OptionsTable = OptionsTable()
 
@@ -177,4 +180,9 @@ def _with_places(study: StudyFile, path: Path) -> StudyFile:
             update = {} if name is None else {file: there(name, f"{key}.{number}.{file}")}
             entries.append(entry.model_copy(update=update))
         found[key] = tuple(entries)
+    if study.operation is not None:
+        found["operation"] = there(study.operation, "operation")
+        if read_operation(found["operation"]).systems:
+            message = "the systems of a study are its own: leave [[system]] out"
+            raise DataError(message, file=found["operation"], field="system")
     return study.model_copy(update=found)

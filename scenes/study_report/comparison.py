@@ -19,7 +19,8 @@ SHAPES = ("round", "square", "diamond", "ring")
 COLUMNS = (
     "sda300_50", "ase1000_250", "da300", "udi_300_3000", "daylight_factor", "dgp_max",
     "glare_perceptible_h", "glare_disturbing_h", "glare_intolerable_h", "glare_protection",
-    "comfortable_80_h", "warm_h", "operative_max_c", "illuminance_error_mean", "seconds",
+    "comfortable_80_h", "warm_h", "operative_max_c", "heating_kwh", "cooling_kwh",
+    "illuminance_error_mean", "seconds",
 )  # fmt: skip
 
 
@@ -134,7 +135,7 @@ def comparison_table(study: StudyResult) -> tables.Table:
     columns = [c for c in COLUMNS if c in present]
     headings = (
         tables.Column("Case", meaning="Number of the case; choose it below."),
-        tables.Column("What", numeric=False),
+        tables.Column("What", numeric=False, short=True),
         tables.Column("Method", numeric=False, short=True),
         *(label_of(c) for c in columns),
     )
@@ -149,9 +150,7 @@ def comparison_table(study: StudyResult) -> tables.Table:
 def _shown(column: str, value: float | str | None) -> str:
     if isinstance(value, str):
         return value
-    digits = 0 if column.endswith("_h") or quantity(column).unit == "%" else 2
-    digits = 1 if column in ("operative_max_c", "seconds", "illuminance_error_mean") else digits
-    return cell(value, 1 if column == "daylight_factor" else digits)
+    return cell(value, 1 if column == "daylight_factor" else quantity(column).digits)
 
 
 def failures_table(study: StudyResult) -> tables.Table:

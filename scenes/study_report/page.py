@@ -111,6 +111,7 @@ def inputs_table(study: StudyResult) -> tables.Table:
             ("Fenestration", case.bsdf),
             ("Its thermal values", case.thermal),
             ("Weather", case.weather),
+            ("Operation", case.operation),
         ):
             if path := getattr(source, "path", None):
                 found[kind, path] = source.sha256

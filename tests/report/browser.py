@@ -52,6 +52,20 @@ addEventListener("load", () => setTimeout(() => {
     setTimeout(() => done(canvas.toDataURL()), 20);
   });
   const use = async () => {
+    //USE//
+  };
+  use().catch((e) => faults.push(String(e))).finally(() => {
+    report.faults = faults;
+    const out = document.createElement("pre");
+    out.id = "inspection";
+    out.textContent = JSON.stringify(report);
+    document.body.append(out);
+  });
+}, 300));
+</script>"""
+
+# What is done on the page of a run, and what is reported of it
+USE = """
     const pictures = [await later(() => {})];
     pictures.push(await later(() => click("viewer-outdoors")));
     pictures.push(await later(() => choose("viewer-layer", "1")));
@@ -73,16 +87,7 @@ addEventListener("load", () => setTimeout(() => {
     plot.dispatchEvent(new PointerEvent("pointermove", {
       clientX: at.left + at.width * 171.5 / 365, clientY: at.top + at.height * 11.5 / 24 }));
     report.tip = document.querySelector(".tip").textContent;
-  };
-  use().catch((e) => faults.push(String(e))).finally(() => {
-    report.faults = faults;
-    const out = document.createElement("pre");
-    out.id = "inspection";
-    out.textContent = JSON.stringify(report);
-    document.body.append(out);
-  });
-}, 300));
-</script>"""
+"""
 
 
 def chromium() -> str | None:
@@ -91,7 +96,7 @@ def chromium() -> str | None:
     return next((found for name in names if (found := shutil.which(name))), None)
 
 
-def inspect(page: str, folder: Path, *flags: str, width: int = 1400) -> dict:
+def inspect(page: str, folder: Path, *flags: str, width: int = 1400, use: str = USE) -> dict:
     """What the page reports on itself at that width.
 
     Chromium's window is at least 500 pixels wide: for a phone the page's body is made narrower.
@@ -99,7 +104,7 @@ def inspect(page: str, folder: Path, *flags: str, width: int = 1400) -> dict:
     file = folder / "inspected.html"
     narrow = f"<style>body {{ width: {width}px; }}</style>" if width < 500 else ""
     watched = page.replace("<head>", "<head>" + LISTEN, 1).replace("</head>", narrow + "</head>")
-    watched = watched.replace("</body>", INSPECT + "</body>")
+    watched = watched.replace("</body>", INSPECT.replace("//USE//", use) + "</body>")
     file.write_text(watched, encoding="utf-8")
     command = [
         chromium(), "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",

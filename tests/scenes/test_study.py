@@ -96,6 +96,7 @@ def test_a_case_is_known_by_what_its_numbers_depend_on(tmp_path):
         {"glare": "sDGP"},
         {"space": "another"},
         {"program": "newer"},
+        {"operation": case.bsdf},
     ):
         assert replace(case, **other).key != case.key, other
 
@@ -112,7 +113,9 @@ def own_cache(tmp_path_factory):
 def done(tmp_path_factory):
     """A study of two orientations and two systems that are computed, as the command does it."""
     folder = tmp_path_factory.mktemp("study")
-    head = 'title = "Blinds"\norientations_deg = [0, 90]\nmethods = ["three-phase"]\n'
+    (folder / "set points.toml").write_text("[loads]\nheating_c = 20\ncooling_c = 26\n")
+    head = 'operation = "set points.toml"\n'
+    head += 'title = "Blinds"\norientations_deg = [0, 90]\nmethods = ["three-phase"]\n'
     path = study_file(folder, head + 'glare = "sDGP"\n', system=SYSTEM + SECOND)
     assert run(["study", str(path), "--out", str(folder / "out")]) == 0
     return path, folder / "out"
@@ -131,8 +134,8 @@ def test_one_row_a_case_with_all_its_figures(done):
     # the second system differs in heat alone
     by_system = table.groupby("system")
     assert by_system["da300"].apply(list)["blind"] == by_system["da300"].apply(list)["brighter"]
-    warmer = by_system["operative_max_c"].mean()
-    assert warmer["brighter"] > warmer["blind"] + 1
+    cooled, heated = (by_system[f"{what}ing_kwh"].mean() for what in ("cool", "heat"))
+    assert cooled["brighter"] > 1.2 * cooled["blind"] and heated["brighter"] < heated["blind"]
     assert not list(done[1].rglob(".*")), "temporary files are gone"
 
 
@@ -140,7 +143,8 @@ def test_a_turned_model_is_a_room_that_faces_elsewhere(done, tmp_path):
     """By 90 degrees: as a box whose front looks west, traced for itself."""
     west = BOX.replace("width = 3.0", "facing_deg = 270\nwidth = 3.0", 1)
     path = tmp_path / "west.toml"
-    head = 'methods = ["three-phase"]\nglare = "sDGP"\n'
+    (tmp_path / "set points.toml").write_text("[loads]\nheating_c = 20\ncooling_c = 26\n")
+    head = 'operation = "set points.toml"\nmethods = ["three-phase"]\nglare = "sDGP"\n'
     path.write_text(head + west + SYSTEM + CLIMATE + FEW_RAYS)
     found = run_study(read_study(path), Store(tmp_path / "out")).results[0].figures
     turned = pd.read_parquet(done[1] / "results.parquet").iloc[2]
@@ -148,6 +152,7 @@ def test_a_turned_model_is_a_room_that_faces_elsewhere(done, tmp_path):
     noise = 5 * np.hypot(turned["illuminance_error_mean"], found["illuminance_error_mean"]) / 100
     assert found["mean_illuminance_lx"] == pytest.approx(turned["mean_illuminance_lx"], rel=noise)
     assert found["operative_mean_c"] == pytest.approx(turned["operative_mean_c"], abs=0.3)
+    assert found["cooling_kwh"] == pytest.approx(turned["cooling_kwh"], rel=noise)
 
 
 def test_finished_cases_are_not_computed_again(done, capsys):

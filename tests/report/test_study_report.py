@@ -1,0 +1,139 @@
+"""The report of a study: self-contained, complete, and used in headless Chromium."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bim.model import Problem
+from scenes.study.case import Case, Source
+from scenes.study.one_case import glare_figures, room_figures
+from scenes.study.plan import Plan
+from scenes.study.store import CaseResult
+from scenes.study.study import StudyResult
+from scenes.study_report.page import study_report_html
+from tests.report.browser import chromium, inspect
+from tests.report.synthetic import run_result
+
+USE = """
+    const shown = () => [...document.querySelectorAll("section.case")]
+      .filter((s) => !s.hidden).map((s) => s.dataset.case);
+    report.shown = [shown()];
+    document.querySelector("button.dot[data-case='3']").click();
+    report.shown.push(shown());
+    choose("case-choice", "2");
+    report.shown.push(shown());
+    click("case-next");
+    report.shown.push(shown());
+    report.pressed = [...document.querySelectorAll("button.dot[aria-pressed='true']")]
+      .map((d) => d.dataset.case);
+    const pictures = [await later(() => {})];
+    pictures.push(await later(() => choose("viewer-layer", "3")));
+    pictures.push(await later(() => choose("viewer-room", "1")));
+    pictures.push(await later(() => click("viewer-top")));
+    report.scenes = new Set(pictures).size;
+    report.scalesShown = [...document.querySelectorAll("#viewer-scales > div")]
+      .findIndex((e) => !e.hidden);
+    const table = document.querySelector("[data-table='All cases'] table");
+    const headings = [...table.tHead.rows[0].cells];
+    const column = headings.findIndex((c) => c.textContent.includes("DA 300"));
+    headings[column].click();
+    report.column = [...table.tBodies[0].rows].map((r) => Number(r.cells[column].textContent));
+"""
+
+
+class AnyWeather:
+    """Eight thousand hours, as far as the figures of glare ask."""
+
+    times, step_h = range(8760), 1.0
+
+
+def study(systems: int = 2, failed: bool = True) -> StudyResult:
+    """Two rooms with some systems, from the made-up run; one case without a result."""
+    run = run_result(picture_size=48, pictures=1)
+    none = Source(Path("nowhere"), "0")
+    cases, results, rooms = [], [], {}
+    for room in run.spaces:
+        for number in range(systems):
+            case = Case(
+                room="house.ifc", space=room.space.guid, space_name=room.space.name, building=none,
+                specular=False, system=f"system <{number}>", bsdf=none, thermal=none, u_value=None,
+                g_value=None, climate="Lyon", weather=none, orientation_deg=0.0,
+                options=OPTIONS, operation=None, program="", glare="DGP",
+            )  # fmt: skip
+            heat = room.thermal
+            dim = replace(
+                room.daylight,
+                room_metrics=room.daylight.room_metrics | {"da300": 70.0 - 9 * number},
+            )
+            figures, arrays = room_figures(replace(room, thermal=heat, daylight=dim))
+            used = arrays["comfort/occupied"]
+            dgp = 0.3 + 0.2 * np.random.default_rng(number).random(int(used.sum()))
+            figures |= glare_figures(dgp, AnyWeather(), (8, 18)) | {"seconds": 1.0 + number}
+            arrays["dgp"] = np.where(used, 0.0, np.nan).astype(np.float32)
+            arrays["dgp"][used] = dgp
+            rooms[case.scene] = run.building, room.space
+            cases.append(case)
+            results.append(CaseResult(case.key, figures, arrays))
+    if failed:
+        cases.append(replace(cases[-1], system="broken"))
+        results.append(CaseResult(cases[-1].key, error="broken.xml: has <no> band"))
+    return StudyResult("Blinds & shades", Plan(tuple(cases), rooms), tuple(results), 1, 12.0)
+
+
+def options():
+    """The options of a room, without which no case is."""
+    from scenes.job.options import RoomOptions
+
+    return RoomOptions(method="five-phase")
+
+
+OPTIONS = options()
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return study_report_html(study())
+
+
+def test_nothing_is_fetched_and_all_is_escaped(page):
+    assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", page)
+    visible = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert "system &lt;0&gt;" in visible and "system <0>" not in visible
+    assert "Blinds &amp; shades" in page
+
+
+def test_all_that_a_reader_asks_for_is_there(page):
+    for words in (
+        "Daylight against glare", "Glare classes of the occupied hours", "Glare through the year",
+        "Adaptive comfort", "Temperature duration", "Relative standard error", "five-phase, DGP",
+        "broken.xml: has &lt;no&gt; band", "wall without material", "UDI 300",
+    ):  # fmt: skip
+        assert words in page, words
+    assert page.count('<section class="case"') == 4 and len(page) < 5e6
+
+
+def test_problems_of_the_building_are_those_of_its_file():
+    found = study()
+    assert Problem in {type(p) for p in found.problems}
+    assert len(found.problems) == len({(p.where, p.what) for p in found.problems})
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+@pytest.mark.parametrize("width", [1400, 375], ids=["wide", "phone"])
+def test_page_works_in_a_browser(page, tmp_path, width):
+    found = inspect(page, tmp_path, width=width, use=USE)
+    assert found["faults"] == []
+    assert found["scroll"] <= found["width"], "the page scrolls sideways"
+    assert found["overlaps"] == [] and found["clipped"] == []
+    sizes = {name: size for name, *size in found["figures"] if size and size[0][0]}
+    for name in ("Daylight against glare", "DA 300", "Glare through the year", "3D model"):
+        assert all(w >= 100 and h >= 90 for w, h in sizes[name]), (name, sizes.get(name))
+    assert found["shown"] == [["1"], ["3"], ["2"], ["3"]] and found["pressed"] == ["3"]
+    assert found["scenes"] == 4, "a control of the 3D view changed nothing"
+    assert found["scalesShown"] == 3
+    assert found["column"] == sorted(found["column"]) and len(found["column"]) == 4

@@ -1,0 +1,115 @@
+"""The examples in docs/ and README.md: Python is run, study files are read."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from tests.conftest import REPOSITORY
+
+PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FILES = {  # the names that the pages use
+    "blind.xml": VENETIAN_BLIND, "blind.toml": VENETIAN_BLIND.with_suffix(".toml"),
+    "shade.xml": VENETIAN_BLIND, "CITY.epw": WEATHER, "city.epw": WEATHER, "Lyon.epw": WEATHER,
+    "house.ifc": OFFICE, "office.ifc": OFFICE,
+}  # fmt: skip
+
+
+def examples(page: Path, language: str) -> list[str]:
+    """The page's examples in a language."""
+    return [code for kind, code in FENCE.findall(page.read_text("utf-8")) if kind == language]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the files that the pages name, as the working directory."""
+    from mitsuba_cfs.images.hdr import write_hdr
+    from mitsuba_cfs.images.view import fisheye
+
+    for name, source in FILES.items():
+        shutil.copy(source, tmp_path / name)
+    view = fisheye((0, 0, 0), (0, 1, 0), 64)
+    write_hdr(tmp_path / "desk.hdr", np.full((64, 64), 100.0, np.float32), view)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path / "cache"))
+    return tmp_path
+
+
+def given(page: str) -> dict:
+    """What a page's examples take for granted."""
+    if page != "glare.md":
+        return {}
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.sky.patches import ReinhartSky
+    from mitsuba_cfs.trace.systems import sun_scattering
+    from scenes.benchmarks import room
+
+    P, K, H = ReinhartSky(4).size, KLEMS_FULL.size, 4
+    sky = np.full((P, H), 1000.0, dtype=np.float32)
+    return {
+        "pictures_of_the_year": [np.full((64, 64), 100.0, dtype=np.float32)],
+        "interior": room.room(), "exterior": room.NOTHING, "groups": room.window_groups(),
+        "view": fisheye((1.8, 2.0, 1.2), (0, -1, 0), 48),
+        "scattering": [sun_scattering(read_bsdf_xml(VENETIAN_BLIND).band("Visible"))],
+        "T_D_s": np.full((1, K, H), 200.0), "T_Dd_sd": np.zeros((1, K, H)),
+        "D": np.full((1, K, P), 1.0 / P), "D_d": np.zeros((1, K, P)), "sky": sky, "s_d": 0 * sky,
+        "sun_directions": np.tile([0.0, -0.8, 0.6], (H, 1)), "direct_normal": np.full(H, 5e4),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if examples(page, "python")], ids=lambda page: page.name
+)
+def test_python_examples_run(page, folder, variant):
+    """Those of a page one after the other, with one another's names."""
+    names = given(page.name)
+    for number, code in enumerate(examples(page, "python"), 1):
+        exec(compile(code, f"{page.name}, example {number}", "exec"), names)
+
+
+def test_study_files_in_the_docs_are_read(folder):
+    from scenes.study.study_file import read_study
+
+    found = examples(REPOSITORY / "docs" / "studies.md", "toml")
+    for code in found:
+        path = folder / "study.toml"
+        path.write_text(code)
+        read_study(path)
+    assert found
+
+
+def test_commands_in_the_docs_exist():
+    """Every `cfs NAME` at the start of a line of an example, with options that it has."""
+    import click
+
+    from scenes import cli
+
+    context = click.Context(cli.cfs)
+    for page in PAGES:
+        blocks = re.findall(r"^```\w*\n(.*?)^```$", page.read_text("utf-8"), re.M | re.S)
+        for line in re.findall(r"^cfs .*$", "\n".join(blocks).replace("\\\n", " "), re.M):
+            words = line.partition("#")[0].split()
+            command, depth = cli.cfs, 1
+            while isinstance(command, click.Group) and len(words) > depth:
+                name = words[depth]
+                if name.startswith("-"):
+                    break
+                found = command.get_command(context, name)
+                assert found is not None, f"{page.name}: {line}"
+                command, depth = found, depth + 1
+            known = {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
+            wrong = [w for w in words[depth:] if w.startswith("--") and w not in known]
+            assert not (wrong and not passes_on(command)), f"{page.name}: {line}: {wrong}"
+
+
+def passes_on(command) -> bool:
+    """Commands that take another program's options as they are."""
+    return command.context_settings.get("ignore_unknown_options", False)
