@@ -79,8 +79,7 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     depth = source.mean(axis=1) @ direction
     middle = np.average(depth[facing], weights=areas[facing])
     plane = plane_through(source[0, 0] + (middle - source[0, 0] @ direction) * direction, direction)
-    silhouette = shadow(filling.triangles, plane)
-    opening = silhouette if filling.opening is None else shadow(filling.opening, plane)
+    opening = shadow(filling.triangles if filling.opening is None else filling.opening, plane)
     if opening.area < SMALLEST_PANE:
         return None, [Problem(filling.guid, f"{filling.name}: opening has no area", "left out")]
     if filling.opening is None and filling.ifc_class.startswith("IfcWindow"):

@@ -63,7 +63,7 @@ def _covering(window: Window, own: set[str], elements, mesh, owner) -> set[int]:
     directions = hemisphere(window.normal, RAYS)
     directions = np.tile(directions[directions @ window.normal > GRAZING], (len(points), 1))
     origins = np.repeat(points, len(directions) // len(points), axis=0)
-    mine = np.array([elements[i].guid in own for i in owner])
+    mine = np.array([element.guid in own for element in elements])[owner]
     cover = np.full(len(origins), -1)
     travelled, going = np.zeros(len(origins)), np.ones(len(origins), dtype=bool)
     for _ in range(8):  # the window's own panes and frame do not count

@@ -65,7 +65,13 @@ def newell_normal(ring: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def area_vectors(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area vectors [T, 3] [m2] of triangles [T, 3, 3]."""
-    return 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    # written out: np.cross takes nearly three times as long on few triangles
+    a = triangles[:, 1] - triangles[:, 0]
+    b = triangles[:, 2] - triangles[:, 0]
+    x = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    y = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    z = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return 0.5 * np.stack([x, y, z], axis=1)
 
 
 def planar_facets(

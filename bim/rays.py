@@ -11,18 +11,17 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-LEAF = 4  # triangles in a leaf of the tree
+LEAF = 4  # triangles in a leaf of the tree at the most
 DEEPEST = 64  # stack of the walk: the tree halves at every level
 
 
 @dataclass(frozen=True, slots=True)
 class RayMesh:
-    """Triangles with a tree of boxes over them."""
+    """Triangles with a full binary tree of boxes over them: children of node i at 2 i + 1, + 2."""
 
     triangles: NDArray[np.float64]  # [N, 3, 3]
-    order: NDArray[np.int64]  # [N] triangles by leaf
-    boxes: NDArray[np.float64]  # [B, 6] low corner, high corner
-    nodes: NDArray[np.int64]  # [B, 3] first triangle and count (leaf), or right child and 0
+    leaves: NDArray[np.int64]  # [L, k] triangles of each leaf; some twice, so that all hold k
+    boxes: NDArray[np.float64]  # [2 L - 1, 6] low corner, high corner
 
     def first_hits(
         self,
@@ -40,45 +39,44 @@ class RayMesh:
         if not len(self.triangles) or not len(origins):
             return np.full(len(origins), np.inf), np.full(len(origins), -1, dtype=np.int64)
         return _first_hits(
-            origins, directions, float(reach), self.triangles, self.order, self.boxes, self.nodes
+            origins, directions, float(reach), self.triangles, self.leaves, self.boxes
         )
 
 
 def ray_mesh(triangles: NDArray[np.float64]) -> RayMesh:
-    """Tree over triangles [N, 3, 3]: halves by the middle triangle along the longest side."""
+    """Tree over triangles [N, 3, 3]: each level halved by the middle along its longest side."""
     triangles = np.ascontiguousarray(triangles, dtype=float).reshape(-1, 3, 3)
+    count = len(triangles)
+    if not count:
+        return RayMesh(triangles, np.empty((0, LEAF), dtype=np.int64), np.empty((0, 6)))
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     middle = 0.5 * (low + high)
-    order = np.arange(len(triangles))
-    boxes: list[NDArray[np.float64]] = []
-    nodes: list[list[int]] = []
-
-    def build(start: int, stop: int) -> None:
-        index = order[start:stop]
-        boxes.append(np.concatenate([low[index].min(axis=0), high[index].max(axis=0)]))
-        here = len(nodes)
-        nodes.append([start, stop - start, 0])
-        if stop - start <= LEAF:
-            return
-        spread = np.ptp(middle[index], axis=0)
-        order[start:stop] = index[np.argsort(middle[index, spread.argmax()], kind="stable")]
-        half = (start + stop) // 2
-        build(start, half)
-        nodes[here] = [len(nodes), 0, 0]
-        build(half, stop)
-
-    if len(triangles):
-        build(0, len(triangles))
-    return RayMesh(triangles, order, np.array(boxes).reshape(-1, 6), np.array(nodes).reshape(-1, 3))
+    levels = max(int(np.ceil(np.log2(count / LEAF))), 0)
+    size = -(-count // 2**levels)
+    parts = np.resize(np.arange(count), (1, size * 2**levels))  # the first ones again at the end
+    for _ in range(levels):
+        points = middle[parts]
+        axis = np.ptp(points, axis=1).argmax(axis=1)
+        keys = np.take_along_axis(points, axis[:, None, None], axis=2)[..., 0]
+        half = parts.shape[1] // 2
+        halves = np.take_along_axis(parts, np.argpartition(keys, half, axis=1), axis=1)
+        parts = halves.reshape(-1, half)
+    boxes = [np.concatenate([low[parts].min(axis=1), high[parts].max(axis=1)], axis=1)]
+    while len(boxes[0]) > 1:
+        pairs = boxes[0].reshape(-1, 2, 6)
+        joined = [pairs[..., :3].min(axis=1), pairs[..., 3:].max(axis=1)]
+        boxes.insert(0, np.concatenate(joined, axis=1))
+    return RayMesh(triangles, parts, np.concatenate(boxes))
 
 
 @numba.njit(cache=True)
-def _first_hits(origins, directions, reach, triangles, order, boxes, nodes):
-    """Walk the tree for each ray; the left child of node i is i + 1."""
+def _first_hits(origins, directions, reach, triangles, leaves, boxes):
+    """Walk the tree for each ray."""
     count = len(origins)
     distance = np.full(count, np.inf)
     hit = np.full(count, -1, dtype=np.int64)
     stack = np.empty(DEEPEST, dtype=np.int64)
+    inner = len(boxes) - len(leaves)
     for r in range(count):
         o, d = origins[r], directions[r]
         best = reach
@@ -89,17 +87,17 @@ def _first_hits(origins, directions, reach, triangles, order, boxes, nodes):
             top -= 1
             if not _meets(o, d, boxes[node], best):
                 continue
-            if nodes[node, 1] == 0:
-                stack[top + 1] = nodes[node, 0]
-                stack[top + 2] = node + 1
+            if node < inner:
+                stack[top + 1] = 2 * node + 2
+                stack[top + 2] = 2 * node + 1
                 top += 2
                 continue
-            for k in range(nodes[node, 0], nodes[node, 0] + nodes[node, 1]):
-                t = _distance(o, d, triangles[order[k]])
+            for k in leaves[node - inner]:
+                t = _distance(o, d, triangles[k])
                 if t < best:
                     best = t
                     distance[r] = t
-                    hit[r] = order[k]
+                    hit[r] = k
     return distance, hit
 
 
