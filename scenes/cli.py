@@ -21,6 +21,7 @@ COMMANDS = {
     "bsdf": "Read, check, plot and make BSDF files.",
     "sky": "Sun positions and sky matrices of a weather file.",
     "glare": "Glare indices of a fisheye luminance image.",
+    "picture": "Luminance picture of a room under the sky of an hour.",
     "dgp": "Glare of a room's views in every hour of a year.",
     "thermal": "Gains, temperatures and comfort of a room, hour by hour.",
     "study": "Many variants from one study file.",

@@ -91,6 +91,21 @@ def fisheye(position: ArrayLike, direction: ArrayLike, size: int = 800, **change
     return replace(plain, **changes)
 
 
+def fitted(view: View, size: int) -> View:
+    """The view with square pixels, `size` of them along its longer side."""
+    half_x, half_y = _half_sizes(view)
+    lengths = {
+        "perspective": (np.tan(half_x), np.tan(half_y)),
+        "parallel": (view.horizontal_deg, view.vertical_deg),  # which are lengths [m]
+        "cylindrical": (half_x, np.tan(half_y)),
+        "hemispherical": (np.sin(half_x), np.sin(half_y)),
+        "angular": (half_x, half_y),
+        "planispheric": (np.tan(half_x / 2), np.tan(half_y / 2)),
+    }[view.kind]
+    width, height = (max(1, round(size * a / max(lengths))) for a in lengths)
+    return replace(view, width=width, height=height)
+
+
 def frame(view: View) -> NDArray[np.float64]:
     """Rows right, up, forward [3, 3] of the picture in the world."""
     forward = np.asarray(view.direction)

@@ -1,0 +1,81 @@
+"""`cfs picture`: a luminance picture of a room under the sky of an hour."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import click
+
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.view_picture import (
+    SUFFIXES,
+    PictureOptions,
+    room_picture,
+    write_picture,
+)
+
+FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+
+
+@click.command()
+@click.argument("building", type=FILE, required=False, metavar="[BUILDING.ifc]")
+@click.option("--weather", type=FILE, default=WEATHER, help="EPW file, hourly [the demo's].")
+@click.option(
+    "--cfs", "system", type=FILE, default=VENETIAN_BLIND, help="BSDF XML file [the demo's]."
+)
+@click.option(
+    "--at", required=True, metavar="'MM-DD HH:MM'", help="The hour of the weather that holds it."
+)
+@click.option("--space", help="Name or GUID of the room; default: the first with a window.")
+@click.option(
+    "--view", metavar="'-vta ...'|FILE.vf",
+    help="View in Radiance's syntax, any kind; default: the room's middle, to its window.",
+)  # fmt: skip
+@click.option("--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True)
+@click.option(
+    "--size", type=click.IntRange(16, 4096), default=800, show_default=True,
+    help="Pixels of the longer side.",
+)  # fmt: skip
+@click.option(
+    "--samples", type=click.IntRange(1, 4096), default=16, show_default=True,
+    help="Paths of a pixel.",
+)  # fmt: skip
+@click.option("--tone", is_flag=True, help="PNG tone-mapped for the eye, not in falsecolour.")
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option(
+    "--out", "files", type=click.Path(dir_okay=False, path_type=Path), multiple=True, required=True,
+    help=f"File to write ({', '.join(SUFFIXES)}); may be repeated.",
+)  # fmt: skip
+def command(building: Path | None, files: tuple[Path, ...], tone: bool, **chosen) -> None:
+    """Luminance picture of a room under the sun and sky of an hour, path-traced.
+
+    Without BUILDING the demo's office.
+    """
+    for file in files:
+        if file.suffix not in SUFFIXES:
+            raise click.UsageError(f"--out {file}: expected one of {', '.join(SUFFIXES)}")
+        if not file.absolute().parent.is_dir():
+            raise click.UsageError(f"--out {file}: no such folder")
+    from mitsuba_cfs.glare.evaluation import evaluate
+    from scenes.commands.progress_bar import ProgressBar
+
+    start = time.perf_counter()
+    with ProgressBar() as progress:
+        try:
+            found = room_picture(PictureOptions(building or OFFICE, **chosen), progress)
+        except ValueError as error:
+            if type(error) is not ValueError:
+                raise
+            raise click.UsageError(str(error)) from None
+    for file in files:
+        write_picture(found, file, print_like=tone)
+    view, lit = found.view, found.luminance
+    says = f"{found.room}, {found.time:%d %B %H:%M}: {view.width} x {view.height} pixels"
+    if (
+        view.kind in ("angular", "hemispherical")
+        and view.horizontal_deg == view.vertical_deg == 180
+    ):
+        rated = evaluate(lit, view)
+        says += f", Ev {rated.Ev:,.0f} lx, DGP {rated.dgp:.3f}, {rated.count} glare source(s)"
+    click.echo(f"{says}; {time.perf_counter() - start:.1f} s")

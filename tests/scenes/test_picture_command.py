@@ -1,0 +1,53 @@
+"""`cfs picture`: the demo's office in every format, other views, and what cannot be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.images.hdr import read_hdr
+from mitsuba_cfs.images.view import fitted, parse_view
+from scenes import cli
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+
+def test_one_picture_in_every_format(tmp_path, capsys):
+    from mitsuba_cfs.images.exr import read_exr
+
+    files = [tmp_path / f"desk{suffix}" for suffix in (".hdr", ".exr", ".png")]
+    outs = [word for file in files for word in ("--out", str(file))]
+    call = ["picture", "--at", "03-15 13:30", "--size", "48", "--samples", "2"]
+    assert cli.run([*call, *outs]) == 0
+    assert "48 x 48 pixels, Ev" in capsys.readouterr().out
+    picture = read_hdr(files[0])
+    exact, view = read_exr(files[1])
+    # a view's line keeps nine digits, a pixel eight bits
+    assert picture.view.position == pytest.approx(view.position, abs=1e-6)
+    assert picture.luminance == pytest.approx(exact, rel=0.01, abs=0.01 * float(np.median(exact)))
+    assert exact.max() > 500 and files[2].stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--at", "13-40 12:00", "--out", "a.hdr"], "expected month-day hour:minute"),
+        (["--at", "03-15 12:00", "--out", "a.jpg"], "expected one of .hdr"),
+        (["--at", "03-15 12:00", "--out", "none/a.hdr"], "no such folder"),
+        (["--at", "03-15 12:00", "--out", "a.hdr", "--view", "none.vf"], "cannot be read"),
+        (["--at", "03-15 12:00", "--out", "a.hdr", "--view", "-vta -vh 400"], "illegal size"),
+    ],
+)
+def test_what_cannot_be_is_told_in_a_line(words, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["picture", *words]) != 0
+    said = capsys.readouterr().err.strip()
+    assert message in said and "\n" not in said
+    assert not list(tmp_path.iterdir())
+
+
+def test_pixels_of_a_view_are_square():
+    wide = fitted(parse_view("-vtv -vp 0 0 1 -vd 0 1 0 -vh 90 -vv 53.1301"), 400)
+    assert (wide.width, wide.height) == (400, 200)
+    tall = fitted(parse_view("-vta -vp 0 0 1 -vd 0 1 0 -vh 90 -vv 180"), 400)
+    assert (tall.width, tall.height) == (200, 400)
