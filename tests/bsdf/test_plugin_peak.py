@@ -164,6 +164,23 @@ def test_isotropic_glass_lets_the_view_through_undisturbed(variant, mode, side):
     assert np.array(bsdf.eval(context(mode), si, to_mitsuba(-wi))).max() < 0.02
 
 
+@pytest.mark.parametrize("mode", ["Radiance", "Importance"])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_the_beam_is_that_of_the_side_the_light_comes_from(variant, mode, side):
+    import mitsuba as mi
+
+    from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
+
+    pane = TensorTreeBsdf(
+        transmission_front=isotropic_glass(0.8), transmission_back=isotropic_glass(0.3)
+    )
+    bsdf = mi.load_dict(tensor_tree_plugin(pane, up=UP, peak=True))
+    # in mode Radiance the light goes to where `wi` points, in mode Importance it comes from there
+    straight = 0.8 if (side > 0) == (mode == "Importance") else 0.3
+    weight = sampled(bsdf, context(mode), np.array([0.36, 0.48, 0.8 * side]), 5000, seed=1)[1]
+    assert weight.mean() == pytest.approx(straight + 0.05, rel=0.03)
+
+
 def test_an_isotropic_blind_keeps_all_it_lets_through(variant, real_data):
     """A real tree of rank 3: beam and rest add up to what it scatters without extraction."""
     path = real_data / "bsdf/tensortree/pyradiance_room_blindsT3.xml"
