@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -105,32 +106,35 @@ def compare(name: str, progress: Progress, *, samples: int, options: tuple[str, 
         lambda: genbsdf(samples, options), repeat=1, warm=False
     )
     progress(name, 0.7)
-    values, peers, truth = (relative_values(bsdf) for bsdf in (found, peer, reference()))
+    block = hardest_block(*(relative_values(bsdf) for bsdf in (found, peer, reference())))
     progress(name, 1.0)
     command = f"genBSDF -n {THREADS} -c {samples} +f +b -r '{' '.join(options)}' blind.rad"
+    call = f"generate_klems(samples={PATHS})"
     return Comparison(
         name,
-        "Klems full BSDF of a venetian blind, 4 x 145 x 145 [each block's mean]",
-        Run(
-            "mitsuba-cfs",
-            f"generate_klems(samples={PATHS})",
-            seconds,
-            processor,
-            rms_error(values, truth),
-        ),
-        Run("Radiance", command, peer_seconds, peer_processor, rms_error(peers, truth)),
-        note=hardest_block(values, peers, truth, processor, peer_processor),
+        "Klems full BSDF of a venetian blind, 4 x 145 x 145 [mean of the block]",
+        Run("mitsuba-cfs", call, seconds, processor, block.ours),
+        Run("Radiance", command, peer_seconds, peer_processor, block.peer),
+        note=f"errors of the block that is hardest on us, {block.name}",
     )
 
 
-def hardest_block(ours: NDArray, peers: NDArray, truth: NDArray, seconds, peer_seconds) -> str:
-    """The ratio in processor time of the block that is hardest on us, in words."""
-    ratios = [
-        peer_seconds * rms_error(theirs, true) ** 2 / (seconds * rms_error(own, true) ** 2)
-        for own, theirs, true in zip(ours, peers, truth, strict=True)
+@dataclass(frozen=True)
+class Block:
+    """One of the four blocks and both programs' root mean square errors over its mean."""
+
+    name: str
+    ours: float
+    peer: float
+
+
+def hardest_block(ours: NDArray, peers: NDArray, truth: NDArray) -> Block:
+    """Of values [4, N], the block in which the other program does best against us."""
+    blocks = [
+        Block(name.replace("_", " "), rms_error(own, true), rms_error(theirs, true))
+        for name, own, theirs, true in zip(BLOCKS, ours, peers, truth, strict=True)
     ]
-    worst = int(np.argmin(ratios))
-    return f"hardest block {BLOCKS[worst].replace('_', ' ')}: {ratios[worst]:.1f}"
+    return min(blocks, key=lambda block: block.peer / block.ours)
 
 
 BENCHMARKS = {

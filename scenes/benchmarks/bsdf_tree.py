@@ -17,7 +17,7 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf, square_to_disk
 from mitsuba_cfs.progress import Progress
 from scenes.benchmarks import radiance
 from scenes.benchmarks.bsdf_generate import BLOCKS, TUNED, blind, genbsdf, hardest_block
-from scenes.benchmarks.harness import THREADS, Comparison, Run, rms_error, timed
+from scenes.benchmarks.harness import THREADS, Comparison, Run, timed
 
 LEVELS, SAMPLES = 5, 100
 PAIRS, PATHS, REFERENCE_PATHS = 400_000, 2048, 16_384
@@ -64,17 +64,17 @@ def compare(name: str, progress: Progress) -> Comparison:
         lambda: genbsdf(SAMPLES, TUNED, levels=LEVELS), repeat=1, warm=False
     )
     progress(name, 0.6)
-    values, peers = relative_values(found), relative_values(peer)
     truth = reference() / reference().mean(axis=1, keepdims=True)
+    block = hardest_block(relative_values(found), relative_values(peer), truth)
     progress(name, 1.0)
     command = f"genBSDF -t4 {LEVELS} -n {THREADS} -c {SAMPLES} +f +b -r '{' '.join(TUNED)}'"
     call = f"generate_tensor_tree(levels={LEVELS}, samples={PATHS})"
     return Comparison(
         name,
-        f"tensor tree of 4^{LEVELS} cells a hemisphere of a venetian blind [each block's mean]",
-        Run("mitsuba-cfs", call, seconds, processor, rms_error(values, truth)),
-        Run("Radiance", command, peer_seconds, peer_processor, rms_error(peers, truth)),
-        note=hardest_block(values, peers, truth, processor, peer_processor),
+        f"tensor tree of 4^{LEVELS} cells a hemisphere of a venetian blind [mean of the block]",
+        Run("mitsuba-cfs", call, seconds, processor, block.ours),
+        Run("Radiance", command, peer_seconds, peer_processor, block.peer),
+        note=f"errors of the block that is hardest on us, {block.name}",
     )
 
 

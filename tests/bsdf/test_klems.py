@@ -113,6 +113,22 @@ def test_values_are_those_of_radiance(real_data, name):
 
 
 @pytest.mark.peer
+def test_a_basis_of_the_file_s_own_is_read_as_by_radiance(tmp_path):
+    basis = KlemsBasis("Mine", (0.0, 0.2, 0.7, 1.1, np.pi / 2), (1, 6, 10, 4))
+    blocks = np.random.default_rng(3).uniform(0.02, 0.12, (4, basis.size, basis.size))
+    path = tmp_path / "own.xml"
+    write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(basis, basis, *blocks)}), path, digits=9)
+    incident, outgoing = radiance.random_directions(10_000, seed=4)
+    theirs = radiance.query(path, incident, outgoing)
+    ours = evaluate(
+        radiance.perturbed(read_bsdf_xml(path).band("Visible")),
+        radiance.to_window(incident),
+        radiance.to_window(outgoing),
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=radiance.QUERY_TOLERANCE)
+
+
+@pytest.mark.peer
 @pytest.mark.parametrize("name", ASYMMETRIC_FILES)
 def test_hemispherical_values_are_those_of_radiance(real_data, name):
     path = real_data / "bsdf" / name

@@ -62,6 +62,16 @@ def test_clear_bodies_lose_nothing(variant, angle_deg):
         np.testing.assert_allclose(bsdf.scattered(side), 1, atol=2e-3)
 
 
+def test_the_long_face_of_a_prism_has_its_angle():
+    angle = np.radians(33)
+    triangles = prism_panel(INDEX, pitch=0.01, angle=angle, thickness=0.002).triangles
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    # outdoors; towards the room and down, as the panel is thicker above; the short level face
+    faces = [[0, 0, 1], [0, -np.sin(angle), -np.cos(angle)], [0, 1, 0]]
+    np.testing.assert_allclose(normals[::2], faces, atol=1e-12)
+
+
 def test_a_prism_bends_as_snell_says(variant):
     """Light at normal incidence from outside leaves the long face bent by asin(n sin a) - a."""
     angle = np.radians(20)

@@ -26,6 +26,19 @@ def test_the_holes_have_the_openness(make, openness):
 
 
 @pytest.mark.parametrize("make", [perforated_screen, woven_screen])
+def test_a_thick_sheet_has_two_faces_and_walls(make):
+    spacing, openness, thickness = 0.01, 0.3, 0.002
+    triangles = make(BLACK, spacing=spacing, openness=openness, thickness=thickness).triangles
+    if make is woven_screen:
+        outline = 4 * spacing * np.sqrt(openness)
+    else:  # 24 sides round the area of the hole
+        outline = 2 * spacing * np.sqrt(24 * openness * np.tan(np.pi / 24))
+    expected = 2 * (1 - openness) * spacing**2 + outline * thickness
+    assert area(triangles) == pytest.approx(expected, rel=1e-9)
+    assert (triangles[..., 2].min(), triangles[..., 2].max()) == pytest.approx((-0.001, 0.001))
+
+
+@pytest.mark.parametrize("make", [perforated_screen, woven_screen])
 def test_a_thin_black_sheet_passes_its_openness_at_every_angle(variant, make):
     layer = make(BLACK, spacing=0.01, openness=0.2, thickness=0.0)
     bsdf = generate_klems(layer, KLEMS_QUARTER, samples=4096, seed=1).bsdf[0]
