@@ -15,6 +15,8 @@ from bim.planes import Plane, area_vectors, plane_through, polygons_of
 FLAT = 0.95  # cosine: panes within 18 degrees of the main direction are in its plane
 SMALLEST_PANE = 0.01  # less glass than this is a spy hole, not a window [m2]
 OUTLINE = 0.004  # round openings become polygons this near [m]
+OUT_OF_WALL = 0.05  # glass this far outside its opening's depth is reported [m]
+ASTRAY = 0.3  # and from here on moved into the opening's middle [m]
 PANE_JOINT = 0.002  # gaps between drawn panes up to this are no frame [m]
 
 
@@ -79,6 +81,9 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     depth = source.mean(axis=1) @ direction
     middle = np.average(depth[facing], weights=areas[facing])
     plane = plane_through(source[0, 0] + (middle - source[0, 0] @ direction) * direction, direction)
+    if filling.opening is not None:
+        plane, more = _in_its_opening(filling, plane)
+        problems += more
     opening = shadow(filling.triangles if filling.opening is None else filling.opening, plane)
     if opening.area < SMALLEST_PANE:
         return None, [Problem(filling.guid, f"{filling.name}: opening has no area", "left out")]
@@ -95,6 +100,20 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
         glass, more = _assumed_glass(filling, opening)
         problems += more
     return Aperture(filling, plane, opening, glass), problems
+
+
+def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Problem]]:
+    """The glazing plane, moved to the middle of the opening where it was far off."""
+    heights = plane.to_plane(filling.opening)[..., 2]
+    off = max(heights.min(), -heights.max(), 0.0)
+    if off < OUT_OF_WALL:
+        return plane, []
+    what = f"{filling.name}: its glass lies {off * 1000:.0f} mm out of its opening in the wall"
+    if off < ASTRAY:
+        return plane, [Problem(filling.guid, what, "kept where it is drawn")]
+    middle = 0.5 * (heights.min() + heights.max())
+    moved = Plane(plane.origin + middle * plane.normal, plane.axes)
+    return moved, [Problem(filling.guid, what, "moved to the middle of the opening")]
 
 
 def _drawn_glass(

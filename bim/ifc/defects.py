@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import ifcopenshell
 import numpy as np
 
+from bim.apertures import main_direction
 from bim.ifc.shapes import Shape
 from bim.model import Problem
 from bim.planes import area_vectors
-from bim.solids import solid_of
+from bim.solids import Solid, solid_of
 
 SAME_PLACE = 0.002  # boxes that agree to this are one element drawn twice [m]
 SAME_AREA = 0.3  # if their surfaces agree to this share: only one may have its openings cut
 FLAT, UPRIGHT = 0.5, 1.5  # a slab is lower than this, a wall higher [m]
+WIDEST_JOINT, CLOSEST = 0.05, 0.001  # walls this far apart were meant to meet [m]
+ACROSS = 0.7  # cosine between the normals of walls that meet at a corner at the most
 SOLID_CLASSES = ("IfcWall", "IfcSlab", "IfcRoof")
 
 
 def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Problem]:
-    """Repeated GlobalIds, elements drawn twice, wrong classes, open bodies, unused boundaries."""
+    """Repeated GlobalIds, elements without a body, drawn twice, of a wrong class, open, apart."""
+    solids = {
+        shape.step_id: solid_of(shape.triangles)
+        for shape in shapes
+        if shape.ifc_class.startswith(SOLID_CLASSES)
+    }
     return [
         *repeated_guids(model),
+        *without_body(model),
         *drawn_twice(shapes),
         *wrong_classes(shapes),
-        *open_bodies(shapes),
+        *open_bodies(shapes, solids),
+        *walls_apart(shapes, solids),
         *unused_boundaries(model),
     ]
 
@@ -37,6 +47,16 @@ def repeated_guids(model: ifcopenshell.file) -> list[Problem]:
         Problem(guid, f"GlobalId is used {count} times", "entities are told apart by STEP number")
         for guid, count in counts.items()
         if count > 1
+    ]
+
+
+def without_body(model: ifcopenshell.file) -> list[Problem]:
+    """Walls, slabs and roofs that are neither drawn nor made of parts."""
+    return [
+        Problem(one.GlobalId, f"{one.is_a()} {one.Name or ''}: has no geometry", "left out")
+        for name in SOLID_CLASSES
+        for one in model.by_type(name)
+        if one.Representation is None and not one.IsDecomposedBy
     ]
 
 
@@ -77,13 +97,13 @@ def wrong_classes(shapes: Sequence[Shape]) -> list[Problem]:
     return problems
 
 
-def open_bodies(shapes: Sequence[Shape]) -> list[Problem]:
+def open_bodies(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> list[Problem]:
     """Walls, slabs and roofs whose body is not a closed solid, or only after a repair."""
     problems = []
     for shape in shapes:
-        if not shape.ifc_class.startswith(SOLID_CLASSES):
+        if shape.step_id not in solids:
             continue
-        solid = solid_of(shape.triangles)
+        solid = solids[shape.step_id]
         label = f"{shape.ifc_class} {shape.name}"
         if solid is None:
             what = f"{label}: its body is no closed solid"
@@ -91,6 +111,30 @@ def open_bodies(shapes: Sequence[Shape]) -> list[Problem]:
         elif solid.repair not in ("", "welded"):
             what = f"{label}: its body is not sound ({solid.repair})"
             problems.append(Problem(shape.guid, what, "its surfaces are used as they are"))
+    return problems
+
+
+def walls_apart(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> list[Problem]:
+    """Walls across each other that nearly meet; leaves of one wall, side by side, are none."""
+    walls = []
+    for shape in shapes:
+        solid = solids.get(shape.step_id)
+        normal = main_direction(shape.triangles) if shape.ifc_class.startswith("IfcWall") else None
+        if solid is not None and normal is not None:
+            box = solid.manifold.bounding_box()
+            walls.append((shape, solid.manifold, normal, np.array(box[:3]), np.array(box[3:])))
+    problems = []
+    for i, (one, body, normal, low, high) in enumerate(walls):
+        for other, its_body, its_normal, its_low, its_high in walls[i + 1 :]:
+            if np.any(its_low > high + WIDEST_JOINT) or np.any(low > its_high + WIDEST_JOINT):
+                continue
+            if abs(normal @ its_normal) > ACROSS:
+                continue
+            gap = body.min_gap(its_body, WIDEST_JOINT)
+            if CLOSEST < gap < WIDEST_JOINT:
+                what = f"walls {one.name} and {other.name} do not meet: {gap * 1000:.0f} mm apart"
+                done = "harmless to rooms drawn as spaces; closed where rooms have to be found"
+                problems.append(Problem(one.guid, what, done))
     return problems
 
 

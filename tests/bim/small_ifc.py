@@ -189,14 +189,15 @@ def box_room(
 
     Args:
         space_inset: how far the space stops short of the walls [m].
-        gap: how far the east wall stands away from the others [m].
+        gap: width of a slit from floor to roof between the south and the east wall [m].
         shift: how far the window's body lies beside its opening [m].
     """
     small = empty_project(schema, unit=unit, true_north=true_north)
     grey = small.style("wall", 0.5)
     walls = {}
     for name, (low, size) in WALLS.items():
-        low = (low[0] + (gap if name == "east" else 0.0), *low[1:])
+        if name == "east":
+            low, size = (low[0], low[1] + gap, low[2]), (size[0], size[1] - gap, size[2])
         walls[name] = small.box("IfcWall", name, low, size, grey)
     if doubled_wall:
         small.box("IfcWall", "south again", *WALLS["south"], grey)
