@@ -17,13 +17,16 @@ WIDTH, HEIGHT = 1400, 900
 MARGIN = 1.6  # of the picture over the modules' extent
 GREY = 205  # of what is no module, lit from the front
 SKY = 248
+THROUGH = 0.6  # opacity of a module that something hides
+ASIDE = np.radians(25.0)  # of the view from straight before a facade
 AMBIENT = 0.55  # share of the shading that does not depend on the direction
 
 
 def irradiation_picture(result: PvResult, towards: NDArray[np.float64]) -> NDArray[np.uint8]:
     """An orthographic picture [HEIGHT, WIDTH, 3], seen from the direction `towards` [3].
 
-    Modules carry the annual irradiation of their groups of cells, everything else is grey.
+    Modules carry the annual irradiation of their groups of cells, everything else is grey; they
+    shine through what stands before them.
     """
     elements = result.standing.elements
     triangles = np.concatenate([element.triangles for element in elements])
@@ -38,14 +41,21 @@ def irradiation_picture(result: PvResult, towards: NDArray[np.float64]) -> NDArr
     colour = np.full((len(origins), 3), float(SKY))
     seen = hit >= 0
     colour[seen] = GREY * shade[hit[seen], None]
+    own = np.flatnonzero(module_of >= 0)
+    behind, face = ray_mesh(triangles[own]).first_hits(origins, np.tile(-w, (len(origins), 1)))
+    face = np.where(face >= 0, own[face], -1)
     values, scale = cell_irradiation(result), irradiation_scale(result)
     for k, module in enumerate(result.modules):
-        own = np.flatnonzero(seen & (module_of[hit] == k) & (normals[hit] @ module.normal > 0.9))
-        if not len(own):
+        active = (face >= 0) & (module_of[face] == k) & (normals[face] @ module.normal > 0.9)
+        active = np.flatnonzero(active)
+        if not len(active) or module.normal @ w <= 0:
             continue
-        points = origins[own] - distance[own, None] * w
+        points = origins[active] - behind[active, None] * w
         nearest = np.linalg.norm(points[:, None] - module.points, axis=-1).argmin(axis=1)
-        colour[own] = scale.rgba(values[result.irradiance.module == k][nearest])[:, :3]
+        shown = scale.rgba(values[result.irradiance.module == k][nearest])[:, :3]
+        hidden = distance[active] < behind[active] - 1e-6
+        opacity = np.where(hidden, THROUGH, 1.0)[:, None]
+        colour[active] = opacity * shown + (1 - opacity) * colour[active]
     return colour.round().astype(np.uint8).reshape(HEIGHT, WIDTH, 3)
 
 
@@ -76,7 +86,9 @@ def view_directions(result: PvResult) -> list[tuple[str, NDArray[np.float64]]]:
         first = left[np.argmax(left @ mean)]
         group = left[left @ first > 0.2 * np.linalg.norm(first)]
         towards = group.mean(axis=0)
-        chosen.append(towards / np.linalg.norm(towards) + [0.0, 0.0, 0.6])
+        x, y, _ = towards / np.linalg.norm(towards)
+        c, s = np.cos(ASIDE), np.sin(ASIDE)
+        chosen.append(np.array([c * x - s * y, s * x + c * y, 0.6]))
         left = left[left @ towards < 0.2 * np.linalg.norm(towards)]
     names = []
     for towards in chosen:
