@@ -9,6 +9,7 @@ from mitsuba_cfs.images.view import View, rays
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 
 SUBPIXEL = np.radians(0.025)  # places on the sun's disc lie so close: the disc holds 360
+RAYS = 1 << 20  # tried at a time
 
 
 def disc_reach(pixel_size: float) -> float:
@@ -36,10 +37,15 @@ def disc_rays(
     count = int(np.clip(np.ceil(pixel_size / step), 4, 64 * SUBPIXEL / step))
     inner = (np.arange(count) + 0.5) / count
     dx, dy = (a.ravel()[None] for a in np.meshgrid(inner, inner))
-    number = pixels[:, None]
-    x = (number % view.width + dx) / view.width
-    y = 1.0 - (number // view.width + dy) / view.height
-    directions, exists = rays(view, x, y)
-    cosine = np.einsum("ijk,ik->ij", directions, suns)
-    pixel, place = np.nonzero(exists & (cosine >= np.cos(SUN_RADIUS)))
-    return pixel, directions[pixel, place], 1 / count**2
+    owners, ways = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
+    block = max(1, RAYS // count**2)  # a year of large pixels would fill the memory
+    for start in range(0, len(pixels), block):
+        number = pixels[start : start + block, None]
+        x = (number % view.width + dx) / view.width
+        y = 1.0 - (number // view.width + dy) / view.height
+        directions, exists = rays(view, x, y)
+        cosine = np.einsum("ijk,ik->ij", directions, suns[start : start + block])
+        pixel, place = np.nonzero(exists & (cosine >= np.cos(SUN_RADIUS)))
+        owners.append(pixel + start)
+        ways.append(directions[pixel, place])
+    return np.concatenate(owners), np.concatenate(ways), 1 / count**2
