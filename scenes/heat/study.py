@@ -34,12 +34,7 @@ from scenes.job.daylight import Skies
 from scenes.job.inputs import System, chosen_spaces, read_system, read_weather
 from scenes.job.thermal import ThermalSystem, climate, thermal_system
 from thermal.balance import ZoneResult, simulate_zones
-from thermal.blackbox import (
-    Fenestration,
-    layer_absorptances,
-    linear_u,
-    with_realised_films,
-)
+from thermal.blackbox import layer_absorptances, linear_u, with_realised_films
 from thermal.climate import Solar
 from thermal.control import (
     always,
@@ -50,6 +45,7 @@ from thermal.control import (
     switched,
 )
 from thermal.gains import dimmed_share, split_gains
+from thermal.glazing import Gap, gap_resistance
 from thermal.zone import IdealLoads, WindowElement, Zone, work_hours
 
 FloatArray = NDArray[np.float64]
@@ -148,7 +144,11 @@ def state_of(system: System, table: SystemTable) -> ThermalSystem:
     plain = thermal_system(system)
     fenestration = plain.fenestration
     if table.u_model == "linear":
-        fenestration = replace_resistance(fenestration)
+        fenestration = replace(fenestration, resistance=linear_u(fenestration.u_value))
+    if table.gap is not None:
+        gap = Gap(table.gap.width, tuple(table.gap.gas.items()), table.gap.emissivity)
+        resistance = gap_resistance(fenestration.u_value, gap, item=system.name)
+        fenestration = replace(fenestration, resistance=resistance)
     inner, outer = table.realised_inner_resistance, table.realised_outer_resistance
     if inner is None and outer is None:
         return replace(plain, fenestration=fenestration)
@@ -158,19 +158,6 @@ def state_of(system: System, table: SystemTable) -> ThermalSystem:
         r_outer=closed.r_outer, r_inner=closed.r_inner, item=system.name,
     )  # fmt: skip
     return replace(plain, fenestration=closed, absorptances=absorptances)
-
-
-def replace_resistance(fenestration: Fenestration) -> Fenestration:
-    """The fenestration with U linear in the mean temperature of its layers."""
-    return Fenestration(
-        fenestration.name,
-        fenestration.u_value,
-        fenestration.r_outer,
-        fenestration.r_inner,
-        linear_u(fenestration.u_value),
-        emissivity_in=fenestration.emissivity_in,
-        emissivity_out=fenestration.emissivity_out,
-    )
 
 
 def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:

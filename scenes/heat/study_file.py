@@ -54,15 +54,30 @@ class BoxTable(_Table):
     construction: dict[str, tuple[LayerTable, ...]] = {}  # by side or kind, outermost first
 
 
+class GapTable(_Table):
+    """The gas gap of a double glazing, for `u_model = "gap"`."""
+
+    width: Positive  # [m]
+    gas: dict[str, Share] = {"argon": 0.9, "air": 0.1}
+    emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
+
+
 class SystemTable(_Table):
     """One shading state: a BSDF file and what else was measured."""
 
     bsdf: Path
     u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None
     g_value: Share | None = None
-    u_model: Literal["constant", "linear"] = "constant"
+    u_model: Literal["constant", "linear", "gap"] = "constant"  # with the temperatures
+    gap: GapTable | None = None
     realised_inner_resistance: Positive | None = None  # [m2 K/W], see thermal.blackbox
     realised_outer_resistance: Positive | None = None
+
+    @model_validator(mode="after")
+    def _has_its_gap(self) -> SystemTable:
+        if (self.u_model == "gap") != (self.gap is not None):
+            raise ValueError('u_model "gap" and a [system.gap] table belong together')
+        return self
 
 
 class ControlTable(_Table):

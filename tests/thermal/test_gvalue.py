@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from thermal.errors import ThermalInputError
-from thermal.glazing import Gap, en410_g_value, en673_u_value, roos_angular_factor
+from thermal.glazing import (
+    Gap,
+    en410_g_value,
+    en673_u_value,
+    gap_resistance,
+    roos_angular_factor,
+)
 from thermal.gvalue import (
     InternalShade,
     external_shade_g,
@@ -92,3 +98,21 @@ def test_g_below_transmittance_is_refused():
         thermal_data([0.47], [0.2], u_value=1.2, g_normal=0.3)
     with pytest.raises(ThermalInputError, match="U"):
         thermal_data([0.47], [0.2], u_value=12.0)
+
+
+def test_gap_resistance_keeps_u_and_follows_its_gas():
+    gap = Gap(0.016, (("argon", 0.9), ("air", 0.1)), (0.837, 0.03))
+    u = en673_u_value([0.004, 0.004], [gap])
+    follows = gap_resistance(u, gap)
+    assert follows.at(9.85, 15.0) == pytest.approx(1 / u - 0.17, rel=1e-9)
+    for mean, difference in ((-5.0, 25.0), (10.0, 8.0), (30.0, 15.0), (40.0, 30.0)):
+        own = 1 / gap.conductance(difference, mean_temperature=mean + 273.15) + 0.008
+        # six coefficients over a kink at Nu = 1: 6 %
+        assert follows.at(mean, difference) == pytest.approx(own, rel=0.06)
+    # a shade's air layer dampens it: the rest stays constant
+    shaded = gap_resistance(0.88, gap)
+    assert shaded.at(9.85, 15.0) == pytest.approx(1 / 0.88 - 0.17, rel=1e-9)
+    change = [r.at(-5.0, 25.0) / r.at(30.0, 15.0) for r in (follows, shaded)]
+    assert abs(change[1] - 1) < abs(change[0] - 1)
+    with pytest.raises(ThermalInputError, match=r"blind: U: 2 W/\(m2 K\) is above 1.11"):
+        gap_resistance(2.0, gap, item="blind")

@@ -82,6 +82,11 @@ cooling_c = 26.0
         ("[control]\nstate = 3\n", "a state outside 0 to 0"),
         ("[control]\nrule = 'sunny'\n", "control.rule"),
         ("[gains]\nequipment = 3\n", "gains.equipment"),
+        ('u_model = "gap"\n' + TRACE, "belong together"),
+        (
+            'u_model = "gap"\nu_value = 3.0\n[system.gap]\nwidth = 0.016\n' + TRACE,
+            "is above 1.11, what its gas gap alone",
+        ),
         ("[loads]\nheating_limit_w = -5\n", "loads.heating_limit_w"),
         ("building = 3\n[[", "is not TOML"),
         ("[loads]\nheating_c = 26.0\ncooling_c = 20.0\n" + TRACE, "set points"),
