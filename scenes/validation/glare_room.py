@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer
 from mitsuba_cfs.images.view import fisheye
@@ -60,7 +59,7 @@ def known_system(
     """What the methods know: Klems matrices, and the layer's tensor tree before the glazing.
 
     The light that layer and glazing throw at each other, which the matrices hold, is added to the
-    tree in proportion, for each incident patch.
+    tree on Klems patches.
     """
     glass = blind_room.glass_klems()
     if layer is None:
@@ -70,18 +69,19 @@ def known_system(
     tree, _ = generate_tensor_tree(layer, levels, samples=samples, seed=1)
     system = glazing()
     return tree_fenestration(
-        both, tree[0], system.beam, _gain(klems, both), (None, system.mirrors[1])
+        both, tree[0], system.beam, _between(klems, both), (None, system.mirrors[1])
     )
 
 
-def _gain(layer: KlemsBsdf, both: KlemsBsdf) -> NDArray[np.float64]:
-    """Scattered light through layer and glazing over that without their reflections [K]."""
-    omega = KLEMS_FULL.projected_solid_angles()
+def _between(layer: KlemsBsdf, both: KlemsBsdf) -> KlemsBsdf:
+    """What layer and glazing transmit together beyond the layer's light through the glazing."""
     tau = blind_room.glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
-    scattered = through_peak(layer.transmission_front, KLEMS_FULL).scattered
-    alone = (omega * tau) @ scattered
-    extra = omega @ both.transmission_front - (omega * tau) @ layer.transmission_front
-    return 1 + np.divide(extra, alone, out=np.zeros_like(alone), where=alone > 1e-6)
+    front = both.transmission_front - tau[:, None] * layer.transmission_front
+    back = both.transmission_back - tau[None, :] * layer.transmission_back
+    nothing = np.zeros_like(front)
+    return KlemsBsdf(
+        KLEMS_FULL, KLEMS_FULL, np.maximum(front, 0), np.maximum(back, 0), nothing, nothing
+    )
 
 
 def sunny_days(weather: Weather, month: int, day: int, count: int) -> NDArray[np.int64]:
