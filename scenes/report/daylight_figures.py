@@ -17,7 +17,7 @@ DARK_LX = 1.0  # less than this is night, left empty
 
 
 def plans(room: SpaceResult) -> tuple[Plan, ...]:
-    """Plans of daylight autonomy, useful illuminance, daylight factor and annual mean."""
+    """Plans of daylight autonomy, useful illuminance, daylight factor, direct sun and the mean."""
     daylight, view = room.daylight, room.glare.view
     eye = (np.asarray(view.position), np.asarray(view.direction)) if room.glare.pictures else None
     frame = plan_frame(room.space, daylight.points, eye)
@@ -38,6 +38,11 @@ def plans(room: SpaceResult) -> tuple[Plan, ...]:
         pictures.append(
             plan(frame, values, scale, title="Daylight factor", explanation=text, digits=digits)
         )
+    if (column := sensor_column(room, "sunlit_hours")) and daylight.sensor_metrics[column].any():
+        values = daylight.sensor_metrics[column].to_numpy(dtype=float)
+        scale = _from_zero(values, "Sunlit hours", "h")
+        text = quantity("sunlit_hours").meaning
+        pictures.append(plan(frame, values, scale, title="Sunlit hours", explanation=text))
     values = daylight.illuminance.mean(axis=0)
     scale = _from_zero(values, "Annual mean illuminance", "lx")
     text = _mean(values, "lx", quantity("annual_mean").meaning)

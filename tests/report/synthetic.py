@@ -146,6 +146,7 @@ def daylight_result(space: Space, outside, beam, rng) -> DaylightResult:
             "udi_100_300": share((light >= 100) & (light < 300)),
             "udi_300_3000": share((light >= 300) & (light <= 3000)),
             "udi_above_3000": share(light > 3000),
+            "sunlit_hours": 800.0 * np.exp(-depth / 1.2),
             "daylight_factor": 100 * factor,
         }
     )  # fmt: skip
