@@ -4,6 +4,7 @@ A closure turns the same measurable data into the two-layer model:
 
     kuhn      plain Kuhn: nominal films 0.04 and 0.13, R constant from U
     linear    the same with U linear in temperature (Fener)
+    gap       the same with R following the gas gap by EN 673, at the level of U
     surface   R(T_m, dT) in place of a constant
     films     R(T_m, dT), and the resistances that the system's faces really have
 """
@@ -28,10 +29,12 @@ from thermal.blackbox import (
     linear_u,
     with_realised_films,
 )
+from thermal.glazing import Gap, gap_resistance
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
-CLOSURES = ("kuhn", "linear", "surface", "films")
+CLOSURES = ("kuhn", "linear", "gap", "surface", "films")
+GAP = Gap(0.016, (("argon", 0.9), ("air", 0.1)), (0.84, 0.05))  # of the set's glazing
 REALISED_STATE = 0  # of the U list: 0/20 degC
 
 
@@ -132,9 +135,12 @@ def system(
     u = state["U"] if u_value is None else u_value
     emissivity = 0.84 if name in ("dgu", "ext_blind", "ext_shade") else 0.9
     outside = 0.9 if name.startswith("ext") else 0.84
-    resistance = {"kuhn": None, "linear": linear_u(u)}.get(
-        closure, LayerResistance("surface", tuple(fit))
-    )
+    if closure == "gap":
+        resistance: LayerResistance | None = gap_resistance(u, GAP, item=name)
+    else:
+        resistance = {"kuhn": None, "linear": linear_u(u)}.get(
+            closure, LayerResistance("surface", tuple(fit))
+        )
     plain = Fenestration(
         name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
     )

@@ -68,6 +68,13 @@ def test_better_closure_meets_the_bars_in_one_climate(real_data, reference_data)
     hold(compared(real_data, reference_data, "films", ("Frankfurt",), ("S", "E", "N")))
 
 
+def test_gap_closure_meets_the_bars_of_glazing_with_what_anyone_knows(real_data, reference_data):
+    table = compared(real_data, reference_data, "gap", ("Frankfurt",), ("S", "N"))
+    air, window = BARS["dgu"]
+    assert table.loc["dgu", "air rmse"] <= air and table.loc["dgu", "window rmse"] <= window
+    assert table.loc["ext_shade", "window rmse"] <= 0.3  # plain Kuhn 0.30
+
+
 def test_plain_kuhn_shows_the_dissertation_s_errors(real_data, reference_data):
     table = compared(real_data, reference_data, "kuhn", ("Frankfurt",), ("S", "N"))
     # dissertation: air and wall 0.6 K, window 0.8 to 1.2 K, behind an interior shade 2.8 K
