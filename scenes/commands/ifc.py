@@ -17,6 +17,7 @@ from bim.model import Building, Space
 from bim.read_ifc import read_ifc
 from bim.to_energyplus import write_epjson
 from bim.to_gltf import write_gltf
+from bim.to_mitsuba import write_mitsuba
 from bim.to_radiance import identifier, write_radiance
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
@@ -103,31 +104,37 @@ def attach(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
     help="Folder; one folder inside for each room with a window.",
 )  # fmt: skip
+@click.option(
+    "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder; one folder inside for each room with a window.",
+)  # fmt: skip
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 def export(
     building: Path,
     names: tuple[str, ...],
     radiance: Path | None,
+    mitsuba: Path | None,
     epjson: Path | None,
     gltf: Path | None,
 ) -> None:
-    """Write the rooms for Radiance, for EnergyPlus, or for viewing."""
-    if radiance is None and epjson is None and gltf is None:
-        raise click.UsageError("nothing to write: give --radiance, --epjson or --gltf")
+    """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing."""
+    if radiance is None and mitsuba is None and epjson is None and gltf is None:
+        raise click.UsageError("nothing to write: give --radiance, --mitsuba, --epjson or --gltf")
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     spaces = _chosen(read, names, building)
-    for space in spaces if radiance is not None else ():
-        if not space.windows:
-            continue
-        folder = radiance / identifier(space.name)
-        try:
-            write_radiance(space, read, folder)
-        except ValueError as error:  # a void too low for a work plane
-            click.echo(f"{space.name}: left out: {error}", err=True)
-            continue
-        click.echo(folder)
+    for parent, write in ((radiance, write_radiance), (mitsuba, write_mitsuba)):
+        for space in spaces if parent is not None else ():
+            if not space.windows:
+                continue
+            folder = parent / identifier(space.name)
+            try:
+                write(space, read, folder)
+            except ValueError as error:  # a void too low for a work plane or an eye
+                click.echo(f"{space.name}: left out: {error}", err=True)
+                continue
+            click.echo(folder)
     if epjson is not None:
         write_epjson(read, epjson, spaces=spaces)
         click.echo(epjson)

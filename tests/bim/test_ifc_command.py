@@ -32,13 +32,26 @@ def test_check_shows_rooms_and_problems(path, tmp_path):
 
 def test_export_writes_what_is_asked_for(path, tmp_path):
     rad, zone, view = tmp_path / "rad", tmp_path / "room.epJSON", tmp_path / "room.glb"
+    mitsuba = tmp_path / "mitsuba"
     result = CliRunner().invoke(
         command,
-        ["export", str(path), "--radiance", str(rad), "--epjson", str(zone), "--gltf", str(view)],
+        [
+            "export",
+            str(path),
+            "--radiance",
+            str(rad),
+            "--mitsuba",
+            str(mitsuba),
+            "--epjson",
+            str(zone),
+            "--gltf",
+            str(view),
+        ],
         catch_exceptions=False,
     )
     assert result.exit_code == 0
-    assert (rad / "R1" / "windows_S.rad").is_file() and zone.is_file() and view.is_file()
+    assert (rad / "R1" / "windows_S.rad").is_file() and (mitsuba / "R1" / "scene.xml").is_file()
+    assert zone.is_file() and view.is_file()
 
 
 def test_export_of_an_unknown_room_and_of_nothing(path, tmp_path):

@@ -1,0 +1,100 @@
+"""A room as a Mitsuba scene: one XML file and PLY meshes, rendered by `mi.load_file` as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from bim.model import Building, Space
+from bim.sensors import view_point
+
+FIELD_OF_VIEW_DEG = 90.0
+PIXELS, SAMPLES, DEPTH = 512, 256, 8
+GLASS_INDEX = 1.52  # refractive index of the plain panes that the glass is drawn as
+
+
+def write_mitsuba(
+    space: Space, building: Building, folder: str | Path, *, band: str = "visible"
+) -> Path:
+    """Write `scene.xml` and its meshes into a folder; the path of the XML.
+
+    The room's faces by kind and reflectance, its windows as plain panes (shape `glass_*`: put a
+    `klems_bsdf` or `tensor_tree_bsdf` in their place), what stands outdoors, a sky of radiance 1
+    all round, and a camera in the middle of the room that looks at its biggest window.
+
+    Args: band: reflectances of "visible" or "solar".
+    """
+    folder = Path(folder)
+    (folder / "meshes").mkdir(parents=True, exist_ok=True)
+    own = {window.guid for window in space.windows}
+    outdoors = [element for element in building.elements if element.guid not in own]
+    parts: dict[tuple[str, float], list[NDArray[np.float64]]] = {}
+    for face in space.faces:
+        key = f"room_{face.kind.replace(' ', '_')}", round(face.reflectance(band), 4)
+        parts.setdefault(key, []).append(face.triangles[:, ::-1])  # normals into the room
+    for element in outdoors:
+        key = "outdoors", round(element.reflectance(band), 4)
+        parts.setdefault(key, []).append(element.triangles)
+    scene = ElementTree.Element("scene", version="3.0.0")
+    _camera(scene, space)
+    ElementTree.SubElement(scene, "emitter", type="constant", id="sky").append(
+        ElementTree.Element("spectrum", name="radiance", value="1")
+    )
+    for (name, reflectance), triangles in parts.items():
+        label = f"{name}_{reflectance:.4f}"
+        shape = _mesh(scene, folder, label, triangles)
+        both = ElementTree.SubElement(shape, "bsdf", type="twosided")
+        diffuse = ElementTree.SubElement(both, "bsdf", type="diffuse")
+        value = f"{reflectance:.6g}"
+        ElementTree.SubElement(diffuse, "spectrum", name="reflectance", value=value)
+    for number, window in enumerate(space.windows):
+        shape = _mesh(scene, folder, f"glass_{number}", [window.triangles])
+        pane = ElementTree.SubElement(shape, "bsdf", type="thindielectric")
+        ElementTree.SubElement(pane, "float", name="int_ior", value=str(GLASS_INDEX))
+    ElementTree.indent(scene)
+    path = folder / "scene.xml"
+    ElementTree.ElementTree(scene).write(path, encoding="utf-8", xml_declaration=True)
+    return path
+
+
+def _camera(scene: ElementTree.Element, space: Space) -> None:
+    """Integrator, and a perspective camera at the room's view point."""
+    integrator = ElementTree.SubElement(scene, "integrator", type="path")
+    ElementTree.SubElement(integrator, "integer", name="max_depth", value=str(DEPTH))
+    position, direction = view_point(space)
+    sensor = ElementTree.SubElement(scene, "sensor", type="perspective")
+    ElementTree.SubElement(sensor, "float", name="fov", value=str(FIELD_OF_VIEW_DEG))
+    ElementTree.SubElement(sensor, "float", name="near_clip", value="0.001")
+    place = ElementTree.SubElement(sensor, "transform", name="to_world")
+    ElementTree.SubElement(
+        place, "lookat", origin=_numbers(position), target=_numbers(position + direction),
+        up="0, 0, 1",
+    )  # fmt: skip
+    sampler = ElementTree.SubElement(sensor, "sampler", type="independent")
+    ElementTree.SubElement(sampler, "integer", name="sample_count", value=str(SAMPLES))
+    film = ElementTree.SubElement(sensor, "film", type="hdrfilm")
+    for name in ("width", "height"):
+        ElementTree.SubElement(film, "integer", name=name, value=str(PIXELS))
+
+
+def _mesh(
+    scene: ElementTree.Element, folder: Path, label: str, triangles: Sequence[NDArray[np.float64]]
+) -> ElementTree.Element:
+    """A flat-shaded PLY shape of all the triangles, written and added to the scene."""
+    corners = np.concatenate(triangles).reshape(-1, 3)
+    mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    relative = f"meshes/{label}.ply"
+    (folder / relative).write_bytes(mesh.export(file_type="ply", vertex_normal=False))
+    shape = ElementTree.SubElement(scene, "shape", type="ply", id=label)
+    ElementTree.SubElement(shape, "string", name="filename", value=relative)
+    ElementTree.SubElement(shape, "boolean", name="face_normals", value="true")
+    return shape
+
+
+def _numbers(values: NDArray[np.float64]) -> str:
+    return ", ".join(f"{value:.6f}" for value in values)
