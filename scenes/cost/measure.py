@@ -18,7 +18,9 @@ from mitsuba_cfs.progress import Progress, silent
 from scenes.methods.methods import METHODS, method_scene
 from scenes.methods.place import METRICS, Fenestration, Place, Quality, Skies
 
-STEPS = {"three-phase": 16, "five-phase": 16, "point-in-time": 1}  # timed, after one untimed
+# Timed, after one untimed: what more steps take beyond a few is the cost of a step, the rest of the
+# few is that of their system
+STEPS = {"three-phase": (16, 272), "five-phase": (16, 144), "point-in-time": (1, 2)}
 SMALL = 48  # [px] of the pictures of the run that compiles the kernels
 
 
@@ -83,11 +85,15 @@ def _measure(
     small = replace(place, view=replace(place.view, width=SMALL, height=SMALL))
     cheap = replace(quality, sensor_samples=64, patch_samples=64)
     method_scene(method, metric, small, cheap).behind(fenestration).values(skies.part([0]))
-    hours = skies.part(np.arange(STEPS[method]) % skies.hours)
+    few, many = (skies.part(np.arange(n) % skies.hours) for n in STEPS[method])
     scene, per_scene = _timed(lambda: method_scene(method, metric, place, quality), clock)
     system, per_system = _timed(lambda: scene.behind(fenestration), clock)
-    _, per_step = _timed(lambda: system.values(hours), clock)
-    return Cost(method, metric, per_scene, per_system, per_step / hours.hours)
+    system.values(few)  # kernels of this size are compiled
+    _, of_few = _timed(lambda: system.values(few), clock)
+    _, of_many = _timed(lambda: system.values(many), clock)
+    per_step = max(of_many - of_few, 0.0) / (many.hours - few.hours)
+    per_system += max(of_few - few.hours * per_step, 0.0)
+    return Cost(method, metric, per_scene, per_system, per_step)
 
 
 def _timed(work: Callable, clock: Callable[[], float]) -> tuple:
