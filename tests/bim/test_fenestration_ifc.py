@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ifcopenshell
+import ifcopenshell.guid
 import ifcopenshell.validate
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from bim.ifc.fenestration_read import read_states
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.commands.ifc import command
@@ -164,3 +166,42 @@ def test_damaged_set_is_named(path, tmp_path):
     values.ListValues = values.ListValues[:-1]
     with pytest.raises(DataError, match="BlackBox Model"):
         read_states(model, tmp_path)
+
+
+def test_bsdf_by_library_reference(path, tmp_path):
+    file = tmp_path / "system.xml"
+    tame = KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, *(np.full((4, 41, 41), 0.05)))
+    write_bsdf_xml(BsdfFile({"Visible": tame}, "system"), file)
+    model = ifcopenshell.open(str(path))
+    library = model.create_entity("IfcLibraryReference", Location="system.xml", Name="BSDF")
+    model.create_entity(
+        "IfcRelAssociatesLibrary", ifcopenshell.guid.new(), model.by_type("IfcOwnerHistory")[0],
+        RelatedObjects=model.by_type("IfcWindow"), RelatingLibrary=library,
+    )  # fmt: skip
+    out = tmp_path / "out.ifc"
+    model.write(str(out))
+    back = states_of(out)[0].bands["Visible"]
+    np.testing.assert_allclose(back.transmission_front, 0.05, rtol=1e-6)  # 7 digits in the XML
+    assert faults(out) == faults(path)
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+@pytest.mark.parametrize(
+    "name", ["klems_full/fener_649_VS413001b_klems.xml", "tensortree/pyradiance_room_blindsT3.xml"]
+)
+def test_real_bsdf_files_come_back_bit_for_bit(real_data, tmp_path, schema, name):
+    path, out = tmp_path / "in.ifc", tmp_path / "out.ifc"
+    box_room(schema).write(str(path))
+    bands = read_bsdf_xml(real_data / "bsdf" / name).bands
+    attach(path, out, ShadingState("", bands), every_window=True)
+    (state,) = states_of(out)
+    assert state.bands.keys() == bands.keys()
+    for band, bsdf in bands.items():
+        for block in BLOCKS:
+            there, back = getattr(bsdf, block), getattr(state.bands[band], block)
+            assert (there is None) == (back is None)
+            if isinstance(there, TensorTree):
+                np.testing.assert_array_equal(back.values, there.values)
+                np.testing.assert_array_equal(back.depths, there.depths)
+            elif there is not None:
+                np.testing.assert_array_equal(back, there)
