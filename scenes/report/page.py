@@ -86,6 +86,8 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     inputs = manifest.get("inputs", {})
     main = ("building", "weather", "system")
     rows += [(_title(name), _named(manifest, name)) for name in main if name in inputs]
+    if "system" not in inputs and manifest.get("system"):
+        rows.append(("Fenestration", str(manifest["system"])))
     first, last = result.times[0], result.times[-1]
     rows.append(("Period", f"{first:%d %b} to {last:%d %b}, {rounded(len(result.times), 0)} hours"))
     others = len(building.spaces) - len(result.spaces)

@@ -22,7 +22,7 @@ from scenes.job.alike import as_room, same_light, same_systems
 from scenes.job.annual import worst_hours
 from scenes.job.inputs import System, read_system
 from scenes.job.operation import check_states, read_operation, shading_states
-from scenes.job.options import RoomOptions
+from scenes.job.options import JobOptions, RoomOptions
 from scenes.job.room import compute_room, skies_for
 from scenes.job.skies import Skies, Sun
 from scenes.job.windows import everywhere, room_windows
@@ -285,6 +285,33 @@ def test_a_room_alike_has_the_results_of_its_twin(variant, weather, skies, glass
     mean = given.daylight.illuminance.mean(axis=0)
     # the same random numbers; single paths go another way by rounding of coordinates
     np.testing.assert_allclose(mean, other.daylight.illuminance.mean(axis=0), rtol=0.03)
+
+
+def test_a_run_computes_rooms_alike_once(variant, weather, skies, glass, monkeypatch) -> None:
+    from scenes.job import run
+
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    other = shoebox(2.5, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 1.5, 1.5),), name="other")
+    spaces = [ROOM, *other.spaces, twin]
+    building = replace(BOX, spaces=tuple(spaces))
+    systems = {w.guid: (glass,) for s in spaces for w in s.windows}
+    computed = []
+
+    def noted(building, space, *others, **options):
+        computed.append(space.name)
+        return compute_room(building, space, *others, **options, pictures=False)
+
+    monkeypatch.setattr(run, "compute_room", noted)
+    options = JobOptions(
+        Path(), Path(), method="three-phase", cache=False, sky_subdivision=1, sensor_spacing=2.0,
+        sensor_samples=1024, patch_samples=1024,
+    )  # fmt: skip
+    inputs = run.JobInputs(building, spaces, weather, systems, None)
+    results, problems, notes = run._rooms(inputs, skies, options, silent)
+    assert computed == ["room", "other"] and not problems
+    assert [r.space.name for r in results] == ["room", "other", "twin"]
+    assert [r.like for r in results] == ["", "", "room"]
+    assert len(notes) == 1 and "twin" in notes[0] and "room" in notes[0]
 
 
 def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glass) -> None:
