@@ -37,7 +37,7 @@ from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixe
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 BLOCK = 2**19  # paths traced at a time
-TILE = 4  # [px]
+TILE, LARGEST_TILE = np.radians(0.9), 16  # across; [px]
 DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
 SURFACE_STEPS, WINDOW_STEPS = (1, 2), (1,)  # [tiles] of the smoothing, one after the other
 
@@ -48,7 +48,7 @@ def point_in_time_picture(
     view: View,
     *,
     samples: int = 16,
-    tile: int = TILE,
+    tile: int | None = None,
     max_depth: int = 24,
     seed: int = 0,
     progress: Progress = silent,
@@ -57,9 +57,12 @@ def point_in_time_picture(
 
     Args:
         samples: rays and paths for each pixel, spread over it.
-        tile: pixels across of the squares that share slowly varying light; 1: every pixel for
-            itself, without smoothing, for a picture free of any assumption.
+        tile: pixels across of the squares that share slowly varying light, by default 0.9 degrees
+            (2 pixels at least); 1: every pixel for itself, without smoothing, for a picture free
+            of any assumption.
     """
+    if tile is None:
+        tile = int(np.clip(round(TILE / _pixel_size(view)), 2, LARGEST_TILE))
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
@@ -115,7 +118,7 @@ def _add_shared(picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence,
 def _add_disc(picture: NDArray, shown: NDArray, room: Room, sky: Sky, view: View) -> None:
     """Add the sun's disc seen through the straight beam, by its share of each pixel."""
     sun = sky.sun.numpy().ravel()
-    size = float(np.sqrt(pixel_solid_angles(view).max()))
+    size = _pixel_size(view)
     directions = pixel_directions(view)[0].reshape(-1, 3)[shown]
     near = shown[directions @ sun > np.cos(disc_reach(size))]
     pixel, way, share = disc_rays(view, near, np.tile(sun, (len(near), 1)), size, step=DISC_STEP)
@@ -127,6 +130,11 @@ def _add_disc(picture: NDArray, shown: NDArray, room: Room, sky: Sky, view: View
     )
     seen = np.bincount(pixel, tau.numpy(), minlength=len(near))
     picture[near] += seen * share * sky.sun_radiance.numpy()[0]
+
+
+def _pixel_size(view: View) -> float:
+    """The largest angle [rad] across a pixel."""
+    return float(np.sqrt(pixel_solid_angles(view).max()))
 
 
 def _eye(room: Room, view: View) -> mi.Point3f:

@@ -52,7 +52,7 @@ INDEX, TRANSMISSIVITY = 1.52, 0.90  # of Radiance's `glass`: refractive index; i
 TREE_LEVELS, TREE_SAMPLES = 4, 65536
 QUALITY = "-dc 1 -dt 0 -dj 0 -ds 0.1 -st 0"
 CACHED = "-ps 1 -pa 0 -ss 4 -ab 4 -ad 256 -as 0 -aa 0.25 -ar 16 -lr 8 -lw 1e-3"  # of the pictures
-POINT = "-u+ -ss 16 -ab 8 -ad 4096 -aa 0 -lr -20 -lw 1e-6"  # of Ev, so many times:
+POINT = "-u+ -ss 1 -ab 8 -ad 32768 -aa 0 -lr 20 -lw 1e-9"  # of Ev, so many times:
 POINTS = 8
 
 
