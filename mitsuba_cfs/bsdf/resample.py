@@ -9,6 +9,7 @@ from scipy.stats import qmc
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 
 BLOCKS = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
 
@@ -33,6 +34,8 @@ def _block(bsdf: Bsdf, name: str, basis: KlemsBasis, samples: int) -> NDArray[np
     transmits, front = name.startswith("transmission"), name.endswith("front")
     K, patches = basis.size, np.arange(basis.size)
     total, towards = np.zeros((K, K)), []
+    if isinstance(bsdf, TensorTreeBsdf) and bsdf.lookup(name)[0] is None:
+        return total
     for u_in, v_in, u_out, v_out in qmc.Sobol(4, seed=0).random(samples):
         incident = _directions(basis, patches, u_in, v_in) * [1, -1, 1 if front else -1]
         outgoing = _directions(basis, patches, u_out, v_out) * [-1, 1, -1]

@@ -1,0 +1,40 @@
+"""Klems matrices made from other data keep directions, sides and energy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.bsdf.evaluate import direct_hemispherical
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF
+from mitsuba_cfs.bsdf.resample import BLOCKS, _block, klems_of
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from scenes.demo import VENETIAN_BLIND
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_klems_matrix_comes_back(name) -> None:
+    """The blind is the same from neither side nor turned: every convention is in its numbers."""
+    bsdf = read_bsdf_xml(VENETIAN_BLIND).band("Visible").filled()
+    np.testing.assert_allclose(
+        _block(bsdf, name, KLEMS_FULL, 2), getattr(bsdf, name), rtol=1e-9, atol=1e-12
+    )
+
+
+def test_energy_is_that_of_the_tree() -> None:
+    """A lopsided tree of rank 4: each patch sends on what the tree's cells in it do."""
+    rng = np.random.default_rng(0)
+    tree = TensorTree(4, np.full(256, 2, dtype=np.int64), 0.25 * rng.random(256))
+    bsdf = TensorTreeBsdf(transmission_front=tree)
+    klems = klems_of(bsdf)
+    found = klems.direct_hemispherical(klems.transmission_front)
+    towards = KLEMS_FULL.incident_directions()
+    middle = direct_hemispherical(bsdf, "transmission_front", towards)
+    inside = np.isclose(found, middle, rtol=1e-9)  # patches that lie in one cell of the tree
+    assert 20 < inside.sum() < KLEMS_FULL.size
+    omega = KLEMS_FULL.projected_solid_angles()
+    assert omega @ found == pytest.approx(np.pi * tree.hemispherical().mean(), rel=0.01)
+    assert not klems.reflection_front.any()
+    np.testing.assert_array_equal(klems_of(klems).transmission_front, klems.transmission_front)
+    assert klems_of(bsdf, KLEMS_HALF, samples=4).transmission_front.shape == (77, 77)
