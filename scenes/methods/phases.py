@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs import phases
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures, annual_glare
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.simplified import direct_only, enhanced_simplified_dgp, simplified_dgp
@@ -16,7 +17,7 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.annual_pictures import FivePhasePictures, ViewMatrices, view_matrices
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
+from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
 from mitsuba_cfs.trace.estimate import Stopping
 from mitsuba_cfs.trace.picture_outdoors import Outdoors, outdoors
 from mitsuba_cfs.trace.picture_sun import PictureSun
@@ -137,11 +138,16 @@ class PhaseSystem:
         if not s.five_phase:
             return whole
         direct = phases.three_phase(s.direct_view, T, s.direct_daylight, skies.sun)
+        ways = [self.fenestration.scattering] * len(s.place.groups)
+        whole = whole + phases.beam_at_sun_angle(
+            s.view - s.direct_view, T, patch_beams(ways, KLEMS_FULL),
+            through_beams(s.place.groups, ways, skies.direction), s.direct_daylight, skies.sun,
+        )  # fmt: skip
         points, normals = s.place.sensors(s.metric)
         exact = [
             direct_sun_matrix(
                 s.place.interior, s.place.exterior, s.place.groups,
-                [self.fenestration.scattering] * len(s.place.groups), points, normals,
+                ways, points, normals,
                 skies.direction[start : start + SUN_HOURS], stopping=Stopping(batches=BATCHES),
             ).values
             for start in range(0, skies.hours, SUN_HOURS)
