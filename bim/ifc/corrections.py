@@ -12,12 +12,14 @@
     visible = 0.3
     solar = 0.35                # the visible one if left out
 
-Selectors choose by GUID, class, type, material, storey (location), layer, property and more:
-https://docs.ifcopenshell.org/ifcopenshell-python/selector_syntax.html
+Selectors choose by GUID, class, name, type, material, storey (location), property and more:
+https://docs.ifcopenshell.org/ifcopenshell-python/selector_syntax.html; and by CAD layer, which is
+ours: 'IfcWall, layer="A-WALL"'.
 """
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +27,10 @@ from pathlib import Path
 import ifcopenshell
 import ifcopenshell.util.selector
 
+from bim.ifc.elements import cad_layers_of
 from mitsuba_cfs.errors import DataError
 
+LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
 KEYS = {"leave_out", "only", "join", "surroundings", "reflectance"}
 
 
@@ -74,12 +78,21 @@ class Corrections:
 
 def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[int]:
     """STEP ids of the elements that a selector chooses; `DataError` where it is none."""
-    try:
-        found = ifcopenshell.util.selector.filter_elements(model, query)
-    except Exception as error:  # the selector's parser raises many types
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
-        raise DataError(reason, file=file or None, field=query) from None
-    return {element.id() for element in found}
+    found: set[int] = set()
+    for group in re.findall(r'(?:"[^"]*"|[^"+])+', query) if LAYER.search(query) else [query]:
+        rest = LAYER.sub("", group).strip(" ,")
+        try:
+            elements = (
+                ifcopenshell.util.selector.filter_elements(model, rest)
+                if rest
+                else set(model.by_type("IfcProduct"))
+            )
+        except Exception as error:  # the selector's parser raises many types
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
+            raise DataError(reason, file=file or None, field=query) from None
+        layers = {name.strip().strip('"') for name in LAYER.findall(group)}
+        found |= {one.id() for one in elements if layers <= set(cad_layers_of(one))}
+    return found
 
 
 def corrections_beside(model_path: str | Path) -> Corrections:

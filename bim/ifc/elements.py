@@ -77,7 +77,8 @@ def outdoor_elements(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[
         default = SITE_REFLECTANCE if shape.ifc_class.startswith(SITE) else FACADE_REFLECTANCE
         base = Element(
             shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles, default,
-            default, _layer_of(entity), storey_of(entity), _material_name(entity),
+            default, next(iter(cad_layers_of(entity)), ""), storey_of(entity),
+            _material_name(entity),
         )  # fmt: skip
         for index in np.unique(shape.look):
             visible = solar = default
@@ -97,16 +98,17 @@ def outdoor_elements(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[
     return result
 
 
-def _layer_of(entity: ifcopenshell.entity_instance) -> str:
-    """Name of the first presentation layer (CAD layer) of an element, "" if none."""
+def cad_layers_of(entity: ifcopenshell.entity_instance) -> list[str]:
+    """Names of the presentation layers (CAD layers) that an element's body is on."""
+    names: list[str] = []
     with contextlib.suppress(Exception):  # damaged representations
         for representation in entity.Representation.Representations:
-            for layer in representation.LayerAssignments:
-                return layer.Name or ""
+            layers = list(representation.LayerAssignments)
             for item in representation.Items:
-                for layer in getattr(item, "LayerAssignment", None) or ():
-                    return layer.Name or ""
-    return ""
+                layers += getattr(item, "LayerAssignment", None) or ()  # IFC4
+                layers += getattr(item, "LayerAssignments", None) or ()  # IFC2X3
+            names += [layer.Name or "" for layer in layers]
+    return names
 
 
 def _material_name(entity: ifcopenshell.entity_instance) -> str:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import ifcopenshell.api.material
+import ifcopenshell.api.pset
+import ifcopenshell.api.root
+import ifcopenshell.api.spatial
+import ifcopenshell.api.type
 import pytest
 
 from bim.ifc.corrections import Corrections, read_corrections
@@ -75,3 +80,37 @@ def test_wrong_entries_are_named(tmp_path, text, message):
 def test_selector_that_cannot_be_parsed_is_named(path):
     with pytest.raises(DataError, match="IfcWall,,,"):
         read_ifc(path, corrections=Corrections(leave_out=("IfcWall,,,=",)))
+
+
+@pytest.mark.parametrize(
+    "select",
+    [
+        "{guid}",
+        'IfcWall, Name="east"',
+        'IfcWall, type="Type E"',
+        'IfcWall, material="Brick"',
+        'IfcWall, location="Attic"',
+        'layer="A-EAST"',
+        "IfcWall, layer=A-EAST",
+        'layer="A-EAST" + layer="none"',
+        'IfcWall, Pset_WallCommon.Reference="E1"',
+    ],
+)
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_every_kind_of_selector_leaves_out_the_one_wall(tmp_path, schema, select):
+    model = box_room(schema)
+    wall = next(one for one in model.by_type("IfcWall") if one.Name == "east")
+    kind = ifcopenshell.api.root.create_entity(model, ifc_class="IfcWallType", name="Type E")
+    ifcopenshell.api.type.assign_type(model, related_objects=[wall], relating_type=kind)
+    brick = ifcopenshell.api.material.add_material(model, name="Brick")
+    ifcopenshell.api.material.assign_material(model, products=[wall], material=brick)
+    attic = ifcopenshell.api.root.create_entity(model, ifc_class="IfcBuildingStorey", name="Attic")
+    ifcopenshell.api.spatial.assign_container(model, products=[wall], relating_structure=attic)
+    model.create_entity(
+        "IfcPresentationLayerAssignment", Name="A-EAST",
+        AssignedItems=[wall.Representation.Representations[0]],
+    )  # fmt: skip
+    pset = ifcopenshell.api.pset.add_pset(model, product=wall, name="Pset_WallCommon")
+    ifcopenshell.api.pset.edit_pset(model, pset=pset, properties={"Reference": "E1"})
+    removed = Corrections(leave_out=(select.format(guid=wall.GlobalId),)).removed(model)
+    assert removed == {wall.id()}
