@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+
+import numpy as np
 
 from bim.shoebox import shoebox
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part, silent
-from scenes.calibration.costs import HEAT, Calibration, machine_name
+from scenes.calibration.costs import GLARE, HEAT, Calibration, machine_name
 from scenes.cost.measure import Cost
 from scenes.cost.reference import reference_costs
 from scenes.demo import VENETIAN_BLIND, WEATHER
@@ -17,40 +20,56 @@ from scenes.job.inputs import read_system, read_weather
 from scenes.job.options import RoomOptions
 from scenes.job.room import compute_room, skies_for
 from scenes.job.windows import everywhere
-from scenes.methods.place import Quality
 
-HEAT_OPTIONS = RoomOptions(method="three-phase", sensor_spacing=2.0, sensor_samples=64)
+PHASES = ("three-phase", "five-phase")
 
 
-def calibrated(
-    size: int, *, quality: Quality | None = None, progress: Progress = silent, **chosen
-) -> Calibration:
+def calibrated(size: int, *, progress: Progress = silent) -> Calibration:
     """The costs of this machine, measured now: a few minutes.
 
-    Args:
-        size: pixels of a side of the pictures; chosen: `methods` and `metrics` of
-            `scenes.cost.measure.measure`, all by default.
+    Args: size: pixels of a side of the pictures.
     """
-    costs = reference_costs(size=size, quality=quality, progress=part(progress, 0, 0.9), **chosen)
-    heat = heat_cost()
-    progress("calibration", 1.0)
+    options = {"size": size, "metrics": GLARE}
+    glare = reference_costs(progress=part(progress, 0.0, 0.7), **options)
+    options = {"size": size, "methods": ["point-in-time"], "metrics": ["illuminance"]}
+    paths = reference_costs(progress=part(progress, 0.7, 0.8), **options)
+    rooms = room_costs(part(progress, 0.8, 1.0))
     made = datetime.now().astimezone().isoformat(timespec="seconds")
-    return Calibration(machine_name(), made, size, (*costs, heat))
+    return Calibration(machine_name(), made, size, (*glare, *paths, *rooms))
 
 
-def heat_cost(options: RoomOptions = HEAT_OPTIONS) -> Cost:
-    """Gains, temperatures and comfort of a room: tracing once, then each year of lit hours."""
+def room_costs(progress: Progress = silent, options: RoomOptions | None = None) -> list[Cost]:
+    """Illuminance of a year by the phase methods, and heat, of a room as a study computes it.
+
+    The first system of a room has all traced, another one finds V and D; what it takes is shared
+    out over the lit hours.
+    """
+    options = options or RoomOptions()
     weather, system = read_weather(WEATHER), read_system(VENETIAN_BLIND)
     building = shoebox(3.65, 4.6, 3.0)
-    space, skies = building.spaces[0], skies_for(weather, options)
-    seconds = []
-    with tempfile.TemporaryDirectory() as folder:
-        cold, warm = MatrixCache(Path(folder) / "cold"), MatrixCache(Path(folder) / "warm")
-        for cache in (cold, warm, warm):  # the first compiles kernels
-            room = compute_room(
-                building, space, everywhere(space, system), weather, options,
-                skies=skies, cache=cache, pictures=False,
-            )  # fmt: skip
-            seconds.append(room.seconds["thermal"])
-    _, first, again = seconds
-    return Cost(*HEAT, max(first - again, 0.0), 0.0, again / len(skies.lit))
+    space, found = building.spaces[0], []
+    darker = replace(
+        system.visible, transmission_front=0.9 * np.asarray(system.visible.transmission_front)
+    )
+    systems = (system, system, replace(system, visible=darker))
+    for number, method in enumerate(PHASES):
+        chosen = replace(options, method=method)
+        skies = skies_for(weather, chosen)
+        with tempfile.TemporaryDirectory() as folder:
+            cold, warm = MatrixCache(Path(folder) / "cold"), MatrixCache(Path(folder) / "warm")
+            timed = [
+                compute_room(
+                    building, space, everywhere(space, each), weather, chosen,
+                    skies=skies, cache=cache, pictures=False,
+                ).seconds
+                for each, cache in zip(systems, (cold, warm, warm), strict=True)
+            ]  # fmt: skip
+        _, first, again = timed  # the very first compiles kernels
+        stages = {"daylight": (method, "illuminance")}
+        if method == PHASES[-1]:
+            stages["thermal"] = HEAT
+        for stage, name in stages.items():
+            once = max(first[stage] - again[stage], 0.0)
+            found.append(Cost(*name, once, 0.0, again[stage] / len(skies.lit)))
+        progress("calibration", (number + 1) / len(PHASES))
+    return found
