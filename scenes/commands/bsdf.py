@@ -229,3 +229,27 @@ def generate(output: Path, **options) -> None:
         file, exact = generated_file(progress=progress, **options)
     write_bsdf_xml(file, output)
     click.echo(f"{output}: {exact}")
+
+
+@command.command()
+@click.argument("layers", nargs=-1, required=True, type=FILE, metavar="OUTER.xml ... INNER.xml")
+@click.option("--name", default="", help="Name to write into the file.")
+@click.option("--absorptances", type=FILE, help="CSV file: what each layer absorbs, by patch.")
+@click.option("--out", "output", type=FILE, required=True, help="XML file to write.")
+def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, output: Path) -> None:
+    """Combine layers, the exterior one first, by Klems matrix algebra.
+
+    Inter-reflections are all counted; gaps between the files are taken to be empty.
+    """
+    from scenes.bsdf_combination import combined_file
+
+    for option, path in (("--out", output), ("--absorptances", absorptances)):
+        if path is not None and not path.absolute().parent.is_dir():
+            raise click.UsageError(f"{option} {path}: no such folder")
+    file, table = combined_file(layers, name)
+    write_bsdf_xml(file, output)
+    if absorptances is not None:
+        table.to_csv(absorptances, index=False, float_format="%.6g")
+    for band in file.bands:
+        tau = direct_hemispherical(file.band(band), "transmission_front", [0.0, 0.0, 1.0])[0]
+        click.echo(f"{output}: {band}: transmittance at normal incidence {tau:.4f}")
