@@ -125,7 +125,9 @@ def cases(place: Place, levels: int) -> list[Case]:
                 Case(
                     f"{name} {value:g}",
                     peaked_geometry(place.groups[0], transmittance, amplitude),
-                    known_system(peaked_slats(transmittance, amplitude), levels=levels),
+                    known_system(
+                        peaked_slats(transmittance, amplitude), levels=levels, samples=1024
+                    ),
                     skies,
                     (name,),
                     tuple(SPACING * np.arange(EYES) / EYES),
