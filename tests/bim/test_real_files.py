@@ -71,12 +71,9 @@ def test_every_file_is_read_or_refused_in_one_line(real_data):
                 "open edges" in p.what for p in building.problems if p.where == space.guid
             )
             assert (open_edges(space.shell) > 0) == reported
-            for k, (drawn, stated) in enumerate(
-                (
-                    (space.area_as_stated, space.stated_area),
-                    (space.room_volume, space.stated_volume),
-                )
-            ):
+            areas = space.area_as_stated, space.stated_area
+            volumes = space.room_volume, space.stated_volume
+            for k, (drawn, stated) in enumerate((areas, volumes)):
                 stating[k] += stated is not None
                 within[k] += stated is not None and abs(drawn / stated - 1) < 0.02
     assert np.all(within > 0.9 * stating) and np.all(stating > 100)
