@@ -21,6 +21,7 @@ from scenes.methods.place import METRICS, Fenestration, Place, Quality, Skies
 # Timed, after one untimed: what more steps take beyond a few is the cost of a step, the rest of the
 # few is that of their system
 STEPS = {"three-phase": (16, 272), "five-phase": (16, 144), "point-in-time": (1, 2)}
+LEAST = 0.25  # of the mean of many steps: a slope below it is noise of a busy machine
 SMALL = 48  # [px] of the pictures of the run that compiles the kernels
 
 
@@ -91,7 +92,10 @@ def _measure(
     system.values(few)  # kernels of this size are compiled
     _, of_few = _timed(lambda: system.values(few), clock)
     _, of_many = _timed(lambda: system.values(many), clock)
-    per_step = max(of_many - of_few, 0.0) / (many.hours - few.hours)
+    if method == "point-in-time":  # all is done again in every step
+        return Cost(method, metric, per_scene, per_system, (of_few + of_many) / sum(STEPS[method]))
+    slope = (of_many - of_few) / (many.hours - few.hours)
+    per_step = max(slope, LEAST * of_many / many.hours)
     per_system += max(of_few - few.hours * per_step, 0.0)
     return Cost(method, metric, per_scene, per_system, per_step)
 

@@ -97,3 +97,19 @@ def test_no_calibration_is_one_clear_line(tmp_path):
     (tmp_path / "bad.json").write_text('{"machine": 1}')
     with pytest.raises(DataError, match="is no calibration"):
         Calibration.read(tmp_path / "bad.json")
+
+
+@pytest.mark.slow
+def test_this_machine_is_measured_and_found_again(tmp_path, monkeypatch, capsys):
+    from scenes.calibration.costs import GLARE, calibration_file
+    from scenes.cli import run
+    from scenes.methods.methods import METHODS
+
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path))
+    assert run(["calibrate", "--size", "64"]) == 0
+    found = Calibration.read(calibration_file())
+    assert set(found.pairs()) == {(method, metric) for method in METHODS for metric in GLARE}
+    year = Work(1, 1, 3430, 4450)
+    times = {method: found.seconds(method, "DGP", year) for method in METHODS}
+    assert 0 < times["three-phase"] < times["five-phase"] < times["point-in-time"]
+    assert str(calibration_file()) in capsys.readouterr().out
