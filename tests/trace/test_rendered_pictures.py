@@ -19,4 +19,3 @@ def test_illuminance_and_glare_are_radiances(tmp_path, system):
         noise = 5 * found.ev_rtrace_error
         assert found.ev == pytest.approx(found.ev_rtrace, abs=0.03 * found.ev_rtrace + noise)
         assert found.dgp == pytest.approx(found.dgp_rpict, abs=0.01)
-        assert found.sources == found.sources_rpict
