@@ -56,7 +56,7 @@ class ThermalSystem:
 def thermal_system(system: System) -> ThermalSystem:
     """U, g and layer absorptances by direction of a system."""
     solar = system.solar
-    tau = solar.direct_hemispherical(solar.transmission_front)
+    tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
     rho = solar.direct_hemispherical(solar.reflection_front)
     rho = np.minimum(rho, 1.0 - tau)
     data = thermal_data(tau, rho, u_value=system.u_value, g_normal=system.g_value, item=system.name)
