@@ -42,6 +42,7 @@ class Surveyed:
     problems: int = 0
     check_s: float = 0.0  # reading and checking
     export_s: float = 0.0  # every room for Radiance, EnergyPlus and glTF
+    cpu_s: float = 0.0  # of both, all threads: the same on a busy machine
     memory_mb: float = 0.0  # peak of the process
     refused: str = ""  # why, where the file cannot be read
 
@@ -55,7 +56,7 @@ def survey(paths: Iterable[str | Path]) -> Iterator[Surveyed]:
 
 def _surveyed(path: Path) -> Surveyed:
     megabytes = path.stat().st_size / 1e6
-    start = time.perf_counter()
+    start, cpu = time.perf_counter(), time.process_time()
     try:
         building = read_ifc(path)
     except CfsError as error:
@@ -64,7 +65,7 @@ def _surveyed(path: Path) -> Surveyed:
     start = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         _export(building, Path(folder))
-    export_s = time.perf_counter() - start
+    export_s, cpu_s = time.perf_counter() - start, time.process_time() - cpu
     # ru_maxrss counts kilobytes, on macOS bytes
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     peak /= 1e6 if sys.platform == "darwin" else 1e3
@@ -88,6 +89,7 @@ def _surveyed(path: Path) -> Surveyed:
         len(building.problems),
         check_s,
         export_s,
+        cpu_s,
         peak,
     )
 
@@ -114,13 +116,13 @@ def markdown(rows: Sequence[Surveyed]) -> str:
     """The table of the files, and a line of sums below it."""
     head = (
         "| file | MB | schema | rooms | with windows | windows | glass m2 | open | area | volume "
-        "| problems | check s | export s | memory MB |"
+        "| problems | check s | export s | CPU s | memory MB |"
     )
     lines = [head, "|---" * head.count(" | ") + "|---|"]
     for row in rows:
         name = f"{row.file} | {row.megabytes:.1f}"
         if row.refused:
-            lines.append(f"| {name} | refused: {row.refused.split(': ', 1)[-1]} |" + " |" * 11)
+            lines.append(f"| {name} | refused: {row.refused.split(': ', 1)[-1]} |" + " |" * 12)
             continue
         area = f"{row.areas_between_walls}" + (
             f" + {row.areas_to_middles} to middles" if row.areas_to_middles else ""
@@ -129,7 +131,7 @@ def markdown(rows: Sequence[Surveyed]) -> str:
             f"| {name} | {row.schema} | {row.rooms} | {row.rooms_with_windows} | {row.windows} "
             f"| {row.glass:.1f} | {row.open_rooms} | {_of(area, row.areas)} "
             f"| {_of(str(row.volumes_agreeing), row.volumes)} | {row.problems} "
-            f"| {row.check_s:.1f} | {row.export_s:.1f} | {row.memory_mb:.0f} |"
+            f"| {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} | {row.memory_mb:.0f} |"
         )
     total = {f.name: sum(getattr(r, f.name) for r in rows) for f in fields(Surveyed)
              if f.type in ("int", "float")}  # fmt: skip

@@ -153,10 +153,9 @@ def survey(files: tuple[Path, ...], out: Path | None) -> None:
         for row in surveyed(files):
             rows.append(row)
             progress("files", len(rows) / len(files))
-    table = markdown(rows)
-    click.echo(table)
-    if out is not None:
-        out.write_text(table + "\n", encoding="utf-8")
+            if out is not None:  # what is done is kept if the rest is broken off
+                out.write_text(markdown(rows) + "\n", encoding="utf-8")
+    click.echo(markdown(rows))
 
 
 def _chosen(building: Building, names: tuple[str, ...], path: Path) -> tuple[Space, ...]:
