@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import Pictures, full_picture
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.trace.annual_pictures import FivePhasePictures, ViewMatrices, view_matrices
 from mitsuba_cfs.trace.picture_outdoors import outdoors
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.systems import sun_scattering
 from scenes.job.daylight import RoomMatrices, RoomScene, StateLight
+from scenes.job.kept_views import kept_view
 from scenes.job.options import RoomOptions
 from scenes.job.paths import path_picture
 from scenes.job.skies import Skies
@@ -93,17 +96,23 @@ def picture_maker(
     state: NDArray[np.int64],
     skies: Skies,
     options: RoomOptions,
+    cache: MatrixCache | None,
     progress: Progress,
 ) -> PictureMaker:
     """The maker of a room's pictures, its view matrices traced."""
     view = None
     if options.method != "point-in-time":
-        view = view_matrices(
-            scene.interior,
-            scene.groups,
+        sampling = {"samples": options.picture_samples, "seed": options.seed}
+        view = kept_view(
+            cache,
             scene.view,
-            samples=options.picture_samples,
-            seed=options.seed,
-            progress=part(progress, 0.0, 1.0, "pictures"),
+            (variants.activate(), scene.interior, scene.groups, *sampling.values()),
+            lambda: view_matrices(
+                scene.interior,
+                scene.groups,
+                scene.view,
+                progress=part(progress, 0.0, 1.0, "pictures"),
+                **sampling,
+            ),
         )
     return PictureMaker(scene, matrices, lights, state, skies, options, view)

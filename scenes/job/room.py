@@ -188,8 +188,9 @@ class _Room:
         if "view" in self.__dict__:
             return replace(self.view, state=state)
         self.__dict__["view"] = picture_maker(
-            self.scene, self.matrices, self.lights, state, self.skies, self.options, steps
-        )
+            self.scene, self.matrices, self.lights, state, self.skies, self.options, self.cache,
+            steps,
+        )  # fmt: skip
         return self.__dict__["view"]
 
     def daylight(self) -> DaylightResult:

@@ -125,6 +125,29 @@ def test_kept_matrices_serve_other_systems(variant, tmp_path, weather, skies, bl
     np.testing.assert_array_equal(kept, fresh)
 
 
+def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, glass) -> None:
+    """The same pictures from the file; a broken file is traced anew."""
+    from scenes.job import pictures
+
+    options = replace(SMALL, picture_hours=("12-19 12",), sensor_samples=1024, patch_samples=1024)
+
+    def seen(cache: MatrixCache | None) -> np.ndarray:
+        systems = everywhere(ROOM, glass)
+        found = compute_room(BOX, ROOM, systems, weather, options, skies=skies, cache=cache)
+        return found.glare.pictures[0].luminance
+
+    cache = MatrixCache(tmp_path)
+    traced = seen(cache)
+    (file,) = tmp_path.glob("view-pictures-*.npz")
+    assert not list(tmp_path.glob("*.part"))
+    with monkeypatch.context() as patch:
+        patch.setattr(pictures, "view_matrices", None)  # must not be called
+        np.testing.assert_array_equal(seen(cache), traced)
+    file.write_bytes(file.read_bytes()[:1000])
+    np.testing.assert_array_equal(seen(cache), traced)
+    assert file.stat().st_size > 1000
+
+
 def test_windows_with_their_own_systems(variant, weather, skies, blind, glass) -> None:
     """Two windows in one wall, one system each: the light of each alone adds up."""
     both = shoebox(
