@@ -184,6 +184,8 @@ def write_figure(runs: list[dict], path: Path) -> None:
             y = [r["methods"][key][0] for r in mine]
             axes.plot(x, y, styles[metric], color=colours[method], label=key, linewidth=1.3)
         axes.set_xscale("log")
+        axes.set_xticks(x, [f"{value:g}" for value in x])
+        axes.minorticks_off()
         axes.set_xlabel(label, fontsize=8)
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("DGP")
