@@ -24,8 +24,9 @@ from scenes.demo.make_blind import (
 )
 
 PATHS = 16384  # of the goniophotometer, for each incident patch and side
-SHADE = SlatMaterial("light grey fabric", (0.45,), (0.45,))
-OPENNESS = 0.05  # of the shade: what normal light passes
+# The dissertation does not say which shade: a light fabric, about a fifth of the light passes
+SHADE = SlatMaterial("white fabric", (0.65,), (0.65,), transmittance=(0.12,))
+OPENNESS = 0.10  # of the shade: what normal light passes
 MESH, THREAD = 0.001, 0.0004  # its spacing and thickness [m]
 
 
