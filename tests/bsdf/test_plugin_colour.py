@@ -189,6 +189,8 @@ def test_a_file_in_colour_is_read_as_by_radiance(in_variant, tmp_path):
     path = tmp_path / "colour.xml"
     write_bsdf_xml(BsdfFile({"Visible": y, "CIE-X": x, "CIE-Z": z}), path)
     in_variant("llvm_ad_rgb")
+    import mitsuba_cfs.bsdf.plugin  # noqa: F401  registers the plugin
+
     bsdf = mi.load_dict({"type": "klems_bsdf", "filename": str(path), "up": list(UP)})
     incident, outgoing = radiance.random_directions(2000, seed=3)
     theirs = radiance.query_xyz(path, incident, outgoing)
