@@ -46,7 +46,7 @@ from thermal.control import (
 )
 from thermal.gains import dimmed_share, split_gains
 from thermal.glazing import Gap, gap_resistance
-from thermal.zone import IdealLoads, WindowElement, Zone, work_hours
+from thermal.zone import WindowElement, Zone, work_hours
 
 FloatArray = NDArray[np.float64]
 
@@ -298,7 +298,6 @@ def _zone(
         WindowElement(w.name, w.area, w.normal, states, w.glazing_height, height=w.height)
         for w in room.zone.windows
     )
-    infinity = float("inf")
     return Zone(
         room.zone.name,
         room.zone.volume,
@@ -306,10 +305,5 @@ def _zone(
         windows,
         infiltration_ach=air.infiltration_ach + air.night_ach * work_hours(*air.night, hours=hours),
         gains=split_gains(power * present, gains.radiant_share, (lamps, gains.radiant_share)),
-        loads=IdealLoads(
-            -infinity if loads.heating_c is None else loads.heating_c,
-            infinity if loads.cooling_c is None else loads.cooling_c,
-            loads.heating_limit_w or infinity,
-            loads.cooling_limit_w or infinity,
-        ),
+        loads=loads.ideal(),
     )

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from mitsuba_cfs.errors import DataError
+from thermal.zone import IdealLoads
 
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -123,6 +124,16 @@ class LoadsTable(_Table):
     cooling_c: float | None = None
     heating_limit_w: Positive | None = None
     cooling_limit_w: Positive | None = None
+
+    def ideal(self) -> IdealLoads:
+        """Set points and limits; none stated means never, and without limit."""
+        infinity = float("inf")
+        return IdealLoads(
+            -infinity if self.heating_c is None else self.heating_c,
+            infinity if self.cooling_c is None else self.cooling_c,
+            self.heating_limit_w or infinity,
+            self.cooling_limit_w or infinity,
+        )
 
 
 class ComfortTable(_Table):

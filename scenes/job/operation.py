@@ -27,7 +27,7 @@ from scenes.heat.study_file import (
 from scenes.job.inputs import System, read_system
 from thermal.control import always, by_cut_off, by_glare, by_irradiance, by_schedule
 from thermal.gains import dimmed_share, split_gains
-from thermal.zone import IdealLoads, Zone, work_hours
+from thermal.zone import Zone, work_hours
 
 FloatArray = NDArray[np.float64]
 CLOCK = 24  # hours of a schedule
@@ -165,7 +165,6 @@ def operated(
     power = gains.equipment_w_m2 * floor_area + gains.persons * gains.person_w
     lamps = gains.lighting_w_m2 * floor_area * present
     lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
-    infinity = float("inf")
     found = Zone(
         zone.name,
         zone.volume,
@@ -173,12 +172,7 @@ def operated(
         zone.windows,
         infiltration_ach=air.infiltration_ach + air.night_ach * work_hours(*air.night, hours=hours),
         gains=split_gains(power * present, gains.radiant_share, (lamps, gains.radiant_share)),
-        loads=IdealLoads(
-            -infinity if loads.heating_c is None else loads.heating_c,
-            infinity if loads.cooling_c is None else loads.cooling_c,
-            loads.heating_limit_w or infinity,
-            loads.cooling_limit_w or infinity,
-        ),
+        loads=loads.ideal(),
         view_factors=zone.view_factors,
     )
     return found, lamps
