@@ -225,7 +225,7 @@ def _window_points(
     point, sun = _pairs(count, Q)
     ray = mi.Ray3f(
         dr.gather(mi.Point3f, position, point),
-        _on_disc(dr.gather(mi.Vector3f, towards, sun), point, stream),
+        on_disc(dr.gather(mi.Vector3f, towards, sun), point, stream),
     )
     before = dr.dot(ray.d, mi.Vector3f(*map(float, inside.groups[group].frame[2]))) > 0
     lit = before & ~outside.scene.ray_test(ray, coherent=False, active=before)
@@ -277,7 +277,7 @@ def _through(
     start = dr.gather(mi.Point3f, place, sensor)
     stream = mi.sample_tea_32(sensor, key)[0]
     for stratum in range(DISC_STRATA):
-        direction = _on_disc(dr.gather(mi.Vector3f, towards, sun), mi.UInt32(stratum), stream)
+        direction = on_disc(dr.gather(mi.Vector3f, towards, sun), mi.UInt32(stratum), stream)
         cosine = dr.dot(dr.gather(mi.Vector3f, normal, sensor), direction)
         ray = mi.Ray3f(start, direction)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=cosine > 0)
@@ -305,7 +305,7 @@ def _pairs(first: int, second: int) -> tuple[mi.UInt32, mi.UInt32]:
     return row, index - row * size
 
 
-def _on_disc(centre: mi.Vector3f, sample: mi.UInt32, stream: mi.UInt32) -> mi.Vector3f:
+def on_disc(centre: mi.Vector3f, sample: mi.UInt32, stream: mi.UInt32) -> mi.Vector3f:
     """A direction uniform on the sun's disc."""
     u = mi.Point2f(lattice(sample, stream, 2), lattice(sample, stream, 3))
     cosine = 1 - u.x * float(1 - np.cos(SUN_RADIUS))

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.direct_sun import on_disc
 from mitsuba_cfs.trace.sampling import lattice
 from mitsuba_cfs.trace.scene import TracedScene
 
@@ -60,14 +60,10 @@ def sunlit_shares(
         sensor = pair // count
         hour = pair - sensor * count
         stream = mi.sample_tea_32(sensor, hour + dr.opaque(mi.UInt32, start) + key)[0]
-        u = [lattice(sample, stream, dimension) for dimension in range(4)]
         origin = dr.gather(mi.Point3f, place, sensor)
         for k in range(2):
-            origin += dr.gather(mi.Vector3f, sides[k], sensor) * (u[k] - 0.5)
-        cosine = 1 - u[2] * float(1 - np.cos(SUN_RADIUS))
-        sine, phi = dr.safe_sqrt(1 - cosine * cosine), dr.two_pi * u[3]
-        local = mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), cosine)
-        ray = mi.Ray3f(origin, mi.Frame3f(dr.gather(mi.Vector3f, towards, hour)).to_world(local))
+            origin += dr.gather(mi.Vector3f, sides[k], sensor) * (lattice(sample, stream, k) - 0.5)
+        ray = mi.Ray3f(origin, on_disc(dr.gather(mi.Vector3f, towards, hour), sample, stream))
         before = dr.dot(ray.d, dr.gather(mi.Vector3f, normal, sensor)) > 0
         free = before & ~tracer.scene.ray_test(ray, coherent=False, active=before)
         seen = dr.zeros(mi.Float, S * len(some))
