@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -105,12 +104,9 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
     if not windows:
         what = "no window belongs to a room"
         problems.append(Problem(source.path.name, what, "no daylight"))
-    elements = outdoor_elements(source.model, source.elements)
-    value = source.corrections.surroundings
-    if value is not None:
-        elements = [
-            replace(one, reflectance_visible=value, reflectance_solar=value) for one in elements
-        ]
+    elements = outdoor_elements(
+        source.model, source.elements, reflectance=source.corrections.surroundings
+    )
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
     return outdoors.elements, [*problems, *more, *outdoors.problems]

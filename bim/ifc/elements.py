@@ -69,8 +69,13 @@ def _record(
     )
 
 
-def outdoor_elements(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Element]:
-    """Every building element and terrain, one `Element` for each of its surface styles."""
+def outdoor_elements(
+    model: ifcopenshell.file, shapes: Sequence[Shape], *, reflectance: float | None = None
+) -> list[Element]:
+    """Every building element and terrain, one `Element` for each of its surface styles.
+
+    Args: reflectance: of everything, in place of what the file says.
+    """
     result = []
     for shape in shapes:
         entity = model.by_id(shape.step_id)
@@ -87,6 +92,8 @@ def outdoor_elements(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[
                 visible, solar = look.reflectances
                 if look.is_glass:
                     visible = solar = GLASS_REFLECTANCE
+            if reflectance is not None:
+                visible = solar = reflectance
             result.append(
                 replace(
                     base,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from bim.ifc.corrections import Corrections, chosen, corrections_beside
@@ -40,12 +40,7 @@ def read_standing(
     """
     corrections = corrections_beside(path) if corrections is None else corrections
     source = read_source(path, corrections, progress or (lambda stage, fraction: None))
-    elements = outdoor_elements(source.model, source.elements)
-    value = corrections.surroundings
-    if value is not None:
-        elements = [
-            replace(one, reflectance_visible=value, reflectance_solar=value) for one in elements
-        ]
+    elements = outdoor_elements(source.model, source.elements, reflectance=corrections.surroundings)
     found = tuple(
         frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in))
         for query in select
