@@ -12,7 +12,7 @@ from importlib.util import find_spec
 
 import click
 
-# name: help in one line. The module scenes.commands.<name> defines `command`.
+# name: help in one line. The module <name> of one of PLACES defines `command`.
 COMMANDS = {
     "run": "IFC, weather and fenestration to daylight, glare, heat and comfort.",
     "demo": "The whole job on the office that comes with the program.",
@@ -29,7 +29,14 @@ COMMANDS = {
     "calibrate": "What each method costs on this machine.",
     "bench": "Accuracy and speed against other programs, on this machine.",
 }
+PLACES = ("scenes.commands", "scenes.evidence")  # the second comes with the repository only
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
+
+
+def _module(name: str) -> str | None:
+    """The module that defines a subcommand; None where this installation has none."""
+    modules = (f"{place}.{name}" for place in PLACES if find_spec(place))
+    return next((module for module in modules if find_spec(module)), None)
 
 
 class LazyGroup(click.Group):
@@ -37,13 +44,12 @@ class LazyGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The subcommands whose module is there, in the order of the table."""
-        return [name for name in COMMANDS if find_spec(f"scenes.commands.{name}")]
+        return [name for name in COMMANDS if _module(name)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The subcommand, imported now; None if there is no such one."""
-        if cmd_name not in self.list_commands(ctx):
-            return None
-        return import_module(f"scenes.commands.{cmd_name}").command
+        module = _module(cmd_name) if cmd_name in self.list_commands(ctx) else None
+        return None if module is None else import_module(module).command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the subcommands by the table, without importing them."""

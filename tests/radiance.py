@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenes.benchmarks.radiance import (
+from scenes.evidence.benchmarks.radiance import (
     environment,
     polygon,
     read_float_matrix,

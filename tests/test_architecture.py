@@ -29,8 +29,8 @@ TRACING = (
     "mitsuba_cfs/bsdf/generate.py",
     "mitsuba_cfs/bsdf/tensor_plugin.py",
     "mitsuba_cfs/bsdf/traced_",
-    "scenes/benchmarks/",
-    "scenes/validation/",
+    "scenes/evidence/benchmarks/",
+    "scenes/evidence/validation/",
     "scenes/commands/self_test.py",
 )
 IFC = ("bim/ifc/", "bim/read_ifc.py", "scenes/demo/")
@@ -42,6 +42,7 @@ LIMITED = {
     "matplotlib": PLOTTING,
     "plotly": PLOTTING,
 }
+EVIDENCE = "scenes/evidence/"  # imports the product, never the other way
 LONGEST_MODULE = 400
 CATCH_ALL_NAMES = {"utils.py", "util.py", "common.py", "helpers.py", "misc.py"}
 
@@ -68,6 +69,18 @@ def _imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
                 yield str(node.args[0].value).partition(".")[0], node.lineno
 
 
+def _evidence_imports(tree: ast.AST) -> Iterator[int]:
+    """Lines that import a module of `scenes.evidence`."""
+    for node in ast.walk(tree):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        if any(f"{name}.".startswith("scenes.evidence.") for name in names):
+            yield node.lineno
+
+
 def _faults(name: str, source: str) -> list[str]:
     """What a module does against the rules."""
     tree = ast.parse(source)
@@ -81,6 +94,10 @@ def _faults(name: str, source: str) -> list[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and any(alias.name == "*" for alias in node.names):
             faults.append(f"{name}:{node.lineno}: import *")
+    if not name.startswith(EVIDENCE):
+        faults += [
+            f"{name}:{line}: {EVIDENCE} is no part of it" for line in _evidence_imports(tree)
+        ]
     if len(source.splitlines()) > LONGEST_MODULE:
         faults.append(f"{name}: longer than {LONGEST_MODULE} lines")
     if Path(name).name in CATCH_ALL_NAMES:
@@ -106,6 +123,8 @@ def test_module_keeps_to_the_rules(path: Path) -> None:
         ("bim/x.py", "import ifcopenshell.geom"),
         ("bim/x.py", "import matplotlib.pyplot as plt"),
         ("bim/x.py", "from bim.model import *"),
+        ("scenes/x.py", "from scenes import evidence"),
+        ("scenes/job/x.py", "def f():\n    from scenes.evidence.benchmarks import harness"),
         ("bim/utils.py", ""),
         ("bim/x.py", "x = 1\n" * 401),
         ("bim/x.py", "def f():\n    print(1)\n"),
@@ -122,7 +141,9 @@ def test_modules_were_found() -> None:
 def test_the_wheel_holds_exactly_the_four_packages() -> None:
     settings = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["tool"]["setuptools"]
     expected = {pattern for package in PACKAGES for pattern in (package, f"{package}.*")}
-    assert set(settings["packages"]["find"]["include"]) == expected
+    found = settings["packages"]["find"]
+    assert set(found["include"]) == expected
+    assert set(found["exclude"]) == {"scenes.evidence", "scenes.evidence.*"}
 
 
 def test_every_folder_of_modules_is_a_package() -> None:

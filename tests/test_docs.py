@@ -50,7 +50,7 @@ def given(page: str) -> dict:
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.sky.patches import ReinhartSky
     from mitsuba_cfs.trace.systems import sun_scattering
-    from scenes.benchmarks import room
+    from scenes.cost import room
 
     P, K, H = ReinhartSky(4).size, KLEMS_FULL.size, 4
     sky = np.full((P, H), 1000.0, dtype=np.float32)

@@ -19,9 +19,9 @@ from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import read_epw
-from scenes.benchmarks import room
-from scenes.benchmarks.annual_product import SYSTEM, WEATHER
+from scenes.cost import room
 from scenes.cost.measure import Cost, measure
+from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.methods.methods import METHODS
 from scenes.methods.place import (
     METRICS,
@@ -46,7 +46,7 @@ def reference_place(size: int = 800) -> Place:
 
 def reference_system() -> Fenestration:
     """The demo's blind and glazing."""
-    return fenestration(read_bsdf_xml(SYSTEM).band("Visible"))
+    return fenestration(read_bsdf_xml(VENETIAN_BLIND).band("Visible"))
 
 
 def reference_skies(quality: Quality, count: int = 16) -> Skies:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scenes import cli
-from scenes.benchmarks import harness
+from scenes.evidence.benchmarks import harness
 
 
 def comparison(**changes) -> harness.Comparison:
@@ -85,7 +85,7 @@ def test_unknown_name_and_folder_are_usage_errors(registry, capsys, tmp_path):
 
 
 def test_without_pyradiance_the_peer_is_missing(monkeypatch):
-    from scenes.benchmarks import radiance
+    from scenes.evidence.benchmarks import radiance
 
     monkeypatch.setattr(radiance, "find_spec", lambda name: None)
     with pytest.raises(harness.PeerMissing, match="pip install"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.benchmarks import bsdf_generate, bsdf_tree, harness
+from scenes.evidence.benchmarks import bsdf_generate, bsdf_tree, harness
 
 
 def test_they_take_part():

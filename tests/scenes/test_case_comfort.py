@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from scenes.studies import case_comfort_by_orientation as case
-from scenes.studies.systems import blind_before_glazing
+from scenes.evidence.studies import case_comfort_by_orientation as case
+from scenes.evidence.studies.systems import blind_before_glazing
 
 
 def test_north_is_comfortable_longest(tmp_path, variant, real_data):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import click
 import pydantic
@@ -124,10 +124,17 @@ def test_wrong_usage_is_one_line_and_exit_2(arguments: tuple[str, ...], line: st
 def test_help_lists_every_command_that_there_is() -> None:
     done = _cfs("--help")
     assert done.returncode == 0
-    folder = Path(cli.__file__).parent / "commands"
     for name in cli.COMMANDS:
-        listed = any(line.split()[:1] == [name] for line in done.stdout.splitlines())
-        assert listed == ((folder / f"{name}.py").exists() or (folder / name).is_dir()), name
+        assert any(line.split()[:1] == [name] for line in done.stdout.splitlines()), name
+
+
+def test_a_wheel_lists_no_command_of_the_repository(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        cli, "find_spec", lambda name: None if name == "scenes.evidence" else found(name)
+    )
+    listed = cli.cfs.list_commands(click.Context(cli.cfs))
+    assert "run" in listed and "bench" not in listed
 
 
 def test_help_needs_no_heavy_imports() -> None:

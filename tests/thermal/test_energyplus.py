@@ -11,11 +11,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from scenes.validation.energyplus_cases import EPW_FILES, pairs
-from scenes.validation.energyplus_loads import annual_loads
-from scenes.validation.energyplus_statistics import case_row, comfort_classification, pooled
-from scenes.validation.facade_sun import facade_sun, sun_steps
-from scenes.validation.reference_room import ORIENTATIONS, facade_normal
+from scenes.evidence.validation.energyplus_cases import EPW_FILES, pairs
+from scenes.evidence.validation.energyplus_loads import annual_loads
+from scenes.evidence.validation.energyplus_statistics import (
+    case_row,
+    comfort_classification,
+    pooled,
+)
+from scenes.evidence.validation.facade_sun import facade_sun, sun_steps
+from scenes.evidence.validation.reference_room import ORIENTATIONS, facade_normal
 
 BARS = {
     "dgu": (0.2, 0.3),
@@ -112,7 +116,7 @@ def test_comfort_agrees(real_data, reference_data):
 @pytest.mark.slow
 def test_energyplus_run_here_and_now_is_the_reference(real_data, reference_data, tmp_path):
     pytest.importorskip("pyenergyplus")
-    from scenes.validation.energyplus_model import room_model, run_energyplus
+    from scenes.evidence.validation.energyplus_model import room_model, run_energyplus
 
     epw = real_data / "epw" / EPW_FILES["Frankfurt"]
     table = pd.read_parquet(reference_data / "energyplus" / "ep_Frankfurt.parquet")

@@ -43,7 +43,7 @@ def test_a_year_at_ten_minutes_takes_a_fraction_of_a_second():
 @pytest.mark.slow
 def test_clear_glazing_agrees_with_energyplus_and_is_faster():
     pytest.importorskip("pyenergyplus")
-    from scenes.benchmarks.thermal_year import one_year
+    from scenes.evidence.benchmarks.thermal_year import one_year
 
     result = one_year(lambda stage, fraction: None)
     assert float(result.note.split(" by ")[1].split()[0]) < 0.2  # bar of issue 7 for glazing [K]

@@ -1,0 +1,1 @@
+"""What the program is held against: validation, benchmarks, case studies; not in the wheel."""

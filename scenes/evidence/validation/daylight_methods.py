@@ -1,0 +1,235 @@
+"""The dissertation's Table 2 remade: phase methods against explicit slats, hour by hour.
+
+    python -m scenes.evidence.validation.daylight_methods \\
+        --weather CITY.epw [--every 10] [--json FILE]
+
+Room of Table 1 (3.65 x 4.60 x 3.00 m, to the south-west), six sensors in its middle line; double
+glazing by the Roos model, alone and behind an exterior blind of curved slats at 5, 40 and 70
+degrees.  The reference is the same room path-traced with the slats as geometry; the methods know
+only BSDFs made from it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs import phases, variants
+from mitsuba_cfs.bsdf.generate import generate_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.layers import combine_layers
+from mitsuba_cfs.matrices.fine_basis import fine_basis
+from mitsuba_cfs.phases import PhaseMatrices
+from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
+from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
+from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.five_phase import SunlitRoom, SunSeries, SystemState, five_phase_states
+from mitsuba_cfs.trace.lit_room import Room, Sky, System
+from mitsuba_cfs.trace.point_in_time import point_in_time
+from mitsuba_cfs.trace.systems import lit_system, sun_scattering
+from mitsuba_cfs.trace.view_matrix import view_matrix
+from scenes.evidence.validation.blind_room import (
+    TILTS,
+    Scene,
+    blind_layer,
+    empty,
+    glass_klems,
+    slats,
+    test_room,
+)
+from scenes.evidence.validation.glare_room import glazing, known_system
+
+DIM = 50.0  # [lx] hours below this at the reference count no relative error
+SUBDIVISION = 4
+FINE = fine_basis(3)  # 1,321 patches
+COEFFICIENT_PATHS = 65_536  # of a sensor in each of 16 batches
+
+
+@dataclass(frozen=True)
+class Hours:
+    """The skies of the chosen hours."""
+
+    whole: NDArray[np.float64]  # [P, H] cd/m2, the sun spread over patches
+    sky: NDArray[np.float64]  # [P, H] without the sun
+    sun: NDArray[np.float64]  # [P, H] the sun alone
+    direction: NDArray[np.float64]  # [H, 3]
+    luminance: NDArray[np.float64]  # [H] of the disc [cd/m2]
+
+
+def chosen_hours(weather: Weather, every: int) -> Hours:
+    """All sunlit hours of every `every`-th day."""
+    series = sky_series(weather)
+    day = np.arange(len(weather.times)) // round(24 / weather.step_h)
+    lit = (series.diffuse_horizontal > 100) & is_up(series.sun) & (day % every == every // 2)
+    hours = np.flatnonzero(lit)
+
+    parts = {
+        name: sky_matrix(weather, SUBDIVISION, parts=name)[:, hours] for name in ("sky", "sun")
+    }
+    luminance = series.direct_normal[hours] / SUN_SOLID_ANGLE
+
+    return Hours(
+        parts["sky"] + parts["sun"], parts["sky"], parts["sun"], series.sun[hours], luminance
+    )
+
+
+def known_klems(tilt_deg: float | None, basis: KlemsBasis, samples: int) -> KlemsBsdf:
+    """Matrices of the glazing, behind the blind where there is one."""
+    glass = glass_klems(basis)
+    if tilt_deg is None:
+        return glass
+    blind = generate_klems(blind_layer(tilt_deg), basis, samples=samples, seed=1).bsdf[0]
+    return combine_layers([blind, glass]).bsdf
+
+
+def traced(
+    scene: Scene, basis: KlemsBasis, depth: int = 32, samples: int = 2048
+) -> tuple[Estimate, Estimate]:
+    """V and D, or their direct parts with a depth of 1."""
+    view = view_matrix(
+        scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=depth,
+        basis=basis,
+    )  # fmt: skip
+    daylight = daylight_matrix(
+        empty(), scene.groups, subdivision=SUBDIVISION, samples=samples, max_depth=depth,
+        basis=basis,
+    )  # fmt: skip
+    return view, daylight
+
+
+def by_phases(
+    scene: Scene, system: KlemsBsdf, ways: dict[str, Scattering], hours: Hours
+) -> tuple[dict[str, NDArray[np.float64]], float]:
+    """Illuminance [S, H] by the three-phase and the five-phase method, and V's share of its error.
+
+    Args: ways: what passes the sun in the five-phase method, by name.
+    """
+    (view, daylight), (direct_view, direct_daylight) = (
+        traced(scene, KLEMS_FULL, depth) for depth in (32, 1)
+    )
+    matrices = PhaseMatrices(
+        view.values, daylight.values, direct_view.values, direct_daylight.values
+    )
+    T = system.transmission_matrix()
+    states = {f"five-phase, {name}": SystemState(T, way) for name, way in ways.items()}
+    room = SunlitRoom(scene.interior, empty(), scene.groups, scene.points, scene.up)
+    sun = SunSeries(hours.sun, hours.direction, hours.luminance * SUN_SOLID_ANGLE)
+    whole = phases.three_phase(view.values, [T], daylight.values, hours.whole)
+    found = {"three-phase": whole}
+    found |= five_phase_states(room, matrices, [states], hours.whole, sun)[0]
+    mean = phases.room_side_radiance([T], daylight.values, hours.whole.mean(axis=1, keepdims=True))
+    noise = view.error_of(mean[..., 0])[:, 0] / whole.mean(axis=1)
+    return found, float(noise.max())
+
+
+def by_fine_matrix(scene: Scene, tilt_deg: float | None, hours: Hours) -> NDArray[np.float64]:
+    """Illuminance [S, H] by three phases with matrices of high resolution."""
+    view, daylight = traced(scene, FINE, samples=512)
+    T = known_klems(tilt_deg, FINE, 8192).transmission_matrix()
+    return phases.three_phase(view.values, [T], daylight.values, hours.whole)
+
+
+def by_coefficients(scene: Scene, system: System, hours: Hours) -> NDArray[np.float64]:
+    """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
+    room = Room(scene.interior, empty(), scene.groups, [system])
+    coefficients = daylight_coefficients(
+        room, scene.points, scene.up, subdivision=SUBDIVISION, samples=COEFFICIENT_PATHS
+    )
+    return coefficients.values @ hours.whole
+
+
+def by_paths(
+    scene: Scene, exterior: Surfaces, system: System, hours: Hours, samples: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Illuminance [S, H] by point-in-time paths, and its standard error."""
+    room = Room(scene.interior, exterior, scene.groups, [system])
+    runs = []
+    for h in range(len(hours.luminance)):
+        sky = Sky(hours.sky[:, h], hours.direction[h], hours.luminance[h])
+        runs.append(
+            point_in_time(
+                room, sky, scene.points, scene.up, samples=samples, stopping=Stopping(batches=4)
+            )
+        )
+    return tuple(np.stack([getattr(r, name) for r in runs], axis=1) for name in
+                 ("values", "standard_error"))  # fmt: skip
+
+
+def errors(found: NDArray, reference: NDArray) -> dict[str, float]:
+    """Relative mean bias and root mean square error [%] of each sensor's hours, and of their mean.
+
+    The mean of the six sensors is what the dissertation's figures 27 to 30 show.
+    """
+    bright = reference > DIM
+    relative = found[bright] / reference[bright] - 1
+    lit = reference.mean(axis=0) > DIM
+    mean = found.mean(axis=0)[lit] / reference.mean(axis=0)[lit] - 1
+    return {
+        "rMBE": 100 * float(relative.mean()),
+        "rRMSE": 100 * float(np.sqrt(np.mean(relative**2))),
+        "rMBE of the sensors' mean": 100 * float(mean.mean()),
+        "rRMSE of the sensors' mean": 100 * float(np.sqrt(np.mean(mean**2))),
+        "rMBE of sums": 100 * float(found.sum() / reference.sum() - 1),
+        "lowest [lx]": float(found.min()),
+        "highest ratio of the sensors' mean": 1 + float(mean.max()),
+        "hours above 1.05 [%]": 100 * float(np.mean(mean > 0.05)),
+    }
+
+
+def one_case(scene: Scene, hours: Hours, tilt_deg: float | None, samples: int) -> dict:
+    """All methods against the explicit geometry for one system."""
+    exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
+    klems = known_klems(tilt_deg, KLEMS_FULL, 65536)
+    ways, systems = {"Klems": sun_scattering(klems)}, {"Klems": lit_system(klems)}
+    if tilt_deg is not None:
+        tree = known_system(blind_layer(tilt_deg))
+        ways["tensor tree"], systems["tensor tree"] = tree.scattering, tree.system
+    start = time.monotonic()
+    reference, noise = by_paths(scene, exterior, glazing(), hours, samples)
+    seconds = time.monotonic() - start
+    found, view_noise = by_phases(scene, klems, ways, hours)
+    found["three-phase, fine matrix"] = by_fine_matrix(scene, tilt_deg, hours)
+    for name, system in systems.items():
+        found[f"two-phase, {name}"] = by_coefficients(scene, system, hours)
+        found[f"point in time, {name}"] = by_paths(scene, empty(), system, hours, samples)[0]
+    return {
+        "noise of the reference [%]": 100 * float(np.mean(noise / np.maximum(reference, DIM))),
+        "noise of V, worst sensor [%]": 100 * view_noise,
+        "seconds of the reference": round(seconds, 1),
+        "hours": reference.shape[1],
+        **{name: errors(values, reference) for name, values in found.items()},
+    }
+
+
+def main() -> None:
+    """Run all systems and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--weather", type=Path, required=True)
+    parser.add_argument("--every", type=int, default=10, help="days from one to the next")
+    parser.add_argument("--samples", type=int, default=8192, help="paths of a sensor in a batch")
+    parser.add_argument("--only", choices=TILTS, action="append", help="system, all by default")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    variants.activate()
+    hours = chosen_hours(read_epw(options.weather), options.every)
+    scene, results = test_room(), {}
+    for name in options.only or TILTS:
+        results[name] = one_case(scene, hours, TILTS[name], options.samples)
+        print(name, json.dumps(results[name], indent=1), flush=True)
+    if options.json:
+        options.json.write_text(json.dumps(results, indent=1))
+
+
+if __name__ == "__main__":
+    main()

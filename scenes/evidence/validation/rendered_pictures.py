@@ -1,0 +1,252 @@
+"""The same room rendered by Radiance and by this project: vertical illuminance and DGP.
+
+    python -m scenes.evidence.validation.rendered_pictures \\
+        [--systems glass blind tree] [--json FILE]
+
+Room of the dissertation's Table 1 seen from 2 m behind its south window, at twelve positions of the
+sun; clear glass, and the demo's blind as Klems matrices (`BSDF`) and as tensor tree (`aBSDF`).
+Both programs get the sky on the same Reinhart patches and the sun as a disc of 0.533 degrees.
+rpict renders 16 pixels for each of the picture's.  Radiance's Ev is rtrace's, of a point and
+without an ambient cache; its DGP is that of rpict's glare sources with this Ev (evalglare's `-i`),
+ours of the picture alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.blinds import venetian_blind
+from mitsuba_cfs.bsdf.generate import generate_tensor_tree
+from mitsuba_cfs.bsdf.glazing import uncoated_values
+from mitsuba_cfs.bsdf.periodic import plastic
+from mitsuba_cfs.bsdf.plugin import klems_plugin
+from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.images.hdr import EFFICACY, read_hdr
+from mitsuba_cfs.images.view import View, fisheye, format_view
+from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
+from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE, is_up
+from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.trace.lit_room import AngularBeam, Room, Sky, System
+from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+from mitsuba_cfs.trace.systems import lit_system
+from scenes.cost import room
+from scenes.evidence.benchmarks import radiance
+from scenes.evidence.benchmarks.annual_product import SYSTEM, WEATHER
+
+EYE, DIRECTION = (1.8, 2.0, 1.2), (0.0, -1.0, 0.0)
+SIZE, FINER = 200, 4  # [px] of the pictures; rpict's are finer, and averaged
+SAMPLES = 32
+SUBDIVISION = 4
+MONTHS, TIMES = (12, 3, 6), (9, 11, 13, 15)  # of the twelve suns; the month's clearest day
+INDEX, TRANSMISSIVITY = 1.52, 0.90  # of Radiance's `glass`: refractive index; inner transmittance
+TREE_LEVELS, TREE_SAMPLES = 4, 65536
+QUALITY = "-dc 1 -dt 0 -dj 0 -ds 0.1 -st 0"
+CACHED = "-ps 1 -pa 0 -ss 4 -ab 4 -ad 256 -as 0 -aa 0.25 -ar 16 -lr 8 -lw 1e-3"  # of the pictures
+POINT = "-u+ -ss 1 -ab 8 -ad 32768 -aa 0 -lr 20 -lw 1e-9"  # of Ev, so many times:
+POINTS = 8
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The sky of an hour."""
+
+    name: str
+    patches: NDArray[np.float64]  # [P] of sky and ground [cd/m2]
+    sun: NDArray[np.float64]  # [3]
+    sun_luminance: float  # [cd/m2]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Both programs' figures of a picture."""
+
+    system: str
+    moment: str
+    altitude_deg: float
+    ev_rtrace: float
+    ev_rtrace_error: float  # its standard error [lx]
+    ev: float  # ours, from the picture
+    dgp_rpict: float
+    dgp: float
+    sources_rpict: int
+    sources: int
+    seconds_rpict: float
+    seconds: float
+
+
+def moments(weather: Weather) -> list[Moment]:
+    """Twelve sunny hours: of each month and time the day with the strongest sun."""
+    series = sky_series(weather)
+    patches = sky_matrix(weather, SUBDIVISION, parts="sky")
+    up = is_up(series.sun)
+    found = []
+    for month in MONTHS:
+        for time_of_day in TIMES:
+            mine = (weather.times.month == month) & (weather.midpoints.hour == time_of_day) & up
+            hour = int(np.argmax(np.where(mine, series.direct_normal, -1.0)))
+            sun = series.sun[hour]
+            name = f"{weather.midpoints[hour]:%d %b %H:%M}"
+            luminance = series.direct_normal[hour] / SUN_SOLID_ANGLE
+            found.append(Moment(name, patches[:, hour], sun, float(luminance)))
+    return found
+
+
+class Fenestration:
+    """A window's system for both programs."""
+
+    def __init__(self, name: str, folder: Path) -> None:
+        """Write its file into the folder and load it."""
+        self.name = name
+        if name == "glass":
+            self.material = f"void glass window\n0\n0\n3{3 * f' {TRANSMISSIVITY}'}\n"
+            cosine = np.linspace(0, 1, 256)
+            tau, rho = uncoated_values(*_normal_values(), np.arccos(cosine))
+            mirror = AngularBeam(rho)
+            self.system = System(None, AngularBeam(tau), (mirror, mirror))
+        elif name == "blind":
+            (folder / "blind.xml").write_bytes(SYSTEM.read_bytes())
+            self.material = "void BSDF window\n6 0 blind.xml 0 0 1 .\n0\n0\n"
+            bsdf = read_bsdf_xml(SYSTEM).band("Visible")
+            self.system = System(mi.load_dict(klems_plugin(bsdf)))
+        else:
+            write_bsdf_xml(_tree(), folder / "tree.xml")
+            self.material = "void aBSDF window\n5 tree.xml 0 0 1 .\n0\n0\n"
+            self.system = lit_system(read_bsdf_xml(folder / "tree.xml").band("Visible"))
+
+
+def _normal_values() -> tuple[float, float]:
+    """Transmittance and reflectance of the glass at normal incidence, all inner reflections."""
+    r, a = ((INDEX - 1) / (INDEX + 1)) ** 2, TRANSMISSIVITY
+    tau = (1 - r) ** 2 * a / (1 - (r * a) ** 2)
+    return tau, r + r * a * tau
+
+
+def _tree() -> BsdfFile:
+    """The dissertation's blind at 40 degrees as tensor trees."""
+    slats = {"depth": 0.080, "radius": 0.104, "spacing": 0.072, "tilt": np.radians(40)}
+    layer = venetian_blind(plastic("slat", 0.55), **slats)
+    trees, _ = generate_tensor_tree(layer, TREE_LEVELS, samples=TREE_SAMPLES, seed=1)
+    return BsdfFile({"Visible": trees[0]}, name="blind", manufacturer="mitsuba-cfs", thickness=0.08)
+
+
+class Radiance:
+    """The room in a folder, rendered by Radiance."""
+
+    def __init__(self, folder: Path, fenestration: Fenestration) -> None:
+        radiance.write_surfaces(room.room(), folder / "room.rad")
+        lines = [fenestration.material]
+        window = room.window_groups()[0].windows[0]
+        for i, triangle in enumerate(window.triangles):  # normals into the room
+            lines.append(radiance.polygon("window", f"pane{i}", triangle[::-1]))
+        (folder / "window.rad").write_text("\n".join(lines))
+        library = radiance.environment()["RAYPATH"].split(":")[-1]
+        cal = (Path(library) / "reinhart.cal").read_text()
+        (folder / "sky.cal").write_text(f"MF : {SUBDIVISION};\n{cal}")
+        self.folder = folder
+
+    def set_sky(self, moment: Moment) -> None:
+        """Compile the scene under a sky."""
+        values = " ".join(f"{v / EFFICACY:.8g}" for v in moment.patches)
+        last = len(moment.patches) - 1
+        (self.folder / "sky.dat").write_text(f"1\n0 {last} {last + 1}\n{values}\n")
+        sun, radiance_ = moment.sun, f" {moment.sun_luminance / EFFICACY:.8g}"
+        angle = 2 * np.degrees(SUN_RADIUS)
+        (self.folder / "sky.rad").write_text(
+            "void brightdata patches\n4 noop sky.dat sky.cal rbin\n0\n0\n"
+            "patches glow sky_glow\n0\n0\n4 1 1 1 0\nsky_glow source sky\n0\n0\n4 0 0 1 360\n"
+            f"void light solar\n0\n0\n3{3 * radiance_}\nsolar source sun\n0\n0\n"
+            f"4 {sun[0]:.9g} {sun[1]:.9g} {sun[2]:.9g} {angle:.6g}\n"
+        )
+        radiance.run("oconv sky.rad room.rad window.rad > scene.oct", self.folder)
+
+    def picture(self, view: View) -> NDArray[np.float64]:
+        """Luminance [ny, nx], each pixel the mean of finer ones."""
+        n = FINER
+        size = f"-x {n * view.width} -y {n * view.height}"
+        command = f"rpict {QUALITY} {CACHED} {format_view(view)} {size} scene.oct > fine.hdr"
+        radiance.run(command, self.folder)
+        fine = read_hdr(self.folder / "fine.hdr").luminance
+        return fine.reshape(view.height, n, view.width, n).mean(axis=(1, 3))
+
+    def eye_illuminance(self, view: View) -> tuple[float, float]:
+        """Illuminance at the eye by rtrace, and its standard error."""
+        command = f"rtrace -h -I+ {QUALITY} {POINT} scene.oct"
+        given = radiance.sensors_text([view.position] * POINTS, [view.direction] * POINTS)
+        lines = radiance.run(command, self.folder, given).decode().split()
+        values = np.array(lines, dtype=float).reshape(POINTS, -1)[:, 0] * EFFICACY
+        return float(values.mean()), float(values.std(ddof=1) / np.sqrt(POINTS))
+
+
+def outcomes(
+    systems: list[str], chosen: list[Moment], folder: Path, *, size: int = SIZE
+) -> Iterator[Outcome]:
+    """Render every moment with every system in both programs."""
+    view = fisheye(EYE, DIRECTION, size)
+    for name in systems:
+        fenestration = Fenestration(name, folder)
+        peer = Radiance(folder, fenestration)
+        lit = Room(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
+        for moment in chosen:
+            start = time.perf_counter()
+            sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
+            picture = point_in_time_picture(lit, sky, view, samples=SAMPLES)
+            seconds = time.perf_counter() - start
+            peer.set_sky(moment)
+            start = time.perf_counter()
+            theirs = peer.picture(view)
+            peer_seconds = time.perf_counter() - start
+            np.savez(folder / f"{name} {moment.name}.npz", ours=picture, theirs=theirs)
+            ev, ev_error = peer.eye_illuminance(view)
+            ours = evaluate(picture, view)
+            rated = evaluate(theirs, view, illuminance=ev)
+            altitude = float(np.degrees(np.arcsin(moment.sun[2])))
+            yield Outcome(
+                name, moment.name, altitude, ev, ev_error, ours.Ev, rated.dgp, ours.dgp,
+                rated.count, ours.count, peer_seconds, seconds,
+            )  # fmt: skip
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--systems", nargs="+", default=["glass", "blind", "tree"])
+    parser.add_argument("--weather", type=Path, default=WEATHER)
+    parser.add_argument("--size", type=int, default=SIZE)
+    parser.add_argument("--every", type=int, default=1, help="moments from one to the next")
+    parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    variants.activate()
+    chosen = moments(read_epw(options.weather))[:: options.every]
+    rows = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = options.keep or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        for row in outcomes(options.systems, chosen, folder.resolve(), size=options.size):
+            rows.append(asdict(row))
+            print(
+                f"{row.system:6} {row.moment} {row.altitude_deg:5.1f} deg  Ev "
+                f"{row.ev_rtrace:9.1f} +- {row.ev_rtrace_error:.1f}  "
+                f"{row.ev:9.1f} ({100 * (row.ev / row.ev_rtrace - 1):+.2f} %)  DGP "
+                f"{row.dgp_rpict:.4f}  {row.dgp:.4f} ({row.dgp - row.dgp_rpict:+.4f})  sources "
+                f"{row.sources_rpict} {row.sources}  {row.seconds_rpict:.0f} s {row.seconds:.1f} s",
+                flush=True,
+            )
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()
