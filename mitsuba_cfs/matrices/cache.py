@@ -14,12 +14,12 @@ import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mitsuba_cfs.source_code import code_version
 
 VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
@@ -66,9 +66,12 @@ class MatrixCache:
         """The user's cache."""
         return cls(default_folder())
 
-    def entry(self, label: str, *inputs: object) -> CacheEntry:
-        """The place of the matrix that follows from these inputs and this program's code."""
-        key = digest(label, code_version(), *inputs)
+    def entry(self, label: str, *inputs: object, by: str) -> CacheEntry:
+        """The place of the matrix that a module computes from these inputs.
+
+        Args: by: the module's dotted name; its source and what it imports are an input too.
+        """
+        key = digest(label, code_version(by), *inputs)
         return CacheEntry(self, self.folder / f"{label.replace(' ', '-')}-{key[:40]}.npz")
 
     def trim(self, keep: Path | None = None) -> None:
@@ -174,17 +177,6 @@ def _feed(state: hashlib._Hash, value: object) -> None:
         state.update(f"{type(value).__name__} {len(text)};".encode() + text)
     else:
         raise ValueError(f"cannot hash a {type(value).__name__}")
-
-
-@cache
-def code_version() -> str:
-    """The tracer's version: its own source and those of what it is built on."""
-    package = Path(__file__).parents[1]
-    sources = [*sorted((package / "trace").glob("*.py")), package / "bsdf" / "klems.py"]
-    sources += sorted((package / "bsdf").glob("*plugin*.py"))
-    sources += [package / "sky" / "patches.py", package / "surfaces.py", package / "directions.py"]
-    versions = [metadata.version(name) for name in ("mitsuba", "drjit")]
-    return digest(*versions, *(source.read_bytes() for source in sources))
 
 
 def _status(file: Path) -> os.stat_result | None:

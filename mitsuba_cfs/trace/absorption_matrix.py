@@ -110,6 +110,6 @@ def absorption_matrix(
         progress=progress,
         entry=cache_entry(
             cache, "absorption matrix", surfaces, groups, reflectance, basis, n,
-            max_depth, seed, stopping=stopping,
+            max_depth, seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip

@@ -52,6 +52,6 @@ def daylight_coefficients(
         progress=progress,
         entry=cache_entry(
             cache, "daylight coefficients", key, np.asarray(points), np.asarray(directions),
-            subdivision, samples, max_depth, seed, stopping=stopping,
+            subdivision, samples, max_depth, seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip

@@ -106,7 +106,7 @@ def daylight_matrix(
         progress=progress,
         entry=cache_entry(
             cache, "daylight matrix", surfaces, groups, subdivision, basis, n, max_depth,
-            seed, stopping=stopping,
+            seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
 
@@ -176,6 +176,6 @@ def sky_irradiance_matrix(
         entry=cache_entry(
             cache, "sky irradiance", surfaces, points, directions, subdivision,
             () if acceptance is None else np.asarray(acceptance, dtype=float), n, max_depth,
-            seed, stopping=stopping,
+            seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip

@@ -166,7 +166,7 @@ def direct_sun_matrix(
         progress=progress,
         entry=cache_entry(
             cache, "direct sun", interior, exterior, groups, ways, points, directions, suns,
-            window_points, seed, stopping=stopping,
+            window_points, seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
 

@@ -113,15 +113,17 @@ def accumulate(
 
 
 def cache_entry(
-    cache: MatrixCache | None, label: str, *inputs: object, stopping: Stopping | None
+    cache: MatrixCache | None, label: str, *inputs: object, by: str, stopping: Stopping | None
 ) -> CacheEntry | None:
     """The place of a traced matrix in the cache, if there is one.
 
     The variant is an input too: CUDA and LLVM round differently.
+
+    Args: by: name of the module that traces it.
     """
     if cache is None:
         return None
-    return cache.entry(label, mi.variant(), stopping or Stopping(), *inputs)
+    return cache.entry(label, mi.variant(), stopping or Stopping(), *inputs, by=by)
 
 
 class _Keeper:

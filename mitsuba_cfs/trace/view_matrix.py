@@ -100,7 +100,7 @@ def view_matrix(
         progress=progress,
         entry=cache_entry(
             cache, "view matrix", surfaces, groups, points, directions, basis, n, max_depth,
-            seed, stopping=stopping,
+            seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from scipy import sparse
 from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
-from mitsuba_cfs.trace.annual_pictures import ViewMatrices
+from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
 
 LARGEST = 256 << 20  # [bytes] larger ones are traced anew: they would push out all the others
 
@@ -27,7 +27,7 @@ def kept_view(
     """
     if cache is None:
         return trace()
-    path = cache.entry("view pictures", view, *inputs).path
+    path = cache.entry("view pictures", view, *inputs, by=view_matrices.__module__).path
     try:
         return _read(path, view)
     except FileNotFoundError:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import asdict, dataclass, replace
-from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mitsuba_cfs.matrices.cache import digest
+from mitsuba_cfs.source_code import code_version
 from scenes.job.options import RoomOptions
 
 if TYPE_CHECKING:
@@ -97,11 +96,6 @@ def with_method(case: Case, method: str, metric: str, why: str) -> Case:
     return replace(case, options=replace(case.options, method=method), glare=metric, chosen=why)
 
 
-@cache
 def program_version() -> str:
     """A hash of the source that computes a case, and of what it is built on."""
-    root = Path(__file__).parents[2]
-    folders = ("mitsuba_cfs", "bim", "thermal", "scenes/job", "scenes/study")
-    sources = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
-    versions = [metadata.version(name) for name in ("mitsuba", "drjit", "numpy", "ifcopenshell")]
-    return digest(*versions, *(source.read_bytes() for source in sources))
+    return code_version("scenes.study.one_case")

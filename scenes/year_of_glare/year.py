@@ -23,6 +23,7 @@ from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.matrix import sun_up
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.source_code import code_version
 from scenes.job.inputs import chosen_spaces, read_system, read_weather, sha256
 from scenes.methods.phases import PhaseSystem, phase_scene
 from scenes.methods.place import Fenestration, Place, Quality, Skies, fenestration, skies_of
@@ -81,7 +82,7 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
         nothing,
         nothing,
     )
-    chosen = [options.method, options.metric, options.samples, options.seed]
+    chosen = [code_version(__name__), options.method, options.metric, options.samples, options.seed]
     files = [sha256(p) for p in (options.building, options.weather, options.system)]
     digest = hashlib.sha256(json.dumps([*chosen, *files, space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))

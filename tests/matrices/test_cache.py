@@ -17,6 +17,7 @@ import pytest
 from mitsuba_cfs.matrices.cache import MatrixCache, State, default_folder, digest
 from tests.trace import rooms
 
+BY = "mitsuba_cfs.trace.estimate"  # the module that computes what these tests keep
 STATE = State(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
 
 
@@ -38,7 +39,7 @@ def batches(log: list[int], fail_at: int | None = None):
 
 
 def test_a_state_comes_back_as_it_was(cache):
-    entry = cache.entry("view matrix", 1)
+    entry = cache.entry("view matrix", 1, by=BY)
     assert entry.load() is None
     entry.save(STATE)
     found = entry.load()
@@ -51,11 +52,11 @@ def test_a_finished_matrix_is_not_traced_again(cache):
     from mitsuba_cfs.trace.estimate import accumulate
 
     log: list[int] = []
-    first, second = (accumulate(batches(log), entry=cache.entry("m", 1)) for _ in range(2))
+    first, second = (accumulate(batches(log), entry=cache.entry("m", 1, by=BY)) for _ in range(2))
     assert log == list(range(16))
     assert np.array_equal(first.values, second.values)
     assert np.array_equal(first.standard_error, second.standard_error)
-    accumulate(batches(log), entry=cache.entry("m", 2))
+    accumulate(batches(log), entry=cache.entry("m", 2, by=BY))
     assert len(log) == 32
 
 
@@ -65,8 +66,8 @@ def test_a_stopped_run_goes_on_to_the_same_bits(cache):
     whole = accumulate(batches([]))
     log: list[int] = []
     with pytest.raises(KeyboardInterrupt):
-        accumulate(batches(log, fail_at=7), entry=cache.entry("m", 1))
-    resumed = accumulate(batches(log), entry=cache.entry("m", 1))
+        accumulate(batches(log, fail_at=7), entry=cache.entry("m", 1, by=BY))
+    resumed = accumulate(batches(log), entry=cache.entry("m", 1, by=BY))
     assert log == list(range(16))  # each batch once
     assert np.array_equal(whole.values, resumed.values)
     assert np.array_equal(whole.standard_error, resumed.standard_error)
@@ -76,7 +77,7 @@ def test_a_stopped_run_goes_on_to_the_same_bits(cache):
 def test_a_damaged_file_is_ignored_and_written_anew(cache, damage):
     from mitsuba_cfs.trace.estimate import accumulate
 
-    entry = cache.entry("m", 1)
+    entry = cache.entry("m", 1, by=BY)
     whole = accumulate(batches([]), entry=entry)
     data = bytearray(entry.path.read_bytes())
     middle = len(data) // 2
@@ -94,7 +95,7 @@ def test_a_folder_that_cannot_be_written_costs_a_warning_only(tmp_path, caplog):
     from mitsuba_cfs.trace.estimate import accumulate
 
     (tmp_path / "file").write_text("in the way")
-    entry = MatrixCache(tmp_path / "file").entry("m", 1)
+    entry = MatrixCache(tmp_path / "file").entry("m", 1, by=BY)
     result = accumulate(batches([]), entry=entry)
     assert np.array_equal(result.values, accumulate(batches([])).values)
     assert "not kept" in caplog.text
@@ -103,13 +104,14 @@ def test_a_folder_that_cannot_be_written_costs_a_warning_only(tmp_path, caplog):
 def test_the_longest_unused_files_go_first(cache):
     small = replace(cache, limit=3 * 1600)
     for number in range(6):
-        entry = small.entry("m", number)
+        entry = small.entry("m", number, by=BY)
         entry.save(STATE)
         os.utime(entry.path, (1000 + number, 1000 + number))
     small.trim()
     left = {file for file in cache.folder.iterdir()}
     assert sum(file.stat().st_size for file in left) <= small.limit
-    assert left and small.entry("m", 5).path in left and small.entry("m", 0).path not in left
+    newest, oldest = (small.entry("m", number, by=BY).path for number in (5, 0))
+    assert newest in left and oldest not in left
 
 
 def test_every_input_counts():
@@ -222,7 +224,8 @@ SLOW_RUN = """
             time.sleep(60)  # the batch under way when the signal comes
         return np.random.default_rng(number).random((4, 5))
 
-    estimate.accumulate(batch, entry=MatrixCache(Path(sys.argv[1])).entry("m", 1))
+    cache = MatrixCache(Path(sys.argv[1]))
+    estimate.accumulate(batch, entry=cache.entry("m", 1, by="mitsuba_cfs.trace.estimate"))
 """
 
 
@@ -238,9 +241,9 @@ def test_a_killed_process_loses_the_batch_under_way_only(cache):
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    state = cache.entry("m", 1).load()
+    state = cache.entry("m", 1, by=BY).load()
     assert state.count == 6 and not state.finished
     log: list[int] = []
-    resumed = accumulate(batches(log), entry=cache.entry("m", 1))
+    resumed = accumulate(batches(log), entry=cache.entry("m", 1, by=BY))
     assert log == list(range(6, 16))
     assert np.array_equal(resumed.values, accumulate(batches([])).values)
