@@ -34,7 +34,7 @@ def element_surfaces(elements: Iterable[Element], band: str = "visible") -> Surf
 def _surfaces(parts: Iterable[Face | Element], band: str) -> Surfaces:
     parts = list(parts)
     if not parts:
-        return Surfaces(np.empty((0, 3, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+        return Surfaces.none()
     counts = [len(part.triangles) for part in parts]
     return Surfaces(
         np.concatenate([part.triangles for part in parts]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 Progress = Callable[[str, float], None]
 """Called with a stage's label and the fraction of that stage done, 0 to 1."""
@@ -24,3 +24,19 @@ def part(progress: Progress, start: float, end: float, stage: str | None = None)
         progress(stage or label, start + (end - start) * fraction)
 
     return inner
+
+
+def staged(
+    progress: Progress, places: Mapping[str, tuple[float, float]], label: str | None = None
+) -> Progress:
+    """A progress whose stages are parts of larger ones: each from a start to an end.
+
+    Args: places: start and end of each stage, as shares; label: the one stage that they are parts
+        of, their own names by default.
+    """
+
+    def told(stage: str, fraction: float) -> None:
+        start, end = places.get(stage, (0.0, 1.0))
+        progress(label or stage, start + (end - start) * fraction)
+
+    return told

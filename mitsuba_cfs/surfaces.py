@@ -30,6 +30,11 @@ class Surfaces:
         if n and not (np.min(self.reflectance) >= 0 and np.max(self.reflectance) <= 1):
             raise ValueError("reflectance: expected values from 0 to 1")
 
+    @classmethod
+    def none(cls) -> Surfaces:
+        """No surface at all."""
+        return cls(np.empty((0, 3, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+
     @property
     def areas(self) -> NDArray[np.float64]:
         """Area of each triangle [N] [m2]."""

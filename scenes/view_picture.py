@@ -17,11 +17,14 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, parse_view, pixel_directions
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.path_light import PathSystems
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.annual import annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.inputs import chosen_spaces, read_system, read_weather
-from scenes.methods.paths import path_scene
-from scenes.methods.place import Place, Quality, fenestration, skies_of
 from scenes.pictures import write_falsecolour, write_tone_mapped
 
 SUFFIXES = (".hdr", ".exr", ".png")
@@ -62,16 +65,18 @@ def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPi
     space = chosen_spaces(building, names, options.building)[0]
     view = room_view(space, options)
     variants.activate()
-    nothing = np.empty((0, 3))
-    place = Place(
-        interior_surfaces(space, "visible"), exterior_surfaces(building, space, "visible"),
-        window_groups(space), view, nothing, nothing,
-    )  # fmt: skip
-    quality = Quality(path_samples=options.samples, seed=options.seed)
-    scene = path_scene(place, "picture", quality=quality)
-    lit = scene.behind(fenestration(system.visible, system.fine))
-    skies = skies_of(weather, [hour], subdivision=quality.subdivision)
-    luminance = lit.picture(skies, 0, progress=part(progress, 0.4, 1.0, "picture"))
+    scene = DaylightScene(
+        interior_surfaces(space, "visible"),
+        exterior_surfaces(building, space, "visible"),
+        window_groups(space),
+        view=view,
+    )
+    sampling = Sampling(picture_samples=options.samples, seed=options.seed)
+    systems = [[BsdfOptics(system.visible, system.fine)]] * len(scene.groups)
+    light = PathSystems(scene, systems, sampling).light(
+        annual_sky(weather, sampling.subdivision, hours=[hour])
+    )
+    luminance = light.picture(0, progress=part(progress, 0.4, 1.0, "picture"))
     return RoomPicture(luminance, view, space.name or space.guid, weather.midpoints[hour])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from mitsuba_cfs.progress import Progress, silent
@@ -119,6 +119,7 @@ def sky_matrix(
     ground_reflectance: float | None = None,
     measured_illuminance: bool = False,
     sun_up_only: bool = False,
+    hours: ArrayLike | None = None,
     dtype: type = np.float64,
     progress: Progress = silent,
 ) -> NDArray:
@@ -137,6 +138,7 @@ def sky_matrix(
         ground_reflectance: the weather's albedo unless given.
         measured_illuminance: use the file's illuminances rather than Perez's efficacies.
         sun_up_only: leave out the time steps where `sun_up` is false.
+        hours: only these time steps, by their numbers.
 
     Raises: `ValueError` for an unknown option, or illuminances that the weather does not have.
     """
@@ -152,7 +154,7 @@ def sky_matrix(
     )
     reflectance = weather.albedo if ground_reflectance is None else ground_reflectance
     chosen = sun_module.is_up(series.sun) if sun_up_only else np.ones(len(series.sun), dtype=bool)
-    hours = np.flatnonzero(chosen)
+    hours = np.flatnonzero(chosen) if hours is None else np.asarray(hours, dtype=np.int64)
     lit = np.flatnonzero((series.diffuse_horizontal + series.direct_normal)[hours] > 0)
     result = np.zeros((sky.size, len(hours)), dtype=dtype)
     size = max(1, CHUNK_BYTES // (8 * sky.size))

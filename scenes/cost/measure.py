@@ -3,7 +3,7 @@
     seconds = S (per_scene + N (per_system + T per_step))
 
 with S scenes, N fenestration systems in each and T time steps: the constants of the dissertation's
-Tables 5, 8 and 11.  What is timed are the very functions of `scenes.methods`.
+Tables 5, 8 and 11.  What is timed are the very functions of `mitsuba_cfs.methods`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,14 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from mitsuba_cfs.methods import METHODS, METRICS
+from mitsuba_cfs.methods.by_name import PathScene, traced_scene, values, with_systems
+from mitsuba_cfs.methods.optics import SystemOptics
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
-from scenes.methods.methods import METHODS, method_scene
-from scenes.methods.place import METRICS, Fenestration, Place, Quality, Skies
+from mitsuba_cfs.sky.annual import AnnualSky
 
 # Timed, after one untimed: what more steps take beyond a few is the cost of a step, the rest of the
 # few is that of their system
@@ -45,58 +50,65 @@ class Cost:
 
 
 def measure(
-    place: Place,
-    fenestration: Fenestration,
-    skies: Skies,
-    quality: Quality | None = None,
+    scene: DaylightScene,
+    optics: SystemOptics,
+    sky: AnnualSky,
+    sampling: Sampling | None = None,
     *,
     methods: Sequence[str] = METHODS,
     metrics: Sequence[str] = METRICS,
     clock: Callable[[], float] = time.perf_counter,
     progress: Progress = silent,
 ) -> list[Cost]:
-    """Time methods and metrics in a place.
+    """Time methods and metrics in a scene with a system in all its windows.
 
     Kernels are compiled before, in a small picture: that is paid once on a machine.
 
     Args:
-        skies: at least one hour; best with the sun before the windows.  They are repeated as
-            needed.
+        sky: at least one hour; best with the sun before the windows.  They are repeated as needed.
         clock: elapsed seconds; `time.process_time` gives processor seconds of all threads, which
             other work on the machine disturbs less.
     """
-    quality, found = quality or Quality(), []
+    sampling, found = sampling or Sampling(), []
     pairs = [(method, metric) for method in methods for metric in metrics]
     for number, (method, metric) in enumerate(pairs):
         progress("calibration", number / len(pairs))
-        found.append(_measure(method, metric, place, fenestration, skies, quality, clock))
+        found.append(_measure((method, metric), scene, optics, sky, sampling, clock))
     progress("calibration", 1.0)
     return found
 
 
 def _measure(
-    method: str,
-    metric: str,
-    place: Place,
-    fenestration: Fenestration,
-    skies: Skies,
-    quality: Quality,
+    pair: tuple[str, str],
+    scene: DaylightScene,
+    optics: SystemOptics,
+    sky: AnnualSky,
+    sampling: Sampling,
     clock: Callable[[], float],
 ) -> Cost:
-    small = replace(place, view=replace(place.view, width=SMALL, height=SMALL))
-    cheap = replace(quality, sensor_samples=64, patch_samples=64)
-    method_scene(method, metric, small, cheap).behind(fenestration).values(skies.part([0]))
-    few, many = (skies.part(np.arange(n) % skies.hours) for n in STEPS[method])
-    scene, per_scene = _timed(lambda: method_scene(method, metric, place, quality), clock)
-    system, per_system = _timed(lambda: scene.behind(fenestration), clock)
-    system.values(few)  # kernels of this size are compiled
-    _, of_few = _timed(lambda: system.values(few), clock)
-    _, of_many = _timed(lambda: system.values(many), clock)
+    method, metric = pair
+    systems = [[optics]] * len(scene.groups)
+
+    def traced(scene: DaylightScene, sampling: Sampling) -> PhaseScene | PathScene:
+        found = traced_scene(method, scene, sampling)
+        if isinstance(found, PhaseScene):
+            found.trace(metric)
+        return found
+
+    small = replace(scene, view=replace(scene.view, width=SMALL, height=SMALL))
+    cheap = replace(sampling, sensor_samples=64, patch_samples=64, hour_samples=64)
+    values(with_systems(traced(small, cheap), systems).light(sky.part([0])), metric)
+    few, many = (sky.part(np.arange(n) % len(sky.lit)) for n in STEPS[method])
+    found, per_scene = _timed(lambda: traced(scene, sampling), clock)
+    filled, per_system = _timed(lambda: with_systems(found, systems), clock)
+    values(filled.light(few), metric)  # kernels of this size are compiled
+    _, of_few = _timed(lambda: values(filled.light(few), metric), clock)
+    _, of_many = _timed(lambda: values(filled.light(many), metric), clock)
     if method == "point-in-time":  # all is done again in every step
         return Cost(method, metric, per_scene, per_system, (of_few + of_many) / sum(STEPS[method]))
-    slope = (of_many - of_few) / (many.hours - few.hours)
-    per_step = max(slope, LEAST * of_many / many.hours)
-    per_system += max(of_few - few.hours * per_step, 0.0)
+    slope = (of_many - of_few) / (len(many.lit) - len(few.lit))
+    per_step = max(slope, LEAST * of_many / len(many.lit))
+    per_system += max(of_few - len(few.lit) * per_step, 0.0)
     return Cost(method, metric, per_scene, per_system, per_step)
 
 

@@ -16,56 +16,51 @@ import numpy as np
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods import METHODS, METRICS
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import read_epw
 from scenes.cost import room
 from scenes.cost.measure import Cost, measure
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.methods.methods import METHODS
-from scenes.methods.place import (
-    METRICS,
-    Fenestration,
-    Place,
-    Quality,
-    Skies,
-    fenestration,
-    skies_of,
-)
 
 EYE, DIRECTION = (1.8, 2.0, 1.2), (0.0, -1.0, 0.0)
 DIRECT = 20_000.0  # [lx] normal to the sun: the timed hours have the sun before the window
 
 
-def reference_place(size: int = 800) -> Place:
+def reference_scene(size: int = 800) -> DaylightScene:
     """The room of Table 1 with 7 x 9 sensors and an eye 2 m from its window."""
     points, normals = room.sensors()
     view = fisheye(EYE, DIRECTION, size)
-    return Place(room.room(), room.NOTHING, room.window_groups(), view, points, normals)
+    return DaylightScene(room.room(), room.NOTHING, room.window_groups(), points, normals, view)
 
 
-def reference_system() -> Fenestration:
+def reference_system() -> BsdfOptics:
     """The demo's blind and glazing."""
-    return fenestration(read_bsdf_xml(VENETIAN_BLIND).band("Visible"))
+    return BsdfOptics(read_bsdf_xml(VENETIAN_BLIND).band("Visible"))
 
 
-def reference_skies(quality: Quality, count: int = 16) -> Skies:
+def reference_sky(sampling: Sampling, count: int = 16) -> AnnualSky:
     """Hours of a year in which the sun shines on the window, whose outward normal is -y."""
     weather = read_epw(WEATHER)
     series = sky_series(weather)
     sunny = np.flatnonzero((series.direct_normal > DIRECT) & (series.sun[:, 1] < -0.2))
     chosen = sunny[np.linspace(0, len(sunny) - 1, count).astype(int)]
-    return skies_of(weather, chosen, subdivision=quality.subdivision)
+    return annual_sky(weather, sampling.subdivision, hours=chosen)
 
 
 def reference_costs(
-    *, size: int = 800, quality: Quality | None = None, progress: Progress = silent, **options
+    *, size: int = 800, sampling: Sampling | None = None, progress: Progress = silent, **options
 ) -> list[Cost]:
     """Costs of this machine; options `methods`, `metrics`, `clock` of `measure`."""
     variants.activate()
-    quality = quality or Quality()
+    sampling = sampling or Sampling()
     return measure(
-        reference_place(size), reference_system(), reference_skies(quality), quality,
+        reference_scene(size), reference_system(), reference_sky(sampling), sampling,
         progress=progress, **options,
     )  # fmt: skip
 

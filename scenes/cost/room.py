@@ -13,7 +13,7 @@ WIDTH, DEPTH, HEIGHT = 3.65, 4.60, 3.00  # [m]
 WINDOW = (0.3, 3.35, 0.9, 2.6)  # left, right, sill, head in the wall y = 0 [m]
 WALLS, CEILING, FLOOR = 0.50, 0.80, 0.34  # reflectance
 WORK_PLANE = 0.85  # [m]
-NOTHING = Surfaces(np.empty((0, 3, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+NOTHING = Surfaces.none()
 
 
 def room() -> Surfaces:

@@ -12,20 +12,25 @@ from bim.sensors import sensor_grid, view_point
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import phases
+from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.phase_light import PhaseSystems
+from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
 from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.view_matrix import view_matrix
 from scenes.heat.study_file import TraceTable
-from scenes.job.daylight import Skies
 from scenes.job.inputs import System
 from scenes.job.thermal import ThermalSystem
 from thermal.climate import Solar
 
 FloatArray = NDArray[np.float64]
-BATCHES = 8
+EYE_PIXELS = 64  # of the eye's view, of which only place and direction count
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +49,7 @@ def room_light(
     building: Building,
     space: Space,
     room: ThermalRoom,
-    skies: Skies,
+    skies: AnnualSky,
     omega: FloatArray,
     trace: TraceTable,
     progress: Progress,
@@ -77,7 +82,7 @@ def state_solar(
     light: RoomLight,
     system: System,
     thermal: ThermalSystem,
-    skies: Skies,
+    skies: AnnualSky,
     surfaces: int,
     trace: TraceTable,
     progress: Progress,
@@ -119,36 +124,38 @@ def illuminances(
     building: Building,
     space: Space,
     systems: list[System],
-    skies: Skies,
+    skies: AnnualSky,
     trace: TraceTable,
     progress: Progress,
 ) -> tuple[FloatArray, FloatArray]:
     """Mean illuminance of the work plane and that of the eye [J, H] [lx] in every state."""
     points, _ = sensor_grid(space, spacing=1.0, height=0.8, margin=0.5)
     position, direction = view_point(space)
-    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    groups = window_groups(space)
-    options = _options(trace)
-    daylight = daylight_matrix(
-        exterior_surfaces(building, space, "visible"), groups, subdivision=trace.sky_subdivision,
-        progress=part(progress, 0.0, 0.4, "daylight"), **options,
-    ).values  # fmt: skip
-    view = view_matrix(
-        interior_surfaces(space, "visible"), groups,
-        np.concatenate([points, np.asarray(position)[None]]),
-        np.concatenate([up, np.asarray(direction)[None]]),
-        progress=part(progress, 0.4, 1.0, "daylight"),
-        **(options | {"samples": max(trace.sensor_samples // BATCHES, 1)}),
-    ).values  # fmt: skip
-    plane, eye = [], []
-    for system in systems:
-        seen = phases.room_side_radiance(
-            [system.visible.transmission_matrix()] * len(groups), daylight, skies.visible
-        )
-        lit = skies.whole_year(np.einsum("sgk,gkl->sl", view, seen, optimize=True))
-        plane.append(lit[:-1].mean(axis=0))
-        eye.append(lit[-1])
-    return np.array(plane), np.array(eye)
+    scene = DaylightScene(
+        interior_surfaces(space, "visible"),
+        exterior_surfaces(building, space, "visible"),
+        window_groups(space),
+        points,
+        np.tile([0.0, 0.0, 1.0], (len(points), 1)),
+        fisheye(position, direction, EYE_PIXELS),
+    )
+    traced = PhaseScene(
+        scene,
+        Sampling(
+            sensor_samples=trace.sensor_samples,
+            patch_samples=trace.patch_samples,
+            subdivision=trace.sky_subdivision,
+            seed=trace.seed,
+        ),
+        five_phase=False,
+        progress=part(progress, 0.0, 1.0, "daylight"),
+    )
+    states = [BsdfOptics(system.visible, system.fine) for system in systems]
+    light = PhaseSystems(traced, [states] * len(scene.groups)).light(skies)
+    each = [np.full(len(skies.lit), j) for j in range(len(systems))]
+    plane = [light.illuminance(state).mean(axis=0) for state in each]
+    eye = [light.eye(state) for state in each]
+    return skies.whole_year(np.array(plane)), skies.whole_year(np.array(eye))
 
 
 def _options(trace: TraceTable) -> dict:

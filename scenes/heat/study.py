@@ -23,14 +23,13 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, part
-from mitsuba_cfs.sky.matrix import sky_matrix, sun_up
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_solar
 from scenes.heat.study_file import BoxTable, StudyFile, SystemTable
 from scenes.heat.tables import hourly_table, year_summary
-from scenes.job.daylight import Skies
 from scenes.job.inputs import System, chosen_spaces, read_system, read_weather
 from scenes.job.thermal import ThermalSystem, climate, thermal_system
 from thermal.balance import ZoneResult, simulate_zones
@@ -208,13 +207,9 @@ def box_building(box: BoxTable) -> Building:
         raise DataError(str(error), field="box") from error
 
 
-def _skies(weather: Weather, study: StudyFile) -> Skies:
+def _skies(weather: Weather, study: StudyFile) -> AnnualSky:
     subdivision = study.trace.sky_subdivision
-    visible, solar = (
-        sky_matrix(weather, subdivision, band, sun_up_only=True, dtype=np.float32)
-        for band in ("visible", "solar")
-    )
-    return Skies(visible, solar, np.flatnonzero(sun_up(weather)), len(weather.times))
+    return annual_sky(weather, subdivision, sun=False, solar=True)
 
 
 def ready_room(
@@ -225,7 +220,7 @@ def ready_room(
     systems: list[System],
     thermals: list[ThermalSystem],
     weather: Weather,
-    skies: Skies,
+    skies: AnnualSky,
     progress: Progress,
 ) -> ReadyRoom:
     """Trace a room in all its shading states, choose the state of every hour."""

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from bim.model import Building, Space
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from scenes.job.daylight import daylight_options
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.surfaces import Surfaces
 from scenes.job.options import RoomOptions
 from scenes.job.windows import States
 from scenes.results import SpaceResult
@@ -77,9 +78,7 @@ def corner(space: Space) -> NDArray[np.float64]:
 def _daylight(
     building: Building, space: Space, band: str, options: RoomOptions, cache: MatrixCache | None
 ) -> NDArray[np.float64]:
-    return daylight_matrix(
-        exterior_surfaces(building, space, band),
-        window_groups(space),
-        cache=cache,
-        **daylight_options(options),
-    ).values
+    scene = DaylightScene(
+        Surfaces.none(), exterior_surfaces(building, space, band), window_groups(space)
+    )
+    return PhaseScene(scene, options.sampling, cache=cache).daylight.values

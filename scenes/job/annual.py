@@ -6,44 +6,34 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mitsuba_cfs.glare.annual import AnnualGlare, annual_glare
-from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.methods.glare import glare
+from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.pictures import PictureMaker
 
 COLUMNS = {"dgp": "dgp", "ev": "Ev", "dgi": "dgi", "ugr": "ugr", "sources": "sources"}
 
 
-def rated_hours(
-    maker: PictureMaker, state: int, columns: NDArray[np.int64], progress: Progress
-) -> AnnualGlare:
-    """Glare of some lit hours [n] with the windows in a state."""
-    pictures = maker.of_state(state, columns)
-    return annual_glare(pictures, geometry=GlareView(pictures.view), progress=progress)
-
-
-def glare_by_state(maker: PictureMaker, progress: Progress) -> NDArray[np.float64]:
+def glare_by_state(light: PhaseLight, progress: Progress) -> NDArray[np.float64]:
     """DGP of every hour in every state [J, H], 0 in the dark."""
-    every, J = np.arange(len(maker.skies.lit)), len(maker.lights)
+    J, count = light.filled.states, len(light.sky.lit)
     lit = [
-        rated_hours(maker, j, every, part(progress, j / J, (j + 1) / J, "annual glare")).dgp
+        glare(
+            light, "DGP", np.full(count, j),
+            progress=part(progress, j / J, (j + 1) / J, "annual glare"),
+        ).dgp
         for j in range(J)
-    ]
-    return maker.skies.whole_year(np.stack(lit))
+    ]  # fmt: skip
+    return light.sky.whole_year(np.stack(lit))
 
 
-def glare_of_year(maker: PictureMaker, weather: Weather, progress: Progress) -> pd.DataFrame:
-    """Glare of every hour [H] with the state that holds in it; NaN in the dark."""
-    table = np.full((maker.skies.hours, len(COLUMNS)), np.nan)
-    used = np.unique(maker.state).tolist()
-    for i, j in enumerate(used):
-        columns = np.flatnonzero(maker.state == j)
-        steps = part(progress, i / len(used), (i + 1) / len(used), "annual glare")
-        rated = rated_hours(maker, j, columns, steps)
-        table[maker.skies.lit[columns]] = np.stack(
-            [getattr(rated, name) for name in COLUMNS.values()], axis=1
-        )
+def glare_of_year(
+    light: PhaseLight, state: NDArray[np.int64], weather: Weather, progress: Progress
+) -> pd.DataFrame:
+    """Glare of every hour [H] with the state [L] that holds in it; NaN in the dark."""
+    rated = glare(light, "DGP", state, progress=part(progress, 0.0, 1.0, "annual glare"))
+    table = np.full((light.sky.hours, len(COLUMNS)), np.nan)
+    table[light.sky.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
     frame = pd.DataFrame(table, index=weather.midpoints, columns=list(COLUMNS))
     return frame.rename_axis("time")
 

@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 from mitsuba_cfs.errors import CfsError
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.methods.glare import pictures
+from mitsuba_cfs.methods.path_light import PathLight
+from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress
-from scenes.job.pictures import PictureMaker
 from scenes.results import GlareResults, LuminancePicture
 
 DEFAULT_DAYS = ("03-21", "06-21", "12-21")
@@ -66,14 +69,22 @@ def _find(text: str, times: pd.DatetimeIndex) -> int | None:
     return int(found[0]) if len(found) else None
 
 
-def room_glare(maker: PictureMaker, hours: list[int], progress: Progress) -> GlareResults:
-    """Pictures of the chosen hours of the year and their glare."""
-    columns = np.searchsorted(maker.skies.lit, hours)
-    view = maker.scene.view
-    pictures = maker.of_hours(columns, progress)
+def room_glare(
+    light: PhaseLight | PathLight,
+    view: View,
+    state: NDArray[np.int64],
+    hours: list[int],
+    progress: Progress,
+) -> GlareResults:
+    """Pictures of the chosen hours of the year and their glare.
+
+    Args: state: [L] of the windows in each hour with the sun up.
+    """
+    columns = np.searchsorted(light.sky.lit, hours)
     geometry = GlareView(view)
     rated = []
-    for hour, luminance in zip(hours, pictures, strict=True):
+    made = pictures(light, columns, state, progress=progress)
+    for hour, luminance in zip(hours, made, strict=True):
         result = evaluate(luminance, geometry)
         glare = {
             "ev": result.Ev,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-METHODS = ("three-phase", "five-phase", "point-in-time")
+from mitsuba_cfs.methods import METHODS
+from mitsuba_cfs.methods.sampling import Sampling
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +38,20 @@ class RoomOptions:
             raise ValueError(f"method: expected one of {METHODS}, got {self.method!r}")
         if self.annual_glare and self.method == "point-in-time":
             raise ValueError("annual glare needs the three-phase or the five-phase method")
+
+    @property
+    def sampling(self) -> Sampling:
+        """How finely the light is computed."""
+        return Sampling(
+            sensor_samples=self.sensor_samples,
+            patch_samples=self.patch_samples,
+            sun_points=self.sun_points,
+            view_samples=self.picture_samples,
+            picture_samples=2 * self.picture_samples,  # nothing is averaged over hours there
+            hour_samples=self.path_samples,
+            subdivision=self.sky_subdivision,
+            seed=self.seed,
+        )
 
 
 @dataclass(frozen=True, slots=True)

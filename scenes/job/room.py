@@ -23,28 +23,23 @@ from numpy.typing import NDArray
 from bim.model import Building, Space
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.glare import glare
+from mitsuba_cfs.methods.path_light import PathLight, PathSystems
+from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
+from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.phases import window_radiance
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, part, silent, staged
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.study import state_of
 from scenes.job.annual import glare_by_state, glare_of_year, worst_hours
-from scenes.job.daylight import (
-    RoomMatrices,
-    RoomScene,
-    StateLight,
-    room_daylight,
-    room_matrices,
-    room_scene,
-    state_light,
-)
+from scenes.job.daylight import room_daylight, room_scene
 from scenes.job.glare import default_hours, room_glare, wanted_hours
 from scenes.job.inputs import System
 from scenes.job.operation import Operation, operated, shading_states
 from scenes.job.options import RoomOptions
-from scenes.job.pictures import PictureMaker, picture_maker
-from scenes.job.skies import Skies, year_of_skies
 from scenes.job.thermal import ThermalSystem, room_thermal, thermal_system
-from scenes.job.windows import States
+from scenes.job.windows import States, room_windows
 from scenes.results import DaylightResult, GlareResults, OperationResult, SpaceResult, ThermalResult
 from thermal.balance import ZoneResult
 from thermal.zone import Zone
@@ -53,10 +48,10 @@ T = TypeVar("T")
 WORST = 4  # pictures of an annual glare without hours asked for
 
 
-def skies_for(weather: Weather, options: RoomOptions) -> Skies:
+def skies_for(weather: Weather, options: RoomOptions) -> AnnualSky:
     """The year's skies as the method of the options needs them; the same for every room."""
     with_sun = options.method != "three-phase"
-    return year_of_skies(weather, options.sky_subdivision, with_sun=with_sun)
+    return annual_sky(weather, options.sky_subdivision, sun=with_sun, solar=True)
 
 
 def compute_room(
@@ -67,9 +62,10 @@ def compute_room(
     options: RoomOptions,
     *,
     operation: Operation | None = None,
-    skies: Skies | None = None,
+    skies: AnnualSky | None = None,
     cache: MatrixCache | None = None,
     pictures: bool = True,
+    rate: tuple[str, NDArray[np.int64]] | None = None,
     progress: Progress = silent,
 ) -> SpaceResult:
     """Daylight, glare, temperatures and comfort of one room, with one method.
@@ -87,6 +83,7 @@ def compute_room(
         cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
             and weather do not enter V and D: variants of them cost only algebra.
         pictures: False leaves the luminance pictures and their glare out.
+        rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
 
     Raises: `ValueError` for a room that cannot be computed (no work plane, no system for a window).
     """
@@ -103,9 +100,10 @@ def compute_room(
         year = room.timed("annual glare", room.annual_glare)
     if pictures:
         rated = room.timed("glare", lambda: room.glare(hours, year))
+    dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
     heat, balance = room.timed("thermal", lambda: room.thermal(daylight))
     ran = None if operation is None else room.operation_result(balance)
-    return SpaceResult(space, daylight, rated, heat, room.seconds, ran, year)
+    return SpaceResult(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp)
 
 
 class _Room:
@@ -119,13 +117,14 @@ class _Room:
         weather: Weather,
         options: RoomOptions,
         operation: Operation | None,
-        skies: Skies,
+        skies: AnnualSky,
         cache: MatrixCache | None,
         progress: Progress,
     ) -> None:
         self.building, self.space, self.weather, self.options = building, space, weather, options
         self.operation, self.skies, self.cache, self.progress = operation, skies, cache, progress
-        self.scene: RoomScene = room_scene(building, space, systems, options)
+        self.windows = room_windows(space, systems)
+        self.scene = room_scene(building, space, self.windows, options)
         self.seconds: dict[str, float] = {}
         self.lamps = np.zeros(skies.hours)  # [H] power [W]
 
@@ -137,22 +136,27 @@ class _Room:
         return result
 
     @cached_property
-    def matrices(self) -> RoomMatrices:
+    def traced(self) -> PhaseScene:
         """V and D."""
-        steps = part(self.progress, 0.0, 0.6, "daylight")
-        return room_matrices(self.scene, self.options, self.cache, steps)
+        return PhaseScene(
+            self.scene,
+            self.options.sampling,
+            five_phase=self.options.method != "three-phase",
+            cache=self.cache,
+            progress=staged(self.progress, {"daylight": (0.0, 0.6), "pictures": (0.0, 0.5)}),
+        )
 
     @cached_property
-    def lights(self) -> list[StateLight]:
-        """The light of the lit hours in every state [J]."""
-        J = self.scene.windows.states
-        return [
-            state_light(
-                self.scene, self.matrices, j, self.skies, self.options, self.cache,
-                part(self.progress, 0.6 + 0.3 * j / J, 0.6 + 0.3 * (j + 1) / J, "daylight"),
-            )
-            for j in range(J)
-        ]  # fmt: skip
+    def light(self) -> PhaseLight:
+        """The light of the lit hours in every state."""
+        filled = PhaseSystems(self.traced, self.windows.optics())
+        return filled.light(self.skies, progress=part(self.progress, 0.6, 0.9, "daylight"))
+
+    def eye(self) -> NDArray[np.float32]:
+        """Illuminance at the eye in every state [J, L] [lx]."""
+        hours = np.ones(len(self.skies.lit), dtype=np.int64)
+        states = range(self.light.filled.states)
+        return np.stack([self.light.eye(j * hours) for j in states]).astype(np.float32)
 
     @cached_property
     def state(self) -> NDArray[np.int64]:
@@ -160,17 +164,15 @@ class _Room:
         if self.operation is None:
             return np.zeros(self.skies.hours, dtype=np.int64)
         omega = KLEMS_FULL.projected_solid_angles()[:, None]
-        incident = window_radiance(self.matrices.daylight.values, self.skies.solar) * omega
+        incident = window_radiance(self.traced.daylight.values, self.skies.solar) * omega
         return shading_states(
             self.operation.tables.control,
             self.space,
             self.weather,
-            len(self.lights),
+            self.light.filled.states,
             irradiance=self.skies.whole_year(incident.sum(axis=1)).T,
-            eye=self.skies.whole_year(np.stack([light.eye for light in self.lights])),
-            dgp=lambda: glare_by_state(
-                self._maker(np.zeros(len(self.skies.lit), dtype=np.int64)), self.progress
-            ),
+            eye=self.skies.whole_year(self.eye()),
+            dgp=lambda: glare_by_state(self.light, self.progress),
         )
 
     @property
@@ -178,44 +180,40 @@ class _Room:
         """The shading state of every lit hour [L]."""
         return self.state[self.skies.lit]
 
-    @cached_property
-    def maker(self) -> PictureMaker:
-        """What makes pictures of the year as it is operated."""
-        return self._maker(self.lit_state)
-
-    def _maker(self, state: NDArray[np.int64]) -> PictureMaker:
-        steps = part(self.progress, 0.0, 0.5, "pictures")
-        if "view" in self.__dict__:
-            return replace(self.view, state=state)
-        self.__dict__["view"] = picture_maker(
-            self.scene, self.matrices, self.lights, state, self.skies, self.options, self.cache,
-            steps,
-        )  # fmt: skip
-        return self.__dict__["view"]
-
     def daylight(self) -> DaylightResult:
         """Illuminance of the work plane and its metrics."""
-        lights, state = self.lights, self.lit_state
         steps = part(self.progress, 0.9, 1.0, "daylight")
-        found = room_daylight(
-            self.scene, lights, state, self.skies, self.weather, self.options, steps
-        )
+        found = room_daylight(self.light, self.lit_state, self.weather, self.options, steps)
         self.progress("daylight", 1.0)
         return found
 
+    @cached_property
+    def pictured(self) -> PhaseLight | PathLight:
+        """The light that pictures are made of."""
+        if self.options.method != "point-in-time":
+            return self.light
+        filled = PathSystems(self.scene, self.light.filled.systems, self.options.sampling)
+        return filled.light(self.skies)
+
     def annual_glare(self) -> pd.DataFrame:
         """Glare of every hour."""
-        return glare_of_year(self.maker, self.weather, self.progress)
+        return glare_of_year(self.light, self.lit_state, self.weather, self.progress)
+
+    def rated(self, metric: str, hours: NDArray[np.int64]) -> NDArray[np.float64]:
+        """A glare metric in some hours of the year with the sun up [n]."""
+        columns = np.searchsorted(self.skies.lit, hours)
+        steps = part(self.progress, 0.0, 1.0, "annual glare")
+        return glare(self.pictured, metric, self.lit_state, hours=columns, progress=steps).dgp
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
         if not hours and year is not None:
             hours = worst_hours(year, WORST)
         if not hours:
-            eye = np.stack([light.eye for light in self.lights])
-            eye = eye[self.lit_state, np.arange(eye.shape[1])]
+            eye = self.eye()[self.lit_state, np.arange(len(self.skies.lit))]
             hours = default_hours(self.weather.midpoints, self.skies.lit, eye)
-        return room_glare(self.maker, hours, part(self.progress, 0.5, 1.0, "pictures"))
+        steps = part(self.progress, 0.5, 1.0, "pictures")
+        return room_glare(self.pictured, self.scene.view, self.lit_state, hours, steps)
 
     def thermal(self, daylight: DaylightResult) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort."""
@@ -223,8 +221,8 @@ class _Room:
         if self.operation is not None:
             operate = lambda zone: self._operated(zone, daylight)  # noqa: E731
         return room_thermal(
-            self.building, self.space, self.scene, self.matrices.daylight, self.state, self.skies,
-            self.weather, self.options, self.cache, self.progress,
+            self.building, self.space, self.windows, self.traced, self.state, self.skies,
+            self.weather, self.options, self.progress,
             thermal_of=self._thermal_of, operate=operate,
         )  # fmt: skip
 
@@ -239,7 +237,7 @@ class _Room:
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""
-        most = max(self.scene.windows.systems, key=len)
+        most = max(self.windows.systems, key=len)
         hours = pd.DataFrame(
             {
                 "shading_state": self.state,

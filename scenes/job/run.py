@@ -18,6 +18,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.alike import as_room, same_light, same_systems
@@ -27,7 +28,6 @@ from scenes.job.inputs import System, chosen_spaces, read_system, read_weather, 
 from scenes.job.operation import Operation, check_states, read_operation
 from scenes.job.options import JobOptions
 from scenes.job.room import compute_room, skies_for
-from scenes.job.skies import Skies
 from scenes.job.thermal import thermal_system
 from scenes.job.windows import States, everywhere
 from scenes.results import RunResult, SpaceResult
@@ -120,7 +120,7 @@ def used_systems(inputs: JobInputs) -> list[System]:
 
 
 def _rooms(
-    inputs: JobInputs, skies: Skies, options: JobOptions, progress: Progress
+    inputs: JobInputs, skies: AnnualSky, options: JobOptions, progress: Progress
 ) -> tuple[list[SpaceResult], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
     found: dict[str, SpaceResult] = {}

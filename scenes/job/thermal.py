@@ -14,17 +14,17 @@ from bim.to_thermal import ThermalRoom, thermal_room
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
 from mitsuba_cfs.progress import Progress, part
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from scenes.job.daylight import BATCHES, RoomScene
+from mitsuba_cfs.trace.estimate import Stopping
 from scenes.job.inputs import System
 from scenes.job.options import RoomOptions
-from scenes.job.skies import Skies
+from scenes.job.windows import RoomWindows
 from scenes.results import ThermalResult
 from thermal.balance import ZoneResult, simulate
 from thermal.blackbox import Fenestration, LayerAbsorptances, layer_absorptances
@@ -85,13 +85,12 @@ def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
 def room_thermal(
     building: Building,
     space: Space,
-    scene: RoomScene,
-    daylight: Estimate,
+    windows: RoomWindows,
+    traced: PhaseScene,
     state: NDArray[np.int64],
-    skies: Skies,
+    skies: AnnualSky,
     weather: Weather,
     options: RoomOptions,
-    cache: MatrixCache | None,
     progress: Progress,
     *,
     thermal_of: Callable[[System], ThermalSystem] | None = None,
@@ -100,12 +99,11 @@ def room_thermal(
     """Temperatures of a year and adaptive comfort, and the balance they come from.
 
     Args:
-        daylight: D of the visible band, used again where the solar reflectances are the same.
+        traced: D of the visible band is used again where the solar reflectances are the same.
         state: [H] shading state of the room's windows.
         thermal_of: thermal data of a system; `thermal_system` by default.
         operate: gives the zone its gains, air and set points; those of the options by default.
     """
-    windows = scene.windows
     thermal_of = thermal_of or thermal_system
     thermals = [[thermal_of(s) for s in states] for states in windows.systems]
     first = thermals[windows.group[0]][0]
@@ -117,9 +115,8 @@ def room_thermal(
     )
     zone = with_states(room.zone, [thermals[g] for g in windows.group])
     zone = zone if operate is None else operate(zone)
-    sun = room_sun(building, space, scene, daylight, skies, options, cache,
-                   room, part(progress, 0.0, 0.8, "heat"))  # fmt: skip
-    suns = [solar_of_state(sun, scene, thermals, j, skies) for j in range(windows.states)]
+    sun = room_sun(building, space, traced, skies, room, part(progress, 0.0, 0.8, "heat"))
+    suns = [solar_of_state(sun, windows, thermals, j, skies) for j in range(windows.states)]
     solar = switched([s for s, _ in suns], state)
     gains = {
         name: np.stack([sums[name] for _, sums in suns])[state, np.arange(len(state))]
@@ -134,7 +131,7 @@ def room_thermal(
         pd.DataFrame(gains, index=times).rename_axis("time"),
         comfort,
         summary,
-        tuple(fenestration_table(scene, thermals)),
+        tuple(fenestration_table(windows, thermals)),
     )
     return found, result
 
@@ -155,11 +152,11 @@ def per_window(solar: Solar, zone: Zone) -> Solar:
 
 
 def fenestration_table(
-    scene: RoomScene, thermals: Sequence[Sequence[ThermalSystem]]
+    windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]]
 ) -> Iterator[dict[str, float | str]]:
     """What the windows are, group by group and state by state, at normal incidence."""
     seen = set()
-    for states, heats in zip(scene.windows.systems, thermals, strict=True):
+    for states, heats in zip(windows.systems, thermals, strict=True):
         for system, heat in zip(states, heats, strict=True):
             if id(system) in seen:
                 continue
@@ -210,11 +207,8 @@ class RoomSun:
 def room_sun(
     building: Building,
     space: Space,
-    scene: RoomScene,
-    daylight: Estimate,
-    skies: Skies,
-    options: RoomOptions,
-    cache: MatrixCache | None,
+    traced: PhaseScene,
+    skies: AnnualSky,
     room: ThermalRoom,
     progress: Progress,
 ) -> RoomSun:
@@ -224,15 +218,21 @@ def room_sun(
     unit of flux of each window patch is absorbed [G, K, F + G].
     """
     exterior = exterior_surfaces(building, space, "solar")
-    samples = max(options.patch_samples // BATCHES, 1)
-    tracing = {"samples": samples, "stopping": Stopping(batches=BATCHES), "seed": options.seed}
-    if not np.array_equal(exterior.reflectance, scene.exterior.reflectance):
+    chosen, groups, daylight = traced.sampling, traced.scene.groups, None
+    tracing = {
+        "samples": max(chosen.patch_samples // BATCHES, 1),
+        "stopping": Stopping(batches=BATCHES),
+        "seed": chosen.seed,
+        "cache": traced.cache,
+    }
+    if np.array_equal(exterior.reflectance, traced.scene.exterior.reflectance):
+        daylight = traced.daylight
+    else:
         daylight = daylight_matrix(
             exterior,
-            scene.groups,
-            subdivision=options.sky_subdivision,
+            groups,
+            subdivision=chosen.subdivision,
             progress=part(progress, 0.0, 0.4),
-            cache=cache,
             **tracing,
         )
     omega = KLEMS_FULL.projected_solid_angles()
@@ -243,9 +243,8 @@ def room_sun(
             exterior,
             room.outdoor_points,
             room.outdoor_normals,
-            subdivision=options.sky_subdivision,
+            subdivision=chosen.subdivision,
             progress=part(progress, 0.4, 0.6),
-            cache=cache,
             **tracing,
         )
         facade[:, room.outdoor] = skies.whole_year(matrix.values @ skies.solar).T
@@ -257,10 +256,9 @@ def room_sun(
         if key not in known:
             known[key] = absorption_matrix(
                 interior,
-                scene.groups,
+                groups,
                 window_reflectance=reflectance,
                 progress=part(progress, 0.6, 1.0),
-                cache=cache,
                 **tracing,
             ).values
         return known[key]
@@ -270,18 +268,18 @@ def room_sun(
 
 def solar_of_state(
     sun: RoomSun,
-    scene: RoomScene,
+    windows: RoomWindows,
     thermals: Sequence[Sequence[ThermalSystem]],
     state: int,
-    skies: Skies,
+    skies: AnnualSky,
 ) -> tuple[Solar, dict[str, NDArray[np.float64]]]:
     """Sun absorbed by window layers, room surfaces and facades in one state, and its sums [H]."""
-    windows, group = scene.windows, scene.windows.group
+    group = windows.group
     heats = [states[min(state, len(states) - 1)] for states in thermals]
     omega = KLEMS_FULL.projected_solid_angles()
     T = windows.of_state(state, lambda system: system.solar.transmission_matrix() / omega)
     entering = np.stack([t @ i for t, i in zip(T, sun.incident, strict=True)])
-    area = np.array([g.area for g in scene.groups])
+    area = np.array([g.area for g in windows.groups])
     entering *= omega[:, None] * area[:, None, None]  # [G, K, L] flux into the room [W]
     back = np.array([heat.back_reflectance for heat in heats])
     taken = np.einsum("gkf,gkl->lf", sun.absorbed(back), entering, optimize=True)  # [L, F + G]

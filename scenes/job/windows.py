@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from bim.to_tracer import window_groups
+from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.surfaces import WindowGroup
 from scenes.job.inputs import System
 
@@ -30,6 +31,15 @@ class RoomWindows:
     def states(self) -> int:
         """J, how many states there are: of the group that has most."""
         return max(len(states) for states in self.systems)
+
+    def optics(self) -> list[list[BsdfOptics]]:
+        """Each group's systems by state [G][J], as the methods take them."""
+        known: dict[int, BsdfOptics] = {}
+        for states in self.systems:
+            for system in states:
+                if id(system) not in known:
+                    known[id(system)] = BsdfOptics(system.visible, system.fine)
+        return [[known[id(system)] for system in states] for states in self.systems]
 
     def of_state(self, state: int, what: Callable[[System], T]) -> list[T]:
         """What `what` makes of each group's system in a state; fewer states end with their last."""

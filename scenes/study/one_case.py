@@ -16,17 +16,16 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.study import box_building
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.job.operation import read_operation
 from scenes.job.room import compute_room, skies_for
-from scenes.job.skies import Skies
 from scenes.job.windows import everywhere
 from scenes.results import SpaceResult
 from scenes.study.case import Case, Source, program_version
-from scenes.study.glare import occupied_glare
 from scenes.study.store import CaseResult
 from thermal.comfort import hours_between
 
@@ -58,20 +57,18 @@ def _computed(case: Case) -> CaseResult:
     weather = _weather(case.weather, case.orientation_deg)
     skies = _skies(case.weather, case.orientation_deg, case.options)
     cache = MatrixCache.of_user()
+    hours = _rated_hours(weather, case.options.occupied)
     room = compute_room(
         building, space, everywhere(space, system), weather, case.options,
         operation=None if case.operation is None else read_operation(case.operation.path),
         skies=skies, cache=cache, pictures=False,
+        rate=None if case.glare == "none" else (case.glare, hours),
     )  # fmt: skip
     figures, arrays = room_figures(room)
-    if case.glare != "none":
-        begin = time.monotonic()
-        hours = _rated_hours(weather, case.options.occupied)
-        dgp = occupied_glare(building, space, system, weather, hours, case)
-        figures |= glare_figures(dgp, weather, case.options.occupied)
-        figures["glare_s"] = round(time.monotonic() - begin, 3)
+    if room.dgp is not None:
+        figures |= glare_figures(room.dgp, weather, case.options.occupied)
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
-        arrays["dgp"][hours] = dgp
+        arrays["dgp"][hours] = room.dgp
     figures["seconds"] = round(time.monotonic() - start, 3)
     return CaseResult(case.key, figures, arrays)
 
@@ -99,11 +96,11 @@ def _weather(source: Source, angle: float) -> Weather:
 
 
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
-def _skies_of(source: Source, angle: float, subdivision: int, options) -> Skies:
+def _skies_of(source: Source, angle: float, subdivision: int, options) -> AnnualSky:
     return skies_for(_weather(source, angle), options)
 
 
-def _skies(source: Source, angle: float, options) -> Skies:
+def _skies(source: Source, angle: float, options) -> AnnualSky:
     return _skies_of(source, angle, options.sky_subdivision, options)
 
 

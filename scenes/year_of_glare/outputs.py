@@ -96,7 +96,7 @@ def write_heat_map(path: Path, year: Year, rated: ViewYear) -> None:
     """DGP by hour of the day and day of the year (PNG); dark hours are grey."""
     times = year.weather.midpoints
     whole = np.full(len(times), np.nan)
-    whole[year.lit] = rated.ratings.dgp.to_numpy()
+    whole[year.sky.lit] = rated.ratings.dgp.to_numpy()
     grid = day_grid(times, whole)
     figure = Figure(figsize=(9, 3.6), dpi=140)
     FigureCanvasAgg(figure)
@@ -137,7 +137,7 @@ def write_summary(year: Year, rows: list[dict[str, object]], folder: Path) -> pd
         "room": year.room,
         "options": {name: _plain(getattr(options, name)) for name in options.__slots__},
         "inputs": year.digest,
-        "hours_with_sun": len(year.lit),
+        "hours_with_sun": len(year.sky.lit),
         "version": metadata.version("mitsuba-cfs"),
     }
     (folder / MARK).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")

@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,22 +16,26 @@ from numpy.typing import NDArray
 from bim.read_ifc import read_ifc
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
-from mitsuba_cfs.glare.annual import AnnualGlare, annual_glare, full_picture, kept_glare
-from mitsuba_cfs.glare.simplified import simplified_dgp
+from mitsuba_cfs.glare.annual import AnnualGlare, kept_glare
 from mitsuba_cfs.images.view import format_view
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.glare import FIGURES, glare, pictures
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.metrics.schedules import working_hours
-from mitsuba_cfs.progress import Progress, part, silent
-from mitsuba_cfs.sky.matrix import sun_up
+from mitsuba_cfs.progress import Progress, part, silent, staged
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
 from scenes.job.inputs import chosen_spaces, read_system, read_weather, sha256
-from scenes.methods.phases import PhaseSystem, phase_scene
-from scenes.methods.place import Fenestration, Place, Quality, Skies, fenestration, skies_of
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
 
+TRACING = {"daylight": (0.0, 0.1), "pictures": (0.1, 0.3)}  # shares of a view's time
 DARK = 0.0  # DGP of the hours of use without sun, for the share of hours
-FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +55,10 @@ class Year:
     options: YearOptions
     room: str
     views: list[NamedView]
-    place: Place  # its view is the first
-    system: Fenestration
+    scene: DaylightScene  # its view is the first
+    optics: BsdfOptics  # of every window
     weather: Weather
-    lit: NDArray[np.int64]  # [L] hours with the sun up
-    skies: Skies  # of these
+    sky: AnnualSky  # of the hours L with the sun up
     used: NDArray[np.bool_]  # [H] hours of use
     digest: str  # of all inputs
 
@@ -69,92 +72,74 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
     space = chosen_spaces(building, names, options.building)[0]
     views = chosen_views(space, options)
     variants.activate()
-    quality = Quality()
-    lit = np.flatnonzero(sun_up(weather))
-    skies = skies_of(weather, lit, subdivision=quality.subdivision)
+    sampling = sampling_of(options)
+    sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
     progress("inputs", 1.0)
-    nothing = np.empty((0, 3))
-    place = Place(
+    scene = DaylightScene(
         interior_surfaces(space, "visible"),
         exterior_surfaces(building, space, "visible"),
         window_groups(space),
-        views[0].view,
-        nothing,
-        nothing,
+        view=views[0].view,
     )
     chosen = [code_version(__name__), options.method, options.metric, options.samples, options.seed]
     files = [sha256(p) for p in (options.building, options.weather, options.system)]
     digest = hashlib.sha256(json.dumps([*chosen, *files, space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))
     return Year(
-        options, space.name or space.guid, views, place,
-        fenestration(system.visible, system.fine), weather, lit, skies, used, digest,
+        options, space.name or space.guid, views, scene,
+        BsdfOptics(system.visible, system.fine), weather, sky, used, digest,
     )  # fmt: skip
+
+
+def sampling_of(options: YearOptions) -> Sampling:
+    """How finely the year is computed."""
+    memory = options.memory_gb * 2**30
+    return Sampling(view_samples=options.samples, memory=memory, seed=options.seed)
 
 
 def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
     """Rate one view after the other; what lies in the folder `kept` is not computed again."""
-    options, scene = year.options, None
-    quality = Quality(
-        pixel_samples=options.samples, memory=options.memory_gb * 2**30, seed=options.seed
+    options = year.options
+    traced = PhaseScene(
+        year.scene,
+        sampling_of(options),
+        five_phase=options.method == "five-phase",
+        cache=MatrixCache.of_user(),
     )
-    times = year.weather.midpoints[year.lit]
+    times = year.weather.midpoints[year.sky.lit]
     for number, named in enumerate(year.views):
         label = f"{named.name} ({number + 1} of {len(year.views)})"
         start = time.monotonic()
         text = f"{year.digest} {format_view(named.view)} {named.view.width}"
         keep = kept / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
         found = kept_glare(keep, len(times)) if keep.is_file() else None
-        system = None
-        if found is None or (options.worst and options.metric != "sDGP"):
-            place = replace(year.place, view=named.view)
-            scene = phase_scene(
-                place, options.metric, five_phase=options.method == "five-phase",
-                quality=quality, other=scene, progress=part(progress, 0.0, 0.3, label),
-            )  # fmt: skip
-            system = scene.behind(year.system)
-            found = found or _rated(system, year, keep, part(progress, 0.3, 1.0, label))
+        traced = traced.seen_from(named.view, staged(progress, TRACING, label))
+        filled = PhaseSystems(traced, [[year.optics]] * len(traced.scene.groups))
+        light = filled.light(year.sky)
+        found = found or glare(
+            light, options.metric, keep=keep, progress=part(progress, 0.3, 1.0, label)
+        )
         table = pd.DataFrame(
             {name: getattr(found, name) for name in FIGURES}, index=times.rename("time")
         )
-        worst = found.worst(options.worst)
-        pictures = _pictures(system, year, worst) if system is not None else {}
+        shown = _pictures(light, year, found)
         progress(label, 1.0)
-        yield ViewYear(named, table, pictures, time.monotonic() - start)
-
-
-def _rated(system: PhaseSystem, year: Year, keep: Path, progress: Progress) -> AnnualGlare:
-    """Ratings of the lit hours by the year's metric."""
-    metric, skies = year.options.metric, year.skies
-    if metric == "sDGP":
-        eye = system.illuminance(skies)[0]
-        nothing = np.full(len(eye), np.nan)
-        rest = {name: nothing for name in FIGURES[2:]}
-        return AnnualGlare(dgp=simplified_dgp(eye), Ev=eye, **rest)
-    eye = system.illuminance(skies)[0] if metric == "eDGP" else None
-    return annual_glare(
-        system.pictures(skies), geometry=system.scene.geometry, illuminance=eye, keep=keep,
-        progress=progress,
-    )  # fmt: skip
+        yield ViewYear(named, table, shown, time.monotonic() - start)
 
 
 def _pictures(
-    system: PhaseSystem, year: Year, hours: NDArray[np.int64]
+    light: PhaseLight, year: Year, found: AnnualGlare
 ) -> dict[pd.Timestamp, NDArray[np.float32]]:
-    """Pictures of some lit hours."""
+    """Pictures of the worst lit hours."""
+    hours = found.worst(year.options.worst)
     if not len(hours) or year.options.metric == "sDGP":
         return {}
-    pictures = system.pictures(year.skies.part(hours))
-    values = pictures.values(np.arange(len(hours)))
-    times = year.weather.midpoints[year.lit[hours]]
-    return {
-        t: full_picture(row, pictures.pixels, pictures.view)
-        for t, row in zip(times, values, strict=True)
-    }
+    times = year.weather.midpoints[year.sky.lit[hours]]
+    return dict(zip(times, pictures(light, hours), strict=True))
 
 
 def used_dgp(year: Year, dgp: NDArray[np.float64]) -> NDArray[np.float64]:
     """DGP of the hours of use [U] from those of the lit hours [L]; dark hours have no glare."""
     whole = np.full(len(year.weather.midpoints), DARK)
-    whole[year.lit] = dgp
+    whole[year.sky.lit] = dgp
     return whole[year.used]

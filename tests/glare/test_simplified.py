@@ -55,13 +55,16 @@ def place(variant):
     """The benchmark's room in small, and its window."""
     from dataclasses import replace
 
-    from scenes.cost.reference import reference_place, reference_skies, reference_system
-    from scenes.methods.place import Quality
+    from mitsuba_cfs.methods.sampling import Sampling
+    from scenes.cost.reference import reference_scene, reference_sky, reference_system
 
-    place = reference_place(96)
-    place = replace(place, points=place.points[::20], normals=place.normals[::20])
-    quality = Quality(pixel_samples=8, path_samples=8, sensor_samples=4096, patch_samples=1024)
-    return place, reference_system(), reference_skies(quality, 2), quality
+    scene = reference_scene(96)
+    scene = replace(scene, points=scene.points[::20], normals=scene.normals[::20])
+    sampling = Sampling(
+        view_samples=8, picture_samples=8, sensor_samples=4096, hour_samples=4096,
+        patch_samples=1024,
+    )  # fmt: skip
+    return scene, reference_system(), reference_sky(sampling, 2), sampling
 
 
 @pytest.mark.parametrize(
@@ -69,13 +72,14 @@ def place(variant):
     ["eDGP", "illuminance", *(pytest.param(m, marks=pytest.mark.slow) for m in ("DGP", "sDGP"))],
 )
 def test_the_methods_agree_on_every_metric_behind_a_blind(place, metric):
-    from scenes.methods.methods import METHODS, method_scene
+    from mitsuba_cfs.methods import METHODS
+    from mitsuba_cfs.methods.by_name import traced_scene, values, with_systems
 
-    place, system, skies, quality = place
-    found = {
-        method: method_scene(method, metric, place, quality).behind(system).values(skies)
-        for method in METHODS
-    }
+    scene, system, sky, sampling = place
+    found = {}
+    for method in METHODS:
+        filled = with_systems(traced_scene(method, scene, sampling), [[system]])
+        found[method] = values(filled.light(sky), metric)
     reference = found["point-in-time"]
     for method in METHODS[:2]:
         # windows are black to the room in the phase methods, which take 2 to 6 % of the light;
@@ -87,20 +91,22 @@ def test_the_methods_agree_on_every_metric_behind_a_blind(place, metric):
 
 
 def test_a_method_that_there_is_not_is_refused(place):
-    from scenes.methods.methods import UnknownMethodError, method_scene
+    from mitsuba_cfs.methods.by_name import UnknownMethodError, traced_scene, values, with_systems
 
+    scene, system, sky, sampling = place
     with pytest.raises(UnknownMethodError, match="two-phase"):
-        method_scene("two-phase", "DGP", place[0])
+        traced_scene("two-phase", scene)
+    light = with_systems(traced_scene("five-phase", scene, sampling), [[system]]).light(sky)
     with pytest.raises(UnknownMethodError, match="UGR"):
-        method_scene("five-phase", "UGR", place[0])
+        values(light, "UGR")
 
 
 def test_costs_predict_a_study(place):
     from scenes.cost.measure import Cost, measure
 
-    place, system, skies, quality = place
+    scene, system, sky, sampling = place
     cost = Cost("five-phase", "DGP", 10.0, 2.0, 0.5)
     assert cost.seconds(100, systems=3, scenes=2) == 2 * (10 + 3 * (2 + 50))
-    found = measure(place, system, skies, quality, methods=["three-phase"], metrics=["sDGP"])
+    found = measure(scene, system, sky, sampling, methods=["three-phase"], metrics=["sDGP"])
     assert len(found) == 1 and found[0].per_scene > found[0].per_step > 0
     assert Cost(**found[0].record()) == found[0]

@@ -101,9 +101,9 @@ def test_no_calibration_is_one_clear_line(tmp_path):
 
 @pytest.mark.slow
 def test_this_machine_is_measured_and_found_again(tmp_path, monkeypatch, capsys):
+    from mitsuba_cfs.methods import METHODS
     from scenes.calibration.costs import GLARE, calibration_file
     from scenes.cli import run
-    from scenes.methods.methods import METHODS
 
     monkeypatch.setenv("CFS_CACHE", str(tmp_path))
     assert run(["calibrate", "--size", "64"]) == 0

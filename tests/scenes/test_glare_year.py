@@ -19,6 +19,14 @@ from scenes.year_of_glare.views import turned
 INSIDE = "-vta -vp 1.46 3.2 1.2 -vd 0 -1 0 -vh 180 -vv 180"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def own_cache(tmp_path_factory):
+    """A cache of matrices of these tests alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CFS_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture(scope="module")
 def year(variant):
     """The demo's office with two directions, and 16 of its hours."""
@@ -28,8 +36,8 @@ def year(variant):
         OFFICE, WEATHER, VENETIAN_BLIND, directions=2, size=64, samples=2, worst=1
     )
     whole = read_year(options)
-    few = np.arange(5, len(whole.lit), len(whole.lit) // 16)[:16]
-    return replace(whole, lit=whole.lit[few], skies=whole.skies.part(few))
+    count = len(whole.sky.lit)
+    return replace(whole, sky=whole.sky.part(np.arange(5, count, count // 16)[:16]))
 
 
 def test_views_are_rated_and_written_and_a_second_run_takes_them_up(year, tmp_path, monkeypatch):
@@ -57,7 +65,7 @@ def test_views_are_rated_and_written_and_a_second_run_takes_them_up(year, tmp_pa
     def never(*_arguments, **_options):
         raise AssertionError("rated again")
 
-    monkeypatch.setattr(module, "annual_glare", never)
+    monkeypatch.setattr(module, "glare", never)
     quick = replace(year, options=replace(year.options, worst=0))
     again = list(module.rate_views(quick, kept))
     assert np.array_equal(again[0].ratings.dgp.to_numpy(), towards)

@@ -16,6 +16,7 @@ from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import silent
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather, read_epw
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.job.alike import as_room, same_light, same_systems
@@ -24,7 +25,6 @@ from scenes.job.inputs import System, read_system
 from scenes.job.operation import check_states, read_operation, shading_states
 from scenes.job.options import JobOptions, RoomOptions
 from scenes.job.room import compute_room, skies_for
-from scenes.job.skies import Skies, Sun
 from scenes.job.windows import everywhere, room_windows
 
 HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
@@ -67,19 +67,15 @@ def milk() -> System:
 
 
 @pytest.fixture(scope="module")
-def skies(weather) -> Skies:
+def skies(weather) -> AnnualSky:
     """The skies of a few hours, as if the others were dark."""
     return only(skies_for(weather, SMALL), HOURS)
 
 
-def only(skies: Skies, hours: tuple[int, ...]) -> Skies:
+def only(skies: AnnualSky, hours: tuple[int, ...]) -> AnnualSky:
     chosen = np.searchsorted(skies.lit, hours)
     assert np.array_equal(skies.lit[chosen], hours)
-    s = skies.sun
-    sun = Sun(s.patches[:, chosen], s.direction[chosen], s.illuminance[chosen])
-    return Skies(
-        skies.visible[:, chosen], skies.solar[:, chosen], np.array(hours), skies.hours, sun
-    )
+    return skies.part(chosen)
 
 
 BOX = shoebox(
@@ -127,7 +123,7 @@ def test_kept_matrices_serve_other_systems(variant, tmp_path, weather, skies, bl
 
 def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, glass) -> None:
     """The same pictures from the file; a broken file is traced anew."""
-    from scenes.job import pictures
+    from mitsuba_cfs.methods import phase_scene
 
     options = replace(SMALL, picture_hours=("12-19 12",), sensor_samples=1024, patch_samples=1024)
 
@@ -141,7 +137,7 @@ def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, 
     (file,) = tmp_path.glob("view-pictures-*.npz")
     assert not list(tmp_path.glob("*.part"))
     with monkeypatch.context() as patch:
-        patch.setattr(pictures, "view_matrices", None)  # must not be called
+        patch.setattr(phase_scene, "view_matrices", None)  # must not be called
         np.testing.assert_array_equal(seen(cache), traced)
     file.write_bytes(file.read_bytes()[:1000])
     np.testing.assert_array_equal(seen(cache), traced)

@@ -17,7 +17,7 @@ def surfaces(quads: list[tuple[NDArray[np.float64], float]]) -> Surfaces:
     """Surfaces of (triangles, reflectance), one surface each."""
     counts = [len(t) for t, _ in quads]
     if not quads:
-        return Surfaces(np.empty((0, 3, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+        return Surfaces.none()
     return Surfaces(
         np.concatenate([t for t, _ in quads]),
         np.repeat([r for _, r in quads], counts),

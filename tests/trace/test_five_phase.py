@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.phases import PhaseMatrices
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 
@@ -28,11 +28,11 @@ def glass_transmittance(cosine):
 
 def glass():
     """T and the sun's way of glass that a file knows at the middles of its patches."""
+    from mitsuba_cfs.methods.optics import GivenOptics
     from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.five_phase import SystemState
 
     tau = glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
-    return SystemState(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
+    return GivenOptics(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
 
 
 def between_the_rings(cosine):
@@ -45,37 +45,41 @@ def between_the_rings(cosine):
 
 
 def diffuser(tau: float):
+    from mitsuba_cfs.methods.optics import GivenOptics
     from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.five_phase import SystemState
 
     block = np.full((K, K), tau / np.pi)
-    return SystemState(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
+    return GivenOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
 
 
-def traced(interior, exterior, groups, points, samples=2048, **options):
-    """V, D, V_d and D_d."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+def traced(interior, exterior, groups, points, **sampling):
+    """The matrices of a room, none of them traced yet."""
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import DaylightScene
 
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    found = []
-    for depth in (32, 1):
-        view = view_matrix(interior, groups, points, up, samples=samples, max_depth=depth)
-        daylight = daylight_matrix(exterior, groups, samples=256, max_depth=depth, **options)
-        found += [view.values, daylight.values]
-    return PhaseMatrices(*found)
+    scene = DaylightScene(interior, exterior, groups, points, up)
+    return PhaseScene(scene, Sampling(patch_samples=4096, **sampling))
 
 
-def sun_series(sky: ReinhartSky, patches):
-    """Suns at the middles of patches, 1e5 lx each."""
-    from mitsuba_cfs.trace.five_phase import SunSeries
+def lit(matrices, systems, sky, state=None):
+    """Illuminance [S, L] of a room with systems by group and state."""
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
 
+    return PhaseSystems(matrices, systems).light(sky).illuminance(state)
+
+
+def sun_series(sky: ReinhartSky, patches, diffuse: float = 0.0) -> AnnualSky:
+    """Suns at the middles of patches, 1e5 lx each, and a uniform sky and ground [cd/m2]."""
     spread = np.zeros((sky.size, len(patches)))
     spread[patches, np.arange(len(patches))] = 1e5 / sky.solid_angles[patches]
-    return SunSeries(spread, sky.directions[patches], np.full(len(patches), 1e5))
+    hours = np.arange(len(patches))
+    towards, strength = sky.directions[patches], np.full(len(patches), 1e5)
+    return AnnualSky(spread + diffuse, towards, strength, hours, len(patches), spread)
 
 
-def suns_at(places):
+def suns_at(places, diffuse: float = 0.0):
     """The sky of MF:4, and suns of 1e5 lx at an incidence [deg] on the window and a height (z)."""
     sky = ReinhartSky(4)
     cosine = sky.directions @ [0, -1, 0]
@@ -83,7 +87,7 @@ def suns_at(places):
         int(np.argmin(np.hypot(cosine - np.cos(np.radians(angle)), sky.directions[:, 2] - z)))
         for angle, z in places
     ]
-    return sky, sun_series(sky, patches)
+    return sky, sun_series(sky, patches, diffuse)
 
 
 def test_the_beam_between_patches_is_linear_in_angle_and_that_of_the_patch_at_its_middle():
@@ -133,23 +137,22 @@ def test_glass_keeps_its_hemispherical_transmittance():
 
 def test_five_phases_of_clear_glass_have_the_suns_own_transmittance_all_through():
     """A glass that had the sun's transmittance in every patch gives the same, hour by hour."""
+    from mitsuba_cfs.methods.optics import GivenOptics
     from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.five_phase import SunlitRoom, SystemState, five_phase_states
 
     wanted = [(62, 0.3), (66, 0.9), (74, 0.3), (77, 0.6), (84, 0.6)]
     _, sun = suns_at(wanted)
     room, groups = rooms.test_room()
     matrices = traced(room, rooms.NOTHING, groups, POINTS)
-    scene = SunlitRoom(room, rooms.NOTHING, groups, POINTS, UP)
-    found = five_phase_states(scene, matrices, [{"": glass()}], sun.patches, sun)[0][""]
+    found = lit(matrices, [[glass()]], sun)
     at_sun = between_the_rings(sun.direction @ [0, -1, 0])
     for h, tau in enumerate(at_sun):
-        even = SystemState(
+        even = GivenOptics(
             tau * np.eye(K), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
         )
         # between 82.5 and 90 degrees the even glass falls to 0, and so differs
         if wanted[h][0] < 82:
-            alone = five_phase_states(scene, matrices, [{"": even}], sun.patches, sun)[0][""][:, h]
+            alone = lit(matrices, [[even]], sun)[:, h]
             assert found[:, h] == pytest.approx(alone, rel=2e-3)
         assert np.all(found[:, h] > 0)
 
@@ -163,22 +166,23 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     from the room on both sides.
     """
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.five_phase import SunlitRoom, five_phase_states
     from mitsuba_cfs.trace.lit_room import AngularBeam, Room, Sky, System
     from mitsuba_cfs.trace.point_in_time import point_in_time
 
-    sky, sun = suns_at([(62, 0.3), (74, 0.9), (86, 0.3)])
+    diffuse = 300.0  # cd/m2 of a uniform sky and ground
+    sky, sun = suns_at([(62, 0.3), (74, 0.9), (86, 0.3)], diffuse)
     room, groups = rooms.test_room()
     # one sun lights few patches, whose entries of V are known to some per cent only
-    matrices = traced(room, rooms.NOTHING, groups, POINTS, samples=16384)
-    scene = SunlitRoom(room, rooms.NOTHING, groups, POINTS, UP)
-    diffuse = 300.0  # cd/m2 of a uniform sky and ground
-    found = five_phase_states(scene, matrices, [{"": glass()}], sun.patches + diffuse, sun)[0][""]
+    matrices = traced(room, rooms.NOTHING, groups, POINTS, sensor_samples=262_144)
+    found = lit(matrices, [[glass()]], sun)
     beam = AngularBeam(glass_transmittance(np.linspace(0, 1, 128)))
-    lit, luminance = Room(room, rooms.NOTHING, groups, [System(None, beam)]), 1e5 / SUN_SOLID_ANGLE
+    behind, luminance = (
+        Room(room, rooms.NOTHING, groups, [System(None, beam)]),
+        1e5 / SUN_SOLID_ANGLE,
+    )
     for h, direction in enumerate(sun.direction):
         paths = point_in_time(
-            lit, Sky(np.full(sky.size, diffuse), direction, luminance), POINTS, UP,
+            behind, Sky(np.full(sky.size, diffuse), direction, luminance), POINTS, UP,
             samples=8192, stopping=Stopping(batches=8),
         )  # fmt: skip
         ratio = found[:, h].sum() / paths.values.sum()
@@ -187,60 +191,85 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
         assert np.all(found[:, h] > 0)
 
 
-def test_states_of_two_groups_by_schedule_are_the_separate_runs():
-    room, groups, shade = rooms.l_shaped_room()
-    points = np.array([[2.0, 1.0, 0.8], [5.0, 4.5, 0.8]])
-    matrices = traced(room, shade, groups, points, subdivision=1)
-    rng = np.random.default_rng(1)
-    sky = rng.random((matrices.daylight.shape[2], 12))
-    states = [
-        {"up": np.eye(K), "40 degrees": rng.random((K, K)) / K, "down": np.zeros((K, K))},
-        {"clear": 0.7 * np.eye(K), "tinted": 0.1 * np.eye(K)},
-    ]
-    schedule = [rng.choice(list(group), size=12) for group in states]
-    parts = phases.three_phase_states(matrices.view, states, matrices.daylight, sky)
-    found = phases.scheduled(parts, schedule)
-    for h in range(12):
-        now = [group[schedule[g][h]] for g, group in enumerate(states)]
-        alone = phases.three_phase(matrices.view, now, matrices.daylight, sky[:, h : h + 1])
-        assert found[:, h : h + 1] == pytest.approx(alone, rel=1e-10)
-    with pytest.raises(ValueError, match="group 1: no state 'up', only clear, tinted"):
-        phases.scheduled(parts, [schedule[0], ["up"] * 12])
-
-
-def test_five_phase_states_of_two_groups_are_the_room_traced_as_a_whole():
-    from mitsuba_cfs.trace.direct_sun import (
-        direct_sun_matrix,
-        patch_beams,
-        through_beams,
-    )
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.five_phase import SunlitRoom, five_phase_states
-
-    sky = ReinhartSky(1)
+@pytest.fixture(scope="module")
+def corner():
+    """Two window groups below a shade, three sensors, three suns before one or both of them."""
     room, groups, shade = rooms.l_shaped_room()
     points = np.array([[2.0, 1.0, 0.8], [1.0, 4.5, 0.8], [5.0, 4.5, 0.8]])
-    up = np.tile([0.0, 0.0, 1.0], (3, 1))
     matrices = traced(room, shade, groups, points, subdivision=1)
-    sun = sun_series(sky, [20, 24, 50])
-    whole_sky = sun.patches + 3000.0
-    states = [{"up": glass()}, {"down": diffuser(0.4)}]
-    scene, few = SunlitRoom(room, shade, groups, points, up), {"stopping": Stopping(batches=4)}
-    parts = five_phase_states(scene, matrices, states, whole_sky, sun, **few)
-    names = ("up", "down")
-    found = phases.scheduled(parts, [[name] * 3 for name in names])
-    chosen = [group[name] for group, name in zip(states, names, strict=True)]
+    sky = ReinhartSky(1)
+    facing = np.stack([sky.directions @ group.frame[2] for group in groups])
+    facing[:, np.abs(sky.directions[:, 2] - 0.4) > 0.2] = -1
+    suns = [facing[0].argmax(), facing[1].argmax(), facing.min(axis=0).argmax()]
+    return matrices, sun_series(sky, suns, 3000.0)
+
+
+def test_each_group_has_a_state_of_its_own_in_each_hour(corner):
+    """Every hour of a schedule is the room with these systems and no others."""
+    matrices, sky = corner
+    systems = [[glass(), diffuser(0.4)], [diffuser(0.2), glass()]]
+    schedule = np.array([[0, 1, 1], [1, 1, 0]])
+    found = lit(matrices, systems, sky, schedule)
+    for h in range(3):
+        now = [[systems[g][schedule[g, h]]] for g in range(2)]
+        # C_ds' streams are keyed by the number of the sun: all three are traced in both
+        assert found[:, h] == pytest.approx(lit(matrices, now, sky)[:, h], rel=1e-9)
+    together = lit(matrices, systems, sky, np.array([1, 1, 1]))
+    assert np.array_equal(together, lit(matrices, systems, sky, np.ones((2, 3), dtype=int)))
+    with pytest.raises(ValueError, match=r"expected \[2, 3\]"):
+        lit(matrices, systems, sky, np.zeros((3, 3), dtype=int))
+
+
+def test_a_group_with_fewer_states_ends_with_its_last(corner):
+    matrices, sky = corner
+    systems = [[glass(), diffuser(0.4)], [diffuser(0.2)]]
+    one, other = (lit(matrices, systems, sky, np.full(3, j)) for j in (0, 1))
+    alone = lit(matrices, [[glass()], [diffuser(0.2)]], sky)
+    assert one == pytest.approx(alone, rel=1e-9)
+    assert not np.allclose(one, other, rtol=0.01)
+
+
+def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
+    """V T D s - V_d T D_d s_d + the beam at its own angle + C_ds s_sun, written out."""
+    from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
+    from mitsuba_cfs.trace.estimate import Stopping
+
+    matrices, sky = corner
+    scene, chosen = matrices.scene, [glass(), diffuser(0.4)]
+    found = lit(matrices, [[one] for one in chosen], sky)
     t, ways = [c.transmission for c in chosen], [c.scattering for c in chosen]
-    exact = direct_sun_matrix(room, shade, groups, ways, points, up, sun.direction, **few)
-    expected = phases.five_phase(
-        phases.three_phase(matrices.view, t, matrices.daylight, whole_sky),
-        phases.three_phase(matrices.direct_view, t, matrices.direct_daylight, sun.patches),
-        exact.values,
-        sun.illuminance / SUN_SOLID_ANGLE,
-    ) + phases.beam_at_sun_angle(
-        matrices.view - matrices.direct_view, t, patch_beams(ways, KLEMS_FULL),
-        through_beams(groups, ways, sun.direction), matrices.direct_daylight, sun.patches,
+    exact = direct_sun_matrix(
+        scene.interior, scene.exterior, scene.groups, ways, scene.points, scene.normals,
+        sky.direction, window_points=256, stopping=Stopping(batches=4),
     )  # fmt: skip
-    # streams are keyed by the number of the sun, which here counts all: 5 sigma of C_ds
-    noise = 5 * exact.standard_error * sun.illuminance / SUN_SOLID_ANGLE
-    assert np.all(np.abs(found - expected) <= noise + 1e-5 * expected)
+    view, direct_view = matrices.sensors.values, matrices.direct_sensors
+    expected = phases.five_phase(
+        phases.three_phase(view, t, matrices.daylight.values, sky.whole),
+        phases.three_phase(direct_view, t, matrices.direct_daylight, sky.sun),
+        exact.values,
+        sky.illuminance / SUN_SOLID_ANGLE,
+    ) + phases.beam_at_sun_angle(
+        view - direct_view, t, patch_beams(ways, KLEMS_FULL),
+        through_beams(scene.groups, ways, sky.direction), matrices.direct_daylight, sky.sun,
+    )  # fmt: skip
+    assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision
+
+
+def test_the_suns_light_by_group_adds_up_to_that_of_the_room(corner):
+    from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
+    from mitsuba_cfs.trace.estimate import Stopping
+
+    matrices, sky = corner
+    scene, ways = matrices.scene, [diffuser(0.2).scattering, diffuser(0.4).scattering]
+    around = scene.interior, scene.exterior, scene.groups, ways, scene.points, scene.normals
+    both, each = (
+        direct_sun_matrix(*around, sky.direction, stopping=Stopping(batches=4), by_group=by)
+        for by in (False, True)
+    )
+    assert each.values.shape == (2, 3, 3) and np.all(each.values.max(axis=(1, 2)) > 0)
+    assert each.values.sum(axis=0) == pytest.approx(both.values, rel=1e-5)
+    alone = direct_sun_matrix(
+        scene.interior, scene.exterior, scene.groups, [ways[0], None], scene.points,
+        scene.normals, sky.direction, stopping=Stopping(batches=4),
+    )  # fmt: skip
+    assert each.values[0] == pytest.approx(alone.values, rel=1e-6)

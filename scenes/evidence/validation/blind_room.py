@@ -118,4 +118,4 @@ def wall_round(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[n
 
 def empty() -> Surfaces:
     """Nothing outdoors."""
-    return Surfaces(np.empty((0, 3, 3)), np.empty(0), np.empty(0, dtype=np.int64))
+    return Surfaces.none()

@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +24,20 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.matrices.fine_basis import fine_basis
-from mitsuba_cfs.phases import PhaseMatrices
-from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
+from mitsuba_cfs.methods.optics import GivenOptics
+from mitsuba_cfs.methods.phase_light import PhaseSystems
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
+from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather, read_epw
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.five_phase import SunlitRoom, SunSeries, SystemState, five_phase_states
+from mitsuba_cfs.trace.estimate import Stopping
 from mitsuba_cfs.trace.lit_room import Room, Sky, System
 from mitsuba_cfs.trace.point_in_time import point_in_time
 from mitsuba_cfs.trace.systems import lit_system, sun_scattering
@@ -52,36 +55,17 @@ from scenes.evidence.validation.glare_room import glazing, known_system
 
 DIM = 50.0  # [lx] hours below this at the reference count no relative error
 SUBDIVISION = 4
+SAMPLING = Sampling(sensor_samples=262_144, patch_samples=32_768, subdivision=SUBDIVISION)
 FINE = fine_basis(3)  # 1,321 patches
 COEFFICIENT_PATHS = 65_536  # of a sensor in each of 16 batches
 
 
-@dataclass(frozen=True)
-class Hours:
-    """The skies of the chosen hours."""
-
-    whole: NDArray[np.float64]  # [P, H] cd/m2, the sun spread over patches
-    sky: NDArray[np.float64]  # [P, H] without the sun
-    sun: NDArray[np.float64]  # [P, H] the sun alone
-    direction: NDArray[np.float64]  # [H, 3]
-    luminance: NDArray[np.float64]  # [H] of the disc [cd/m2]
-
-
-def chosen_hours(weather: Weather, every: int) -> Hours:
-    """All sunlit hours of every `every`-th day."""
+def chosen_hours(weather: Weather, every: int) -> AnnualSky:
+    """The skies of all sunlit hours of every `every`-th day."""
     series = sky_series(weather)
     day = np.arange(len(weather.times)) // round(24 / weather.step_h)
     lit = (series.diffuse_horizontal > 100) & is_up(series.sun) & (day % every == every // 2)
-    hours = np.flatnonzero(lit)
-
-    parts = {
-        name: sky_matrix(weather, SUBDIVISION, parts=name)[:, hours] for name in ("sky", "sun")
-    }
-    luminance = series.direct_normal[hours] / SUN_SOLID_ANGLE
-
-    return Hours(
-        parts["sky"] + parts["sun"], parts["sky"], parts["sun"], series.sun[hours], luminance
-    )
+    return annual_sky(weather, SUBDIVISION, hours=np.flatnonzero(lit))
 
 
 def known_klems(tilt_deg: float | None, basis: KlemsBasis, samples: int) -> KlemsBsdf:
@@ -93,73 +77,58 @@ def known_klems(tilt_deg: float | None, basis: KlemsBasis, samples: int) -> Klem
     return combine_layers([blind, glass]).bsdf
 
 
-def traced(
-    scene: Scene, basis: KlemsBasis, depth: int = 32, samples: int = 2048
-) -> tuple[Estimate, Estimate]:
-    """V and D, or their direct parts with a depth of 1."""
-    view = view_matrix(
-        scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=depth,
-        basis=basis,
-    )  # fmt: skip
-    daylight = daylight_matrix(
-        empty(), scene.groups, subdivision=SUBDIVISION, samples=samples, max_depth=depth,
-        basis=basis,
-    )  # fmt: skip
-    return view, daylight
-
-
 def by_phases(
-    scene: Scene, system: KlemsBsdf, ways: dict[str, Scattering], hours: Hours
+    scene: Scene, system: KlemsBsdf, ways: dict[str, Scattering], sky: AnnualSky
 ) -> tuple[dict[str, NDArray[np.float64]], float]:
     """Illuminance [S, H] by the three-phase and the five-phase method, and V's share of its error.
 
     Args: ways: what passes the sun in the five-phase method, by name.
     """
-    (view, daylight), (direct_view, direct_daylight) = (
-        traced(scene, KLEMS_FULL, depth) for depth in (32, 1)
-    )
-    matrices = PhaseMatrices(
-        view.values, daylight.values, direct_view.values, direct_daylight.values
-    )
-    T = system.transmission_matrix()
-    states = {f"five-phase, {name}": SystemState(T, way) for name, way in ways.items()}
-    room = SunlitRoom(scene.interior, empty(), scene.groups, scene.points, scene.up)
-    sun = SunSeries(hours.sun, hours.direction, hours.luminance * SUN_SOLID_ANGLE)
-    whole = phases.three_phase(view.values, [T], daylight.values, hours.whole)
-    found = {"three-phase": whole}
-    found |= five_phase_states(room, matrices, [states], hours.whole, sun)[0]
-    mean = phases.room_side_radiance([T], daylight.values, hours.whole.mean(axis=1, keepdims=True))
-    noise = view.error_of(mean[..., 0])[:, 0] / whole.mean(axis=1)
-    return found, float(noise.max())
+    room = DaylightScene(scene.interior, empty(), scene.groups, scene.points, scene.up)
+    T, found = system.transmission_matrix(), {}
+    systems = [[GivenOptics(T, way) for way in ways.values()]]
+    three_phase = PhaseSystems(PhaseScene(room, SAMPLING, five_phase=False), systems).light(sky)
+    found["three-phase"] = three_phase.illuminance()
+    light = PhaseSystems(PhaseScene(room, SAMPLING), systems).light(sky)
+    for number, name in enumerate(ways):
+        found[f"five-phase, {name}"] = light.illuminance(np.full(len(sky.lit), number))
+    return found, float(three_phase.relative_error().max())
 
 
-def by_fine_matrix(scene: Scene, tilt_deg: float | None, hours: Hours) -> NDArray[np.float64]:
+def by_fine_matrix(scene: Scene, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by three phases with matrices of high resolution."""
-    view, daylight = traced(scene, FINE, samples=512)
+    view = view_matrix(
+        scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=32,
+        basis=FINE,
+    )  # fmt: skip
+    daylight = daylight_matrix(
+        empty(), scene.groups, subdivision=SUBDIVISION, samples=512, max_depth=32, basis=FINE
+    )
     T = known_klems(tilt_deg, FINE, 8192).transmission_matrix()
-    return phases.three_phase(view.values, [T], daylight.values, hours.whole)
+    return phases.three_phase(view.values, [T], daylight.values, sky.whole)
 
 
-def by_coefficients(scene: Scene, system: System, hours: Hours) -> NDArray[np.float64]:
+def by_coefficients(scene: Scene, system: System, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
     room = Room(scene.interior, empty(), scene.groups, [system])
     coefficients = daylight_coefficients(
         room, scene.points, scene.up, subdivision=SUBDIVISION, samples=COEFFICIENT_PATHS
     )
-    return coefficients.values @ hours.whole
+    return coefficients.values @ sky.whole
 
 
 def by_paths(
-    scene: Scene, exterior: Surfaces, system: System, hours: Hours, samples: int
+    scene: Scene, exterior: Surfaces, system: System, sky: AnnualSky, samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] by point-in-time paths, and its standard error."""
     room = Room(scene.interior, exterior, scene.groups, [system])
     runs = []
-    for h in range(len(hours.luminance)):
-        sky = Sky(hours.sky[:, h], hours.direction[h], hours.luminance[h])
+    for h in range(len(sky.lit)):
+        luminance = sky.illuminance[h] / SUN_SOLID_ANGLE
+        now = Sky(sky.without_sun(h), sky.direction[h], luminance)
         runs.append(
             point_in_time(
-                room, sky, scene.points, scene.up, samples=samples, stopping=Stopping(batches=4)
+                room, now, scene.points, scene.up, samples=samples, stopping=Stopping(batches=4)
             )
         )
     return tuple(np.stack([getattr(r, name) for r in runs], axis=1) for name in
@@ -187,22 +156,22 @@ def errors(found: NDArray, reference: NDArray) -> dict[str, float]:
     }
 
 
-def one_case(scene: Scene, hours: Hours, tilt_deg: float | None, samples: int) -> dict:
+def one_case(scene: Scene, sky: AnnualSky, tilt_deg: float | None, samples: int) -> dict:
     """All methods against the explicit geometry for one system."""
     exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
     klems = known_klems(tilt_deg, KLEMS_FULL, 65536)
     ways, systems = {"Klems": sun_scattering(klems)}, {"Klems": lit_system(klems)}
     if tilt_deg is not None:
         tree = known_system(blind_layer(tilt_deg))
-        ways["tensor tree"], systems["tensor tree"] = tree.scattering, tree.system
+        ways["tensor tree"], systems["tensor tree"] = tree.scattering, tree.paths
     start = time.monotonic()
-    reference, noise = by_paths(scene, exterior, glazing(), hours, samples)
+    reference, noise = by_paths(scene, exterior, glazing(), sky, samples)
     seconds = time.monotonic() - start
-    found, view_noise = by_phases(scene, klems, ways, hours)
-    found["three-phase, fine matrix"] = by_fine_matrix(scene, tilt_deg, hours)
+    found, view_noise = by_phases(scene, klems, ways, sky)
+    found["three-phase, fine matrix"] = by_fine_matrix(scene, tilt_deg, sky)
     for name, system in systems.items():
-        found[f"two-phase, {name}"] = by_coefficients(scene, system, hours)
-        found[f"point in time, {name}"] = by_paths(scene, empty(), system, hours, samples)[0]
+        found[f"two-phase, {name}"] = by_coefficients(scene, system, sky)
+        found[f"point in time, {name}"] = by_paths(scene, empty(), system, sky, samples)[0]
     return {
         "noise of the reference [%]": 100 * float(np.mean(noise / np.maximum(reference, DIM))),
         "noise of V, worst sensor [%]": 100 * view_noise,
@@ -222,10 +191,10 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     variants.activate()
-    hours = chosen_hours(read_epw(options.weather), options.every)
+    sky = chosen_hours(read_epw(options.weather), options.every)
     scene, results = test_room(), {}
     for name in options.only or TILTS:
-        results[name] = one_case(scene, hours, TILTS[name], options.samples)
+        results[name] = one_case(scene, sky, TILTS[name], options.samples)
         print(name, json.dumps(results[name], indent=1), flush=True)
     if options.json:
         options.json.write_text(json.dumps(results, indent=1))

@@ -24,18 +24,22 @@ from numpy.typing import NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.methods import METHODS
+from mitsuba_cfs.methods.by_name import traced_scene, values, with_systems
+from mitsuba_cfs.methods.optics import SystemOptics
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather, read_epw
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.evidence.validation.blind_room import TILTS, blind_layer, empty, slats
 from scenes.evidence.validation.glare_room import (
-    glare_place,
+    glare_scene,
     known_system,
     lit_hours,
     measurement,
     sunny_days,
 )
-from scenes.methods.methods import METHODS, method_scene
-from scenes.methods.place import Fenestration, Place, Quality, Skies, skies_of
 from scenes.pictures import write_falsecolour
 
 GLARE = ("DGP", "eDGP", "sDGP")
@@ -59,23 +63,23 @@ class Case:
 
     name: str
     exterior: Surfaces
-    system: Fenestration
-    skies: Skies
+    system: SystemOptics
+    sky: AnnualSky
     times: tuple[str, ...]
     raised: tuple[float, ...] = (0.0,)  # [m] eyes of the measurement above the view's, for a mean
 
 
 def measured(
-    place: Place, case: Case, quality: Quality, pictures: Path | None = None
+    scene: DaylightScene, case: Case, sampling: Sampling, pictures: Path | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """DGP and illuminance [lx] of the room with everything as geometry [H]."""
-    geometry, rows = GlareView(place.view), []
+    geometry, rows = GlareView(scene.view), []
     for height in case.raised:
-        eye = np.add(place.view.position, [0, 0, height])
-        raised = replace(place, view=replace(place.view, position=tuple(eye)))
-        room, row = measurement(raised, case.exterior, "DGP", quality), []
-        for hour in range(case.skies.hours):
-            picture = room.picture(case.skies, hour, seed=SEED)
+        eye = np.add(scene.view.position, [0, 0, height])
+        raised = replace(scene, view=replace(scene.view, position=tuple(eye)))
+        light, row = measurement(raised, case.exterior, sampling).light(case.sky), []
+        for hour in range(len(case.sky.lit)):
+            picture = light.picture(hour, seed=SEED)
             found = evaluate(picture, geometry)
             row.append((found.dgp, found.Ev))
             if pictures is not None:
@@ -87,30 +91,32 @@ def measured(
     return dgp, lux
 
 
-def rated(place: Place, cases: list[Case], quality: Quality, pictures: Path | None) -> list[dict]:
+def rated(
+    scene: DaylightScene, cases: list[Case], sampling: Sampling, pictures: Path | None
+) -> list[dict]:
     """The measurement and all methods for all cases; a method's scene is traced once."""
     found = []
     for case in cases:
-        dgp, lux = measured(place, case, quality, pictures)
+        dgp, lux = measured(scene, case, sampling, pictures)
         found.append(
             {"system": case.name, "times": list(case.times), "Ev": lux.round(1).tolist(),
              "measured": dgp.round(5).tolist(), "methods": {}}
         )  # fmt: skip
         print(case.name, "measured", dgp.round(3), file=sys.stderr, flush=True)
-    geometry = GlareView(place.view)
     for method in METHODS:
+        traced = traced_scene(method, scene, sampling)
         for metric in GLARE:
             start = time.monotonic()
-            scene = method_scene(method, metric, place, quality, geometry=geometry)
             for case, run in zip(cases, found, strict=True):
-                values = scene.behind(case.system).values(case.skies)
-                run["methods"][f"{method} {metric}"] = values.round(5).tolist()
+                light = with_systems(traced, [[case.system]] * len(scene.groups)).light(case.sky)
+                dgp = values(light, metric)
+                run["methods"][f"{method} {metric}"] = dgp.round(5).tolist()
             seconds = time.monotonic() - start
             print(f"{method} {metric}: {seconds:.0f} s", file=sys.stderr, flush=True)
     return found
 
 
-def weather_case(name: str, weather: Weather, place: Place, options) -> Case:
+def weather_case(name: str, weather: Weather, scene: DaylightScene, options) -> Case:
     """A system of `TILTS` in the hours that the options choose."""
     tilt = TILTS[name]
     days = [sunny_days(weather, 9, 4, options.days)]
@@ -120,9 +126,9 @@ def weather_case(name: str, weather: Weather, place: Place, options) -> Case:
     layer = None if tilt is None else blind_layer(tilt)
     return Case(
         name,
-        empty() if tilt is None else slats(place.groups[0], tilt),
+        empty() if tilt is None else slats(scene.groups[0], tilt),
         known_system(layer, levels=options.levels),
-        skies_of(weather, hours),
+        annual_sky(weather, hours=hours),
         tuple(f"{t:%m-%d %H:%M}" for t in weather.midpoints[hours]),
     )
 
@@ -147,8 +153,8 @@ def table(runs: list[dict]) -> str:
         for metric in GLARE:
             key = f"{method} {metric}"
             each = [_cell(errors(run["methods"][key], run["measured"])) for run in runs]
-            values = np.concatenate([run["methods"][key] for run in runs])
-            both = [_cell(errors(values, dgp)), _cell(DISSERTATION[method, metric])]
+            found = np.concatenate([run["methods"][key] for run in runs])
+            both = [_cell(errors(found, dgp)), _cell(DISSERTATION[method, metric])]
             lines.append(f"| {method}, {metric} | " + " | ".join(each + both) + " |")
     return "\n".join(lines)
 
@@ -180,11 +186,11 @@ def main() -> None:
     variants.activate()
     if options.pictures:
         options.pictures.mkdir(parents=True, exist_ok=True)
-    place, weather = glare_place(options.size), read_epw(options.weather)
-    quality = Quality(path_samples=options.samples, pixel_samples=2 * options.samples)
+    scene, weather = glare_scene(options.size), read_epw(options.weather)
+    sampling = Sampling(picture_samples=options.samples, view_samples=2 * options.samples)
     names = options.system or list(TILTS)
-    cases = [weather_case(name, weather, place, options) for name in names]
-    found = rated(place, cases, quality, options.pictures)
+    cases = [weather_case(name, weather, scene, options) for name in names]
+    found = rated(scene, cases, sampling, options.pictures)
     if options.json:
         options.json.write_text(json.dumps(found, indent=1))
     print(table(found))

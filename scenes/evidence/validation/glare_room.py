@@ -6,6 +6,8 @@ facade, and looks at it.  The "measurement" is the same room with the slats as g
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,28 +16,32 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer
 from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
+from mitsuba_cfs.methods.path_light import PathSystems
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.lit_room import AngularBeam, Room, System
+from mitsuba_cfs.trace.lit_room import AngularBeam, System
 from scenes.evidence.validation import blind_room
-from scenes.evidence.validation.glare_systems import tree_fenestration
-from scenes.methods.paths import PathSystem, path_scene
-from scenes.methods.place import Fenestration, Place, Quality, fenestration
+from scenes.evidence.validation.glare_systems import tree_optics
 
 EYE_HEIGHT = 1.2  # [m]
 DIFFUSE = 5_000.0  # [lx] horizontal: hours below it are left out
 COSINE = np.linspace(0, 1, 64)
 
 
-def glare_place(size: int, distance: float = 1.5) -> Place:
+def glare_scene(size: int, distance: float = 1.5) -> DaylightScene:
     """The room, seen from `distance` [m] before the facade at 1.2 m above the floor."""
     scene = blind_room.test_room()
     inward = -scene.groups[0].frame[2]
     middle = scene.groups[0].windows[0].triangles.reshape(-1, 3).mean(axis=0) * [1, 1, 0]
     eye = middle + distance * inward + [0, 0, EYE_HEIGHT]
     view = fisheye(eye, -inward, size)
-    return Place(scene.interior, blind_room.empty(), scene.groups, view, scene.points, scene.up)
+    return DaylightScene(
+        scene.interior, blind_room.empty(), scene.groups, scene.points, scene.up, view
+    )
 
 
 def glazing() -> System:
@@ -47,15 +53,15 @@ def glazing() -> System:
     return System(None, AngularBeam(blind_room.glass_transmittance(COSINE)), mirrors)
 
 
-def measurement(place: Place, exterior: Surfaces, metric: str, quality: Quality) -> PathSystem:
+def measurement(scene: DaylightScene, exterior: Surfaces, sampling: Sampling) -> PathSystems:
     """The room with everything as geometry, path-traced."""
-    scene = path_scene(place, metric, quality=quality)
-    return PathSystem(scene, Room(place.interior, exterior, place.groups, [glazing()]))
+    scene = replace(scene, exterior=exterior)
+    return PathSystems(scene, [[GivenOptics(paths=glazing())]] * len(scene.groups), sampling)
 
 
 def known_system(
     layer: PeriodicLayer | None, *, levels: int = 5, samples: int = 4096
-) -> Fenestration:
+) -> SystemOptics:
     """What the methods know: Klems matrices, and the layer's tensor tree before the glazing.
 
     The light that layer and glazing throw at each other, which the matrices hold, is added to the
@@ -63,14 +69,12 @@ def known_system(
     """
     glass = blind_room.glass_klems()
     if layer is None:
-        return fenestration(glass)
+        return BsdfOptics(glass)
     klems = generate_klems(layer, samples=16 * samples, seed=1).bsdf[0]
     both = combine_layers([klems, glass]).bsdf
     tree, _ = generate_tensor_tree(layer, levels, samples=samples, seed=1)
     system = glazing()
-    return tree_fenestration(
-        both, tree[0], system.beam, _between(klems, both), (None, system.mirrors[1])
-    )
+    return tree_optics(both, tree[0], system.beam, _between(klems, both), (None, system.mirrors[1]))
 
 
 def _between(layer: KlemsBsdf, both: KlemsBsdf) -> KlemsBsdf:

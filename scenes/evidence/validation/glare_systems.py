@@ -9,9 +9,9 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+from mitsuba_cfs.methods.optics import GivenOptics
 from mitsuba_cfs.trace.direct_sun import KlemsScattering
 from mitsuba_cfs.trace.lit_room import AngularBeam, System
-from scenes.methods.place import Fenestration
 
 
 class TreeBehind:
@@ -81,13 +81,13 @@ class TreeBehind:
         return factor
 
 
-def tree_fenestration(
+def tree_optics(
     klems: KlemsBsdf,
     tree: TensorTreeBsdf,
     glass: AngularBeam,
     between: KlemsBsdf,
     mirrors: tuple[AngularBeam | None, AngularBeam | None] = (None, None),
-) -> Fenestration:
+) -> GivenOptics:
     """A layer known by a tensor tree before clear glazing known by its transmittance.
 
     Args:
@@ -95,4 +95,4 @@ def tree_fenestration(
         between: see `TreeBehind`; mirrors: see `System`.
     """
     way = TreeBehind(tree, glass, between)
-    return Fenestration(klems.transmission_matrix(), way, System(way, way, mirrors))
+    return GivenOptics(klems.transmission_matrix(), way, System(way, way, mirrors))

@@ -21,14 +21,16 @@ import numpy as np
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.blinds import extrude
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
+from mitsuba_cfs.methods import METHODS
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.evidence.validation import blind_room
 from scenes.evidence.validation.glare_methods import GLARE, Case, rated
-from scenes.evidence.validation.glare_room import glare_place, known_system
-from scenes.methods.methods import METHODS
-from scenes.methods.place import Place, Quality, Skies
+from scenes.evidence.validation.glare_room import glare_scene, known_system
 
 SPACING = 0.004  # [m]
 PROFILE_DEG = 25.0  # of the sun, and of the slats
@@ -89,11 +91,11 @@ def peaked_geometry(group: WindowGroup, transmittance: float, amplitude_deg: flo
     )
 
 
-def clear_sky(place: Place) -> Skies:
+def clear_sky(scene: DaylightScene) -> AnnualSky:
     """CIE's clear sky, its sun before the window at the slats' profile angle."""
     profile = np.radians(PROFILE_DEG)
     aside = np.radians(ASIDE_DEG)
-    along, _, outward = place.groups[0].frame
+    along, _, outward = scene.groups[0].frame
     sun = (
         np.cos(aside) * outward
         + np.sin(aside) * along
@@ -108,12 +110,13 @@ def clear_sky(place: Place) -> Skies:
     near = np.argsort(-cosine)[:4]
     weight = 1 / (1.002 - cosine[near])
     patches[1 + near] = DIRECT * weight / weight.sum() / reinhart.solid_angles[1 + near]
-    return Skies(sky[:, None], patches[:, None], sun[None], np.array([DIRECT]))
+    whole, alone = (sky + patches)[:, None], patches[:, None]
+    return AnnualSky(whole, sun[None], np.array([DIRECT]), np.array([0]), 1, alone)
 
 
-def cases(place: Place, levels: int) -> list[Case]:
+def cases(scene: DaylightScene, levels: int) -> list[Case]:
     """Both series."""
-    skies, found = clear_sky(place), []
+    sky, found = clear_sky(scene), []
     series = {
         "transmittance": [(t, AMPLITUDE_DEG) for t in TRANSMITTANCES],
         "amplitude": [(TRANSMITTANCE, a) for a in AMPLITUDES_DEG],
@@ -124,11 +127,11 @@ def cases(place: Place, levels: int) -> list[Case]:
             found.append(
                 Case(
                     f"{name} {value:g}",
-                    peaked_geometry(place.groups[0], transmittance, amplitude),
+                    peaked_geometry(scene.groups[0], transmittance, amplitude),
                     known_system(
                         peaked_slats(transmittance, amplitude), levels=levels, samples=1024
                     ),
-                    skies,
+                    sky,
                     (name,),
                     tuple(SPACING * np.arange(EYES) / EYES),
                 )
@@ -210,9 +213,9 @@ def main() -> None:
         variants.activate()
         if options.pictures:
             options.pictures.mkdir(parents=True, exist_ok=True)
-        place = glare_place(options.size)
-        quality = Quality(path_samples=options.samples, pixel_samples=2 * options.samples)
-        runs = rated(place, cases(place, options.levels), quality, options.pictures)
+        scene = glare_scene(options.size)
+        sampling = Sampling(picture_samples=options.samples, view_samples=2 * options.samples)
+        runs = rated(scene, cases(scene, options.levels), sampling, options.pictures)
     if options.json:
         options.json.write_text(json.dumps(runs, indent=1))
     if options.figure:

@@ -1,0 +1,129 @@
+"""Glare of hours by any method: DGP of full pictures, eDGP of direct ones, sDGP of illuminance.
+
+    three-phase    E_v = V T D s                                eDGP pictures V_d T D_d s
+    five-phase     E_v = V T D s - V_d T D_d s_d + C_ds s_sun   V_d T D_d s_sky + C s_sun
+    paths          E_v of a sensor at the eye                   paths of one reflection
+
+Source: Wienold 2009, "Dynamic daylight glare evaluation" (eDGP); the dissertation's 3.2.4 to 3.2.6.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.glare.annual import AnnualGlare, annual_glare, full_picture
+from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
+from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.glare.simplified import DIRECT_DEPTH, simplified_dgp
+from mitsuba_cfs.methods.path_light import PathLight
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.progress import Progress, part, silent
+
+FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance")
+State = ArrayLike | None  # [G, L] of each window group in each hour, or [L] of all; None: the first
+
+
+def glare(
+    light: PhaseLight | PathLight,
+    metric: str = "DGP",
+    state: State = None,
+    *,
+    hours: ArrayLike | None = None,
+    keep: Path | None = None,
+    progress: Progress = silent,
+) -> AnnualGlare:
+    """Glare of the view in some hours [n] of the light's sky, all by default.
+
+    Args:
+        metric: DGP, eDGP or sDGP; the latter has no figures but the illuminance.
+        state: of the windows in each of the sky's hours.
+        keep: file of the ratings so far, see `annual_glare`.
+    """
+    chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
+    rows = states_of(light, state)[:, chosen]
+    if isinstance(light, PathLight):
+        return _of_paths(light, metric, chosen, rows, progress)
+    if metric == "sDGP":
+        return _simplified(light.eye(state)[chosen])
+    own = light.eye(state)[chosen] if metric == "eDGP" else None
+    geometry = light.filled.traced.geometry
+    table = np.full((len(FIGURES), len(chosen)), np.nan)
+    kinds, kind = np.unique(rows, axis=1, return_inverse=True)
+    for i, combination in enumerate(kinds.T):
+        columns = np.flatnonzero(kind.ravel() == i)
+        rated = annual_glare(
+            light.pictures(chosen[columns], combination, direct=metric == "eDGP"),
+            geometry=geometry,
+            illuminance=None if own is None else own[columns],
+            keep=keep if keep is None or i == 0 else keep.with_stem(f"{keep.stem}-{i}"),
+            progress=part(progress, i / kinds.shape[1], (i + 1) / kinds.shape[1], "glare"),
+        )
+        table[:, columns] = [getattr(rated, name) for name in FIGURES]
+    return AnnualGlare(**dict(zip(FIGURES, table, strict=True)))
+
+
+def pictures(
+    light: PhaseLight | PathLight,
+    hours: ArrayLike,
+    state: State = None,
+    *,
+    progress: Progress = silent,
+) -> list[NDArray[np.float32]]:
+    """Luminance pictures [ny, nx] [cd/m2] of some hours [n] of the light's sky."""
+    hours = np.asarray(hours, dtype=np.int64)
+    rows = states_of(light, state)[:, hours]
+    found: dict[int, NDArray[np.float32]] = {}
+    if isinstance(light, PathLight):
+        for i, now in enumerate(rows.T):
+            steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
+            found[i] = light.picture(int(hours[i]), now, progress=steps)
+        return list(found.values())
+    kinds, kind = np.unique(rows, axis=1, return_inverse=True)
+    for i, combination in enumerate(kinds.T):
+        columns = np.flatnonzero(kind.ravel() == i)
+        of_kind = light.pictures(hours[columns], combination)
+        values = of_kind.values(np.arange(len(columns)))
+        for c, row in zip(columns.tolist(), values, strict=True):
+            found[c] = full_picture(row, of_kind.pixels, of_kind.view)
+    progress("pictures", 1.0)
+    return [found[i] for i in range(len(hours))]
+
+
+def states_of(light: PhaseLight | PathLight, state: State) -> NDArray[np.int64]:
+    """The state of each window group in each hour [G, L]."""
+    groups, hours = len(light.filled.systems), len(light.sky.lit)
+    rows = np.zeros(hours, dtype=np.int64) if state is None else np.asarray(state)
+    return np.tile(rows, (groups, 1)) if rows.ndim == 1 else rows
+
+
+def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
+    nothing = np.full(len(eye), np.nan)
+    rest = {name: nothing for name in FIGURES[2:]}
+    return AnnualGlare(dgp=simplified_dgp(eye), Ev=np.asarray(eye, dtype=float), **rest)
+
+
+def _of_paths(
+    light: PathLight,
+    metric: str,
+    hours: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    progress: Progress,
+) -> AnnualGlare:
+    """Glare of some hours, each by its own paths."""
+    if metric == "sDGP":
+        eye = [light.eye(int(h), now) for h, now in zip(hours, rows.T, strict=True)]
+        return _simplified(np.array(eye))
+    geometry, found = GlareView(light.filled.scene.view), []
+    for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
+        options, depth = GlareOptions(), {}
+        if metric == "eDGP":
+            options = GlareOptions(illuminance=light.eye(hour, now))
+            depth = {"max_depth": DIRECT_DEPTH}
+        result = evaluate(light.picture(hour, now, **depth), geometry, options=options)
+        found.append([result.count if f == "sources" else getattr(result, f) for f in FIGURES])
+        progress("glare", (i + 1) / len(hours))
+    table = np.array(found, dtype=float).reshape(len(hours), len(FIGURES)).T
+    return AnnualGlare(**dict(zip(FIGURES, table, strict=True)))

@@ -1,0 +1,73 @@
+"""A fenestration system in one state, as each method takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.lit_room import System
+from mitsuba_cfs.trace.systems import lit_system, sun_scattering
+
+
+class SystemOptics(Protocol):
+    """Visible band of a system in one state."""
+
+    @property
+    def transmission(self) -> NDArray[np.float64]:
+        """T [K, K] of the matrix methods."""
+
+    @property
+    def scattering(self) -> Scattering:
+        """How the five-phase method's sun passes it."""
+
+    @property
+    def paths(self) -> System:
+        """What paths meet, from either side."""
+
+
+States = Sequence[SystemOptics]  # of a window group, such as from open to closed
+
+
+class BsdfOptics:
+    """The optics of BSDF data; each method's form is made when it is first asked for."""
+
+    def __init__(self, coarse: KlemsBsdf, fine: Bsdf | None = None) -> None:
+        """From Klems matrices, and the same as finely as it is known: a tensor tree."""
+        self._coarse, self._fine = coarse, coarse if fine is None else fine
+
+    @cached_property
+    def transmission(self) -> NDArray[np.float64]:
+        """See `SystemOptics`."""
+        return self._coarse.transmission_matrix()
+
+    @cached_property
+    def scattering(self) -> Scattering:
+        """See `SystemOptics`."""
+        return sun_scattering(self._fine)
+
+    @cached_property
+    def paths(self) -> System:
+        """See `SystemOptics`."""
+        return lit_system(self._fine)
+
+
+@dataclass(frozen=True)
+class GivenOptics:
+    """Optics given for each method by itself; what is not given must not be asked for."""
+
+    transmission: NDArray[np.float64] | None = None  # [K, K]
+    scattering: Scattering | None = None
+    paths: System | None = None
+
+
+def in_state(systems: Sequence[States], state: Sequence[int]) -> list[SystemOptics]:
+    """The optics of each group [G] in its state; a group with fewer states is in its last."""
+    return [group[min(j, len(group) - 1)] for group, j in zip(systems, state, strict=True)]

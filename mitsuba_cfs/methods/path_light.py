@@ -1,0 +1,132 @@
+"""Point-in-time paths: every hour is traced for itself, through the BSDF as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.methods.optics import States, in_state
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.lit_room import Room, Sky
+from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+from mitsuba_cfs.trace.point_in_time import point_in_time
+
+BATCHES = 4
+
+
+class PathSystems:
+    """A scene with what fills its windows, ready to be traced in each of its states."""
+
+    def __init__(
+        self,
+        scene: DaylightScene,
+        systems: Sequence[States],
+        sampling: Sampling | None = None,
+    ) -> None:
+        """From the states of each window group [G]."""
+        if len(systems) != len(scene.groups):
+            raise ValueError(f"systems of {len(systems)} groups for {len(scene.groups)}")
+        self.scene, self.systems, self.sampling = scene, systems, sampling or Sampling()
+        self._rooms: dict[tuple[int, ...], Room] = {}
+
+    def light(self, sky: AnnualSky, *, progress: Progress = silent) -> PathLight:
+        """The light of the sky's hours."""
+        return PathLight(self, sky, progress)
+
+    def room(self, state: Sequence[int]) -> Room:
+        """The room with each window group in a state [G]."""
+        key = tuple(int(j) for j in state)
+        if key not in self._rooms:
+            scene = self.scene
+            paths = [optics.paths for optics in in_state(self.systems, key)]
+            self._rooms[key] = Room(scene.interior, scene.exterior, scene.groups, paths)
+        return self._rooms[key]
+
+
+class PathLight:
+    """The light of some hours, each traced when it is asked for."""
+
+    def __init__(self, filled: PathSystems, sky: AnnualSky, progress: Progress = silent) -> None:
+        """From `PathSystems.light`; the sky must have its sun apart."""
+        if sky.sun is None:
+            raise ValueError("paths need the sky's sun")
+        self.filled, self.sky, self.progress = filled, sky, progress
+
+    def illuminance(self, state: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
+        """Illuminance of the scene's sensors [S, L] [lx]; `state` as for `estimate`."""
+        return self.estimate(state)[0]
+
+    def estimate(
+        self, state: NDArray[np.int64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Illuminance of the scene's sensors [S, L] [lx], and the relative error [S] of its mean.
+
+        Args: state: [G, L] of each window group in each hour, or [L] of all; the first by default.
+        """
+        scene, states = self.filled.scene, self._state(state)
+        lit = np.zeros((len(scene.points), len(self.sky.lit)))
+        variance = np.zeros(len(scene.points))
+        for hour, now in enumerate(states.T):
+            self.progress("point in time", hour / len(self.sky.lit))
+            found = self._sensors(scene.points, scene.normals, hour, now)
+            lit[:, hour] = found.values
+            variance += found.standard_error**2
+        total = lit.sum(axis=1)
+        error = np.divide(np.sqrt(variance), total, out=np.zeros_like(total), where=total > 0)
+        return lit, error
+
+    def eye(self, hour: int, state: Sequence[int]) -> float:
+        """Illuminance at the view's eye in one hour, its number among the sky's [lx]."""
+        view = self.filled.scene.view
+        place, direction = np.atleast_2d(view.position), np.atleast_2d(view.direction)
+        return float(self._sensors(place, direction, hour, state).values[0])
+
+    def picture(
+        self, hour: int, state: Sequence[int] | None = None, **options
+    ) -> NDArray[np.float32]:
+        """Luminance picture [ny, nx] of one hour [cd/m2].
+
+        Args: options: of `point_in_time_picture`; samples and seed are the sampling's.
+        """
+        chosen, filled = self.filled.sampling, self.filled
+        state = [0] * len(filled.systems) if state is None else state
+        options = {"samples": chosen.picture_samples, "seed": chosen.seed} | options
+        return point_in_time_picture(
+            filled.room(state), self.sky_of(hour), filled.scene.view, **options
+        )
+
+    def sky_of(self, hour: int) -> Sky:
+        """Sky and sun of one hour."""
+        sky = self.sky
+        luminance = sky.illuminance[hour] / SUN_SOLID_ANGLE
+        return Sky(sky.without_sun(hour), sky.direction[hour], luminance)
+
+    def _sensors(
+        self,
+        points: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        hour: int,
+        state: Sequence[int],
+    ) -> Estimate:
+        chosen = self.filled.sampling
+        return point_in_time(
+            self.filled.room(state),
+            self.sky_of(hour),
+            points,
+            directions,
+            samples=max(chosen.hour_samples // BATCHES, 1),
+            stopping=Stopping(batches=BATCHES),
+            seed=chosen.seed * self.sky.hours + int(self.sky.lit[hour]),  # hours scatter apart
+        )
+
+    def _state(self, state: NDArray[np.int64] | None) -> NDArray[np.int64]:
+        """The state of each group in each hour [G, L]."""
+        rows = np.zeros(len(self.sky.lit), dtype=np.int64) if state is None else np.asarray(state)
+        return np.tile(rows, (len(self.filled.systems), 1)) if rows.ndim == 1 else rows

@@ -1,0 +1,301 @@
+"""The three-phase and five-phase sums: matrices, systems and skies to illuminance and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs import phases
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.glare.annual import Pictures
+from mitsuba_cfs.methods.optics import States, in_state
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.trace.annual_pictures import FivePhasePictures
+from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
+from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.picture_outdoors import Outdoors, outdoors
+from mitsuba_cfs.trace.picture_sun import PictureSun
+
+SUN_BATCHES = 4  # of C_ds
+State = NDArray[np.int64]  # [G, L] state of each window group in each hour, or [L] of all groups
+
+
+class PhaseSystems:
+    """A scene's matrices with what fills its windows, in each of its states."""
+
+    def __init__(self, traced: PhaseScene, systems: Sequence[States]) -> None:
+        """From the states of each window group [G]."""
+        if len(systems) != len(traced.scene.groups):
+            raise ValueError(f"systems of {len(systems)} groups for {len(traced.scene.groups)}")
+        self.traced, self.systems = traced, systems
+        self._seen: dict[tuple[int, ...], tuple[PictureSun, Outdoors]] = {}
+
+    @property
+    def states(self) -> int:
+        """J, how many states the group has that has most."""
+        return max(map(len, self.systems))
+
+    def light(self, sky: AnnualSky, *, progress: Progress = silent) -> PhaseLight:
+        """The light of the sky's hours."""
+        return PhaseLight(self, sky, progress)
+
+    def coefficients(self, state: int = 0) -> NDArray[np.float64]:
+        """V T D [S, P]: illuminance of each sensor per unit luminance of each sky patch."""
+        optics = in_state(self.systems, [state] * len(self.systems))
+        view, daylight = self.traced.sensors.values, self.traced.daylight.values
+        through = np.stack([o.transmission @ d for o, d in zip(optics, daylight, strict=True)])
+        count = len(self.traced.scene.points)
+        return np.einsum("sgk,gkp->sp", view[:count], through, optimize=True)
+
+    def seen_sun(self, state: tuple[int, ...]) -> tuple[PictureSun, Outdoors]:
+        """The sun and the outdoors in the view's pixels, with each group in a state."""
+        if state not in self._seen:
+            scene, chosen = self.traced.scene, self.traced.sampling
+            scattering = [o.scattering for o in in_state(self.systems, state)]
+            around = scene.interior, scene.exterior, scene.groups, scattering, scene.view
+            self._seen[state] = PictureSun(*around), outdoors(
+                *around, subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
+                seed=chosen.seed,
+            )  # fmt: skip
+        return self._seen[state]
+
+
+@dataclass(frozen=True, slots=True)
+class WindowLight:
+    """The luminance of a window group towards the room in one state."""
+
+    whole: NDArray[np.float32]  # [K, L] T D s [cd/m2]
+    sun: NDArray[np.float32] | None  # [K, L] T D_d s_d, the sun alone
+
+
+@dataclass(frozen=True, slots=True)
+class SensorLight:
+    """What a window group in one state gives to the sensors, the eye last [lx]."""
+
+    diffuse: NDArray[np.float64]  # [S, L] V T D s - V_d T D_d s_d + the reflected beam's own angle
+    sun: NDArray[np.float64] | None  # [S, L] C_ds s_sun
+    sun_error: NDArray[np.float64] | float  # [S] standard error of its sum over the hours
+
+
+class PhaseLight:
+    """The light of some hours, each window group in a state of its own in each of them.
+
+        E = V T D s                                         three-phase
+        E = V T D s - V_d T D_d s_d + C_ds s_sun            five-phase
+
+    with V T D s having the beam that the room reflects at the sun's own angle, as C_ds has it
+    (`mitsuba_cfs.phases.beam_at_sun_angle`).  Nothing gets negative.
+    """
+
+    def __init__(self, filled: PhaseSystems, sky: AnnualSky, progress: Progress = silent) -> None:
+        """From `PhaseSystems.light`."""
+        if filled.traced.five_phase and sky.sun is None:
+            raise ValueError("the five-phase method needs the sky's sun")
+        self.filled, self.sky, self.progress = filled, sky, progress
+        self._traced = filled.traced
+
+    @cached_property
+    def windows(self) -> list[list[WindowLight]]:
+        """Luminance of each window group in each of its states."""
+        daylight, sky, found = self._traced.daylight.values, self.sky, []
+        for g, states in enumerate(self.filled.systems):
+            T, D = [s.transmission for s in states], [daylight[g]] * len(states)
+            whole = phases.room_side_radiance(T, D, sky.whole).astype(np.float32)
+            sun: Sequence = [None] * len(states)
+            if self._traced.five_phase:
+                D = [self._traced.direct_daylight[g]] * len(states)
+                sun = phases.room_side_radiance(T, D, sky.sun).astype(np.float32)
+            found.append([WindowLight(*pair) for pair in zip(whole, sun, strict=True)])
+        return found
+
+    @cached_property
+    def sensors(self) -> list[list[SensorLight]]:
+        """What each window group gives to the sensors in each of its states."""
+        exact = self._exact_sun()
+        return [
+            [self._sensor_light(g, j, exact) for j in range(len(states))]
+            for g, states in enumerate(self.filled.systems)
+        ]
+
+    def illuminance(self, state: State | None = None) -> NDArray[np.float64]:
+        """Illuminance of the scene's sensors [S, L] [lx]."""
+        return self._of_all(state)[: len(self._traced.scene.points)]
+
+    def eye(self, state: State | None = None) -> NDArray[np.float64]:
+        """Illuminance at the view's eye [L] [lx]."""
+        return self._of_all(state)[-1]
+
+    def direct_sun(self, state: State | None = None) -> NDArray[np.float64] | None:
+        """Illuminance of the sensors straight from the sun [S, L] [lx]; None by three phases."""
+        parts = [self._chosen(g, "sun", row) for g, row in enumerate(self._state(state))]
+        if parts[0] is None:
+            return None
+        return sum(parts)[: len(self._traced.scene.points)]
+
+    def relative_error(self, state: State | None = None) -> NDArray[np.float64]:
+        """Standard error of each sensor's mean over the hours [S], from the tracing.
+
+        The errors of different window groups are taken as independent.
+        """
+        state, variance = self._state(state), 0.0
+        for g, row in enumerate(state):
+            mean = self._window_luminance("whole", state)[g].mean(axis=-1)
+            tracing = _group(self._traced.sensors, g).error_of(mean)
+            share = np.bincount(row, minlength=len(self.sensors[g])) / len(row)
+            sun = sum(w * s.sun_error for w, s in zip(share, self.sensors[g], strict=True))
+            variance = variance + tracing**2 + (sun / len(row)) ** 2
+        mean = self._of_all(state).mean(axis=1)
+        error = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
+        return error[: len(self._traced.scene.points)]
+
+    def pictures(
+        self, hours: NDArray[np.int64], state: Sequence[int], *, direct: bool = False
+    ) -> Pictures:
+        """Pictures of some hours [n] with each window group in a state [G].
+
+        Args: direct: without what the room or the outdoors reflect more than once, for eDGP.
+        """
+        traced, sky = self._traced, self.sky
+        rows = np.tile(np.asarray(state)[:, None], len(hours))
+        matrices, daylight = traced.view, traced.daylight.values
+        if direct:
+            matrices, daylight = traced.direct_view, traced.direct_daylight
+            T = [o.transmission for o in in_state(self.filled.systems, state)]
+            luminance = phases.room_side_radiance(T, daylight, sky.whole[:, hours])
+        else:
+            luminance = self._window_luminance("whole", rows, hours)
+        if not traced.five_phase:
+            return matrices.three_phase(luminance)
+        sun, seen = self.filled.seen_sun(tuple(int(j) for j in state))
+        found = FivePhasePictures(
+            matrices,
+            sun,
+            luminance,
+            self._window_luminance("sun", rows, hours),
+            sky.direction[hours],
+            sky.illuminance[hours],
+        )
+        found.show_outdoors(
+            seen, daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
+        )
+        return found
+
+    def _sensor_light(self, g: int, j: int, exact: list[Estimate | None]) -> SensorLight:
+        traced, sky, window = self._traced, self.sky, self.windows[g][j]
+        view = traced.sensors.values[:, g]
+        three_phase = view @ window.whole
+        if not traced.five_phase:
+            return SensorLight(three_phase, None, 0.0)
+        direct = traced.direct_sensors[:, g]
+        optics = self.filled.systems[g][j]
+        ways, groups = [optics.scattering], traced.scene.groups[g : g + 1]
+        three_phase = three_phase - direct @ window.sun
+        beams = patch_beams(ways, KLEMS_FULL)
+        if beams.any():
+            three_phase += phases.beam_at_sun_angle(
+                (view - direct)[:, None],
+                [optics.transmission],
+                beams,
+                through_beams(groups, ways, sky.direction),
+                traced.direct_daylight[g : g + 1],
+                sky.sun,
+            )
+        sun, shining = np.zeros_like(three_phase), self._shining()
+        if exact[j] is None:
+            return SensorLight(three_phase, sun, 0.0)
+        luminance = sky.illuminance[shining] / SUN_SOLID_ANGLE
+        found = _row(exact[j], g)
+        sun[:, shining] = found.values * luminance
+        return SensorLight(three_phase, sun, found.error_of(luminance))
+
+    def _exact_sun(self) -> list[Estimate | None]:
+        """C_ds [G, S, Q] of the hours in which the sun shines on a window, in each state [J]."""
+        traced, shining = self._traced, self._shining()
+        count = self.filled.states
+        if not traced.five_phase or not len(shining):
+            return [None] * count
+        scene, chosen = traced.scene, traced.sampling
+        found: list[Estimate | None] = []
+        for j in range(count):
+            ways = [o.scattering for o in in_state(self.filled.systems, [j] * len(scene.groups))]
+            found.append(
+                direct_sun_matrix(
+                    scene.interior, scene.exterior, scene.groups, ways, *scene.sensors(),
+                    self.sky.direction[shining],
+                    window_points=max(chosen.sun_points // SUN_BATCHES, 1),
+                    stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
+                    progress=lambda _, done, j=j: self.progress("daylight", (j + done) / count),
+                    cache=traced.cache,
+                )
+            )  # fmt: skip
+        return found
+
+    def _shining(self) -> NDArray[np.int64]:
+        """The hours L in which the sun stands before a window."""
+        groups = self._traced.scene.groups
+        facing = np.any([self.sky.direction @ g.frame[2] > 0 for g in groups], axis=0)
+        return np.flatnonzero(facing & (self.sky.illuminance > 0))
+
+    def _of_all(self, state: State | None) -> NDArray[np.float64]:
+        """Illuminance of sensors and eye [S + 1, L] by all groups."""
+        rows = list(enumerate(self._state(state)))
+        diffuse = sum(self._chosen(g, "diffuse", row) for g, row in rows)
+        if not self._traced.five_phase:
+            return diffuse
+        return np.maximum(diffuse, 0.0) + sum(self._chosen(g, "sun", row) for g, row in rows)
+
+    def _chosen(self, g: int, name: str, row: NDArray[np.int64]) -> NDArray[np.float64] | None:
+        """What a group gives [S, L] in the state of each hour [L]."""
+        states = [getattr(light, name) for light in self.sensors[g]]
+        if len(states) == 1 or states[0] is None:
+            return states[0]
+        found = np.empty_like(states[0])
+        for j, values in enumerate(states):
+            found[:, row == j] = values[:, row == j]
+        return found
+
+    def _window_luminance(
+        self, name: str, rows: NDArray[np.int64], hours: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float32]:
+        """Luminance [G, K, n] of the windows in some hours [n], in the state [G, n] of each."""
+        hours = np.arange(len(self.sky.lit)) if hours is None else hours
+        found = []
+        for group, row in zip(self.windows, rows, strict=True):
+            states = np.minimum(row, len(group) - 1)
+            values = np.empty((len(group[0].whole), len(hours)), dtype=np.float32)
+            for j in np.unique(states):
+                values[:, states == j] = getattr(group[j], name)[:, hours[states == j]]
+            found.append(values)
+        return np.stack(found)
+
+    def _state(self, state: State | None) -> NDArray[np.int64]:
+        """The state of each group in each hour [G, L], as far as it has states."""
+        count = len(self.filled.systems)
+        rows = np.zeros(len(self.sky.lit), dtype=np.int64) if state is None else np.asarray(state)
+        rows = np.tile(rows, (count, 1)) if rows.ndim == 1 else rows
+        if rows.shape != (count, len(self.sky.lit)):
+            raise ValueError(f"state {rows.shape}: expected [{count}, {len(self.sky.lit)}]")
+        return np.minimum(rows, np.array([[len(s) - 1] for s in self.filled.systems]))
+
+
+def _group(view: Estimate, g: int) -> Estimate:
+    """V of one window group [S, K]."""
+    return Estimate(
+        view.values[:, g], view.standard_error[:, g], view.sum_error[:, g], view.batches,
+        view.seconds,
+    )  # fmt: skip
+
+
+def _row(estimate: Estimate, g: int) -> Estimate:
+    """One group's part of C_ds [S, Q]."""
+    return Estimate(
+        estimate.values[g], estimate.standard_error[g], estimate.sum_error[g], estimate.batches,
+        estimate.seconds,
+    )  # fmt: skip

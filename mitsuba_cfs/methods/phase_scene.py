@@ -1,0 +1,156 @@
+"""What the phase methods trace of a scene, once for all that may fill its windows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.view_cache import kept_view
+from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
+from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.view_matrix import view_matrix
+
+BATCHES = 8  # independent repetitions that the standard errors come from
+INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path
+
+
+class PhaseScene:
+    """The matrices of a scene, each traced when it is first asked for, or found in the cache."""
+
+    def __init__(
+        self,
+        scene: DaylightScene,
+        sampling: Sampling | None = None,
+        *,
+        five_phase: bool = True,
+        cache: MatrixCache | None = None,
+        progress: Progress = silent,
+    ) -> None:
+        """A Mitsuba variant must be active.
+
+        Args: cache: where matrices are kept and found again, `MatrixCache.of_user()`.
+        """
+        self.scene, self.sampling = scene, sampling or Sampling()
+        self.five_phase, self.cache, self.progress = five_phase, cache, progress
+
+    def seen_from(self, view: View, progress: Progress | None = None) -> PhaseScene:
+        """The same room seen from another eye: what is outdoors is not traced again."""
+        other = PhaseScene(
+            replace(self.scene, view=view),
+            self.sampling,
+            five_phase=self.five_phase,
+            cache=self.cache,
+            progress=self.progress if progress is None else progress,
+        )
+        for name in ("daylight", "direct_daylight"):
+            if name in self.__dict__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
+
+    def trace(self, metric: str) -> None:
+        """Trace now what a metric needs (`mitsuba_cfs.methods.METRICS`)."""
+        wanted = ["daylight"]
+        if self.five_phase or metric == "eDGP":
+            wanted.append("direct_daylight")
+        if metric != "DGP":
+            wanted += ["sensors", "direct_sensors"] if self.five_phase else ["sensors"]
+        wanted += {"DGP": ["view", "geometry"], "eDGP": ["direct_view", "geometry"]}.get(metric, [])
+        for name in wanted:
+            getattr(self, name)
+
+    @cached_property
+    def daylight(self) -> Estimate:
+        """D [G, K, P]."""
+        return self._daylight(OUTDOOR_DEPTH, 0.0, 0.2)
+
+    @cached_property
+    def direct_daylight(self) -> NDArray[np.float64]:
+        """D_d [G, K, P]: what comes straight from the sky; a part of D."""
+        if not len(self.scene.exterior.triangles):  # nothing outdoors reflects
+            return self.daylight.values
+        return self._daylight(1, 0.2, 0.3).values
+
+    @cached_property
+    def sensors(self) -> Estimate:
+        """V [S, G, K] of the scene's sensors."""
+        return self._sensors(INDOOR_DEPTH, 0.3, 0.9)
+
+    @cached_property
+    def direct_sensors(self) -> NDArray[np.float64]:
+        """V_d [S, G, K]: what comes straight from the windows; a part of V."""
+        return self._sensors(1, 0.9, 1.0).values
+
+    @cached_property
+    def view(self) -> ViewMatrices:
+        """V of the view's pixels."""
+        return self._view(INDOOR_DEPTH)
+
+    @cached_property
+    def direct_view(self) -> ViewMatrices:
+        """V of the view's pixels without what the room reflects more than once."""
+        return self._view(1)
+
+    @cached_property
+    def geometry(self) -> GlareView:
+        """What glare needs of the view."""
+        return GlareView(self.scene.view)
+
+    def _daylight(self, depth: int, start: float, end: float) -> Estimate:
+        chosen = self.sampling
+        return daylight_matrix(
+            self.scene.exterior,
+            self.scene.groups,
+            subdivision=chosen.subdivision,
+            samples=max(chosen.patch_samples // BATCHES, 1),
+            max_depth=depth,
+            stopping=Stopping(batches=BATCHES),
+            seed=chosen.seed,
+            progress=part(self.progress, start, end, "daylight"),
+            cache=self.cache,
+        )
+
+    def _sensors(self, depth: int, start: float, end: float) -> Estimate:
+        chosen = self.sampling
+        return view_matrix(
+            self.scene.interior,
+            self.scene.groups,
+            *self.scene.sensors(),
+            samples=max(chosen.sensor_samples // BATCHES, 1),
+            max_depth=depth,
+            stopping=Stopping(batches=BATCHES),
+            seed=chosen.seed,
+            progress=part(self.progress, start, end, "daylight"),
+            cache=self.cache,
+        )
+
+    def _view(self, depth: int) -> ViewMatrices:
+        scene, chosen = self.scene, self.sampling
+        if scene.view is None:
+            raise ValueError("the scene has no view to make pictures of")
+        inputs = scene.interior, tuple(scene.groups), chosen.view_samples, chosen.seed, depth
+        return kept_view(
+            self.cache,
+            scene.view,
+            (variants.activate(), *inputs),
+            lambda: view_matrices(
+                scene.interior,
+                scene.groups,
+                scene.view,
+                samples=chosen.view_samples,
+                seed=chosen.seed,
+                memory=chosen.memory,
+                max_depth=depth,
+                progress=part(self.progress, 0.0, 1.0, "pictures"),
+            ),
+        )

@@ -1,0 +1,44 @@
+"""A scene in the dissertation's sense: room and outdoors, without what fills the windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+
+
+def _nowhere() -> NDArray[np.float64]:
+    return np.empty((0, 3))
+
+
+@dataclass(frozen=True, slots=True)
+class DaylightScene:
+    """What light meets, the sensors it is taken at, and an eye."""
+
+    interior: Surfaces
+    exterior: Surfaces
+    groups: Sequence[WindowGroup]  # axis G
+    points: NDArray[np.float64] = field(default_factory=_nowhere)  # [S, 3] [m]
+    normals: NDArray[np.float64] = field(default_factory=_nowhere)  # [S, 3]
+    view: View | None = None  # of the eye whose glare is rated
+
+    def __post_init__(self) -> None:
+        if self.points.shape != self.normals.shape or self.points.shape[1:] != (3,):
+            raise ValueError(
+                f"points {self.points.shape}, normals {self.normals.shape}: expected [S, 3] both"
+            )
+
+    def sensors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions and directions [S + 1, 3] of the sensors, the eye as the last; [S, 3] without
+        a view."""
+        if self.view is None:
+            return self.points, self.normals
+        eye, direction = (
+            np.asarray(a, dtype=float)[None] for a in (self.view.position, self.view.direction)
+        )
+        return np.concatenate([self.points, eye]), np.concatenate([self.normals, direction])
