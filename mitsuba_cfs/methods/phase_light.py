@@ -91,7 +91,12 @@ class PhaseLight:
         E = V T D s - V_d T D_d s_d + C_ds s_sun            five-phase
 
     with V T D s having the beam that the room reflects at the sun's own angle, as C_ds has it
-    (`mitsuba_cfs.phases.beam_at_sun_angle`).  Nothing gets negative.
+    (`mitsuba_cfs.phases.beam_at_sun_angle`).  V_d and D_d are traced with the seed and the samples
+    of V and D: they are a part of them, entry by entry, and nothing gets negative.
+
+    Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase); McNeil and
+    Lee 2013, "Annual daylighting performance of a passive optical light shelf" and McNeil 2013,
+    "The five-phase method for simulating complex fenestration with Radiance".
     """
 
     def __init__(self, filled: PhaseSystems, sky: AnnualSky, progress: Progress = silent) -> None:

@@ -86,7 +86,7 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     table = outputs.write_summary(year, rows, out)
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
-        f"{year.room}: {len(table)} view(s), {len(year.lit)} hours with the sun up.  Highest "
+        f"{year.room}: {len(table)} view(s), {len(year.sky.lit)} hours with the sun up.  Highest "
         f"{year.options.metric} {worst['highest_dgp']:.2f} ({worst['view']}, {worst['worst_hour']})"
     )
     for level, count in table["protection_en17037"].value_counts().items():

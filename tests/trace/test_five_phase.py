@@ -243,15 +243,13 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
         sky.direction, window_points=256, stopping=Stopping(batches=4),
     )  # fmt: skip
     view, direct_view = matrices.sensors.values, matrices.direct_sensors
-    expected = phases.five_phase(
-        phases.three_phase(view, t, matrices.daylight.values, sky.whole),
-        phases.three_phase(direct_view, t, matrices.direct_daylight, sky.sun),
-        exact.values,
-        sky.illuminance / SUN_SOLID_ANGLE,
-    ) + phases.beam_at_sun_angle(
+    expected = phases.three_phase(view, t, matrices.daylight.values, sky.whole)
+    expected -= phases.three_phase(direct_view, t, matrices.direct_daylight, sky.sun)
+    expected += phases.beam_at_sun_angle(
         view - direct_view, t, patch_beams(ways, KLEMS_FULL),
         through_beams(scene.groups, ways, sky.direction), matrices.direct_daylight, sky.sun,
     )  # fmt: skip
+    expected += exact.values * sky.illuminance / SUN_SOLID_ANGLE
     assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision
 
 
