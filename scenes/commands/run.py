@@ -122,7 +122,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     files = (options.building, options.weather, options.system, options.operation)
     folder = ResultFolder(out, command, inputs=files)
     if options.cache:
-        default_folder()  # or one line that it cannot be one
+        default_folder()  # of the cache, or one line that it cannot be one
     with ProgressBar() as progress:
         result = run_job(options, progress)
         progress("results", 0.0)

@@ -41,6 +41,7 @@ def command(
     is new.
     """
     from mitsuba_cfs.files import check_file
+    from mitsuba_cfs.matrices.cache import default_folder
     from scenes.commands.progress_bar import ProgressBar
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
@@ -54,6 +55,7 @@ def command(
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, **asked)
     store = Store(out, inputs=(study, *parsed.files))
+    default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
     plan = settled(parsed, plan_of(parsed))
