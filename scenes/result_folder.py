@@ -129,11 +129,15 @@ class ResultFolder:
 
     def kept(self, name: str) -> Path:
         """A folder inside for what is kept while the command works; it is never cleared."""
+        made: list[Path] = []
         try:
-            (self._place / name).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
+            made = _make_folders(self._place / name)
+            self._mark.write(self._place)
+        except (OSError, DataError) as error:
+            _remove_empty(made)  # without a mark they would be another's
+            if isinstance(error, DataError):
+                raise
             raise self._error(f"cannot be written: {reason(error)}") from error
-        self._mark.write(self._place)
         return self.folder / name
 
     def _refuse_inputs(self, inputs: Iterable[Path | None]) -> None:
