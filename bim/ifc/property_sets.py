@@ -8,7 +8,7 @@ from pathlib import Path
 import ifcopenshell
 import ifcopenshell.guid
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_text
 
 Entity = ifcopenshell.entity_instance
 
@@ -64,9 +64,5 @@ def _take_off(model: ifcopenshell.file, target: Entity, name: str) -> None:
 
 def save(model: ifcopenshell.file, out: str | Path) -> None:
     """Write the model; a file of that name is replaced only once the new one is whole."""
-    part = Path(out).with_name(Path(out).name + ".part")
-    try:
-        model.write(str(part))
-        part.replace(out)
-    except (OSError, RuntimeError) as error:
-        raise DataError(f"cannot be written: {error}", file=out) from None
+    # not `model.write`: on a full disk it says nothing, or not why, and leaves a file of its own
+    write_text(out, model.to_string())

@@ -76,14 +76,18 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     if start >= end:
         raise click.UsageError(f"--occupied {start} {end}: expected the first hour before the last")
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.result_folder import ResultFolder
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare.year import rate_views, read_year
 
-    kept = outputs.kept_folder(out)
+    files = (building, chosen["weather"], chosen["system"], *map(Path, chosen["views"]))
+    folder = ResultFolder(out, "dgp", inputs=files)
     with ProgressBar() as progress:
         year = read_year(YearOptions(building or OFFICE, **chosen), progress)
-        rows = [outputs.write_view(year, v, out) for v in rate_views(year, kept, progress)]
-    table = outputs.write_summary(year, rows, out)
+        views = rate_views(year, folder.kept(outputs.KEPT), progress)
+        with folder.replaced() as place:
+            rows = [outputs.write_view(year, rated, place) for rated in views]
+            table = outputs.write_summary(year, rows, place)
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
         f"{year.room}: {len(table)} view(s), {len(year.sky.lit)} hours with the sun up.  Highest "

@@ -8,6 +8,7 @@ import click
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, write_table
 from mitsuba_cfs.glare import areas, report
 from mitsuba_cfs.glare.classes import glare_class
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
@@ -17,6 +18,7 @@ from mitsuba_cfs.images.hdr import Picture, read_hdr, write_hdr
 from mitsuba_cfs.images.view import View
 from scenes.commands import glare_flags
 from scenes.commands.glare_flags import Request
+from scenes.result_folder import ResultFolder
 
 SUFFIXES = {".hdr", ".pic"}
 CUTS = {1: "total", 2: "both eyes"}
@@ -51,6 +53,7 @@ def command(words: tuple[str, ...]) -> None:
         return
     options = glare_flags.options(request)
     paths = pictures(request.paths or [Path("/dev/stdin")])
+    _check_outputs(request, paths)
     rows, geometry = [], None
     for path in paths:
         picture = read_hdr(path)
@@ -62,6 +65,18 @@ def command(words: tuple[str, ...]) -> None:
             rows.append(row)
     if (table := request.value("--csv")) is not None and rows:
         _write_table(table, rows)
+
+
+def _check_outputs(request: Request, paths: list[Path]) -> None:
+    """Refuse, before anything is read, what could not be written at the end."""
+    for flag in ("-c", "--csv", "--png"):
+        target = request.value(flag)
+        if target is None:
+            continue
+        if flag == "--png" or (flag == "-c" and (len(paths) > 1 or target.is_dir())):
+            ResultFolder(target, "glare", adding=True, field=flag)
+        else:
+            check_file(target, field=flag, inputs=paths)
 
 
 def pictures(paths: list[Path]) -> list[Path]:
@@ -227,20 +242,22 @@ def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, 
     if (check := request.value("-c")) is not None:
         from scenes.pictures import check_radiance
 
-        target = check / f"{path.stem}_check.hdr" if several or check.is_dir() else check
-        if several:
-            check.mkdir(parents=True, exist_ok=True)
         uniform, blue = request.given.get("-u"), "-T" in request.given
         pixels = check_radiance(result, uniform, show_task=blue)
-        write_hdr(target, pixels, result.geometry.view, comments=(VERSION,))
+        view, about = result.geometry.view, (VERSION,)
+        if several or check.is_dir():
+            with ResultFolder(check, "glare", adding=True, field="-c").replaced() as place:
+                write_hdr(place / f"{path.stem}_check.hdr", pixels, view, comments=about)
+        else:
+            write_hdr(check, pixels, view, comments=about)
     if (folder := request.value("--png")) is not None:
-        _write_png(folder, path.stem, picture, result, request.given.get("--scale"))
+        with ResultFolder(folder, "glare", adding=True, field="--png").replaced() as place:
+            _write_png(place, path.stem, picture, result, request.given.get("--scale"))
 
 
 def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, limits) -> None:
     from scenes import pictures as drawn
 
-    folder.mkdir(parents=True, exist_ok=True)
     title = f"{name}   DGP {result.dgp:.3f} ({glare_class(result.dgp)}), E_v {result.Ev:,.0f} lx"
     valid = in_picture_order(result.geometry.valid)
     colour = picture.pixels if picture.colours == "rgb" else picture.luminance
@@ -259,7 +276,4 @@ def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, l
 def _write_table(path: Path, rows: list[dict]) -> None:
     import pandas as pd
 
-    try:
-        pd.DataFrame(rows).to_csv(path, index=False, float_format="%.6g")
-    except OSError as error:
-        raise DataError(f"cannot be written ({error.strerror})", file=path) from None
+    write_table(pd.DataFrame(rows), path, index=False, float_format="%.6g")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,8 +23,11 @@ from bim.to_mitsuba import write_mitsuba
 from bim.to_radiance import identifier, write_radiance
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, write_table, write_text
 from scenes.commands.progress_bar import ProgressBar
+from scenes.result_folder import ResultFolder
 
+SUFFIXES = {write_radiance: (".rad", ".pts", ".vf"), write_mitsuba: (".xml", ".ply")}
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
@@ -36,6 +41,8 @@ def command() -> None:
 @click.option("--csv", "table", type=click.Path(path_type=Path), help="Also write the problems.")
 def check(building: Path, table: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
+    if table is not None:
+        check_file(table, field="--csv", inputs=[building])
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     console = Console(width=None if Console().is_terminal else 200)
@@ -50,7 +57,8 @@ def check(building: Path, table: Path | None) -> None:
         import pandas as pd
 
         rows = [(p.where, p.what, p.consequence) for p in read.problems]
-        pd.DataFrame(rows, columns=["where", "what", "consequence"]).to_csv(table, index=False)
+        columns = ["where", "what", "consequence"]
+        write_table(pd.DataFrame(rows, columns=columns), table, index=False)
 
 
 @command.command()
@@ -82,6 +90,7 @@ def attach(
     """Write BSDF, angular g-values and U into an IFC file's windows."""
     if bsdf is None and g_table is None and u_value is None:
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
+    check_file(out, inputs=[bsdf, g_table])  # the building may be written back
     file = None if bsdf is None else read_bsdf_xml(bsdf)
     copied = file is not None and not reference
     one = ShadingState(
@@ -121,20 +130,31 @@ def export(
     """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing."""
     if radiance is None and mitsuba is None and epjson is None and gltf is None:
         raise click.UsageError("nothing to write: give --radiance, --mitsuba, --epjson or --gltf")
+    for field, path in (("--epjson", epjson), ("--gltf", gltf)):
+        if path is not None:
+            check_file(path, field=field, inputs=[building])
+    writers: dict[Path, list] = {}
+    for parent, write in ((radiance, write_radiance), (mitsuba, write_mitsuba)):
+        if parent is not None:
+            writers.setdefault(parent, []).append(write)
+    option = "--mitsuba" if radiance is None else "--radiance"
+    folders = {
+        parent: ResultFolder(parent, "ifc export", adding=True, field=option) for parent in writers
+    }
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     spaces = _chosen(read, names, building)
-    for parent, write in ((radiance, write_radiance), (mitsuba, write_mitsuba)):
-        for space in spaces if parent is not None else ():
-            if not space.windows:
-                continue
-            folder = parent / identifier(space.name)
-            try:
-                write(space, read, folder)
-            except ValueError as error:  # a void too low for a work plane or an eye
-                click.echo(f"{space.name}: left out: {error}", err=True)
-                continue
-            click.echo(folder)
+    for parent, folder in folders.items():
+        written: list[str] = []
+        kinds = {suffix for write in writers[parent] for suffix in SUFFIXES[write]}
+
+        def of_these(name: str, written=written, kinds=kinds) -> bool:
+            return name.partition("/")[0] in written and Path(name).suffix in kinds
+
+        with folder.replaced(gone=of_these) as place:
+            written += _export_rooms(read, spaces, place, writers[parent])
+        for name in written:
+            click.echo(parent / name)
     if epjson is not None:
         write_epjson(read, epjson, spaces=spaces)
         click.echo(epjson)
@@ -143,18 +163,41 @@ def export(
         click.echo(gltf)
 
 
+def _export_rooms(
+    building: Building, spaces: Sequence[Space], place: Path, writers: Sequence[Callable]
+) -> list[str]:
+    """Write a folder for each room with a window; their names."""
+    written = []
+    for space in spaces:
+        name = identifier(space.name)
+        name = f"{name}_{identifier(space.guid)}" if (place / name).exists() else name
+        try:
+            for write in writers if space.windows else ():
+                write(space, building, place / name)
+        except ValueError as error:  # a void too low for a work plane or an eye
+            if isinstance(error, DataError):
+                raise
+            click.echo(f"{space.name}: left out: {error}", err=True)
+            shutil.rmtree(place / name, ignore_errors=True)
+            continue
+        written += [name] if space.windows else []
+    return written
+
+
 @command.command()
 @click.argument("files", type=FILE, nargs=-1, required=True, metavar="BUILDING.ifc...")
 @click.option("--markdown", "out", type=click.Path(path_type=Path), help="Also write the table.")
 def survey(files: tuple[Path, ...], out: Path | None) -> None:
     """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
+    if out is not None:
+        check_file(out, field="--markdown", inputs=files)
     rows = []
     with ProgressBar() as progress:
         for row in surveyed(files):
             rows.append(row)
             progress("files", len(rows) / len(files))
             if out is not None:  # what is done is kept if the rest is broken off
-                out.write_text(markdown(rows) + "\n", encoding="utf-8")
+                write_text(out, markdown(rows) + "\n")
     click.echo(markdown(rows))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from mitsuba_cfs.files import check_file
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.view_picture import (
     SUFFIXES,
@@ -55,8 +56,7 @@ def command(building: Path | None, files: tuple[Path, ...], tone: bool, **chosen
     for file in files:
         if file.suffix not in SUFFIXES:
             raise click.UsageError(f"--out {file}: expected one of {', '.join(SUFFIXES)}")
-        if not file.absolute().parent.is_dir():
-            raise click.UsageError(f"--out {file}: no such folder")
+        check_file(file)
     from mitsuba_cfs.glare.evaluation import evaluate
     from scenes.commands.progress_bar import ProgressBar
 

@@ -40,11 +40,13 @@ def command(
     results: the same command goes on after an interruption, and a longer grid computes only what
     is new.
     """
+    from mitsuba_cfs.files import check_file
+    from mitsuba_cfs.matrices.cache import default_folder
     from scenes.commands.progress_bar import ProgressBar
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.store import Store
-    from scenes.study.study import run_study
+    from scenes.study.study import run_study, write_study
     from scenes.study.study_file import read_study
     from scenes.study.write_ifc import building_file, write_study_ifc
     from scenes.study_report import write_study_report
@@ -52,26 +54,31 @@ def command(
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, **asked)
+    store = Store(out, inputs=(study, *parsed.files))
+    default_folder()  # of the cache, or one line that it cannot be one
+    if write_ifc is not None:
+        check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
     plan = settled(parsed, plan_of(parsed))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
     if write_ifc is not None:
         building_file(plan)  # or one line that there is none
-    store = Store(out)
     with ProgressBar() as progress:
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
             progress=progress, told=_tell,
         )  # fmt: skip
+    nothing = result.failed == len(result.results)
+    report = None if nothing else lambda path: write_study_report(result, path)
+    write_study(parsed, result, store, report)
     click.echo(
         f"{len(result.results)} cases: {result.reused} were there, {result.failed} failed, "
         f"{result.seconds:.0f} s; table: {out / 'results.parquet'}"
     )
     if result.clock:
         click.echo(f"auto: {result.clock}")
-    if result.failed == len(result.results):
+    if nothing:
         raise click.ClickException("no case could be computed")
-    store.write("report.html", lambda path: write_study_report(result, path))
     click.echo(f"report: {out / 'report.html'}")
     if write_ifc is not None:
         for problem in write_study_ifc(result, write_ifc):

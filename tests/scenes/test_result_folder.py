@@ -1,0 +1,176 @@
+"""A folder of results cut off at every step, and files that are whole or not there."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, remove_stale, replacing, write_text
+from scenes.result_folder import MARK, ResultFolder
+from tests.conftest import REPOSITORY
+
+
+def write(folder: Path, **files: str) -> None:
+    """Results of these files in the place of earlier ones."""
+    with ResultFolder(folder, "test").replaced() as place:
+        for name, text in files.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            (place / name).write_text(text)
+
+
+def content(folder: Path) -> dict[str, str]:
+    return {p.name: p.read_text() for p in folder.iterdir() if p.name != MARK}
+
+
+def test_new_results_replace_the_files_of_the_earlier_and_no_others(tmp_path):
+    out = tmp_path / "deep" / "out"
+    write(out, a="1", b="1")
+    (out / "mine").write_text("mine")
+    write(out, b="2", c="2")
+    assert content(out) == {"b": "2", "c": "2", "mine": "mine"}
+    assert not [p for p in tmp_path.rglob(".*")]
+
+
+def test_an_error_leaves_the_earlier_results(tmp_path):
+    out = tmp_path / "out"
+    with pytest.raises(ZeroDivisionError), ResultFolder(out, "test").replaced():
+        raise ZeroDivisionError
+    assert not out.exists()
+    write(out, a="1")
+    with pytest.raises(ZeroDivisionError), ResultFolder(out, "test").replaced() as place:
+        (place / "a").write_text("2")
+        raise ZeroDivisionError
+    assert content(out) == {"a": "1"}
+
+
+CUT = """
+import os, sys
+from pathlib import Path
+from tests.scenes.test_result_folder import write
+moves = 0
+def cut(self, target, move=Path.replace):
+    global moves
+    moves += 1
+    if moves > int(sys.argv[2]):
+        os.kill(os.getpid(), 9)
+    return move(self, target)
+import mitsuba_cfs.files
+write(Path(sys.argv[1]), a="1", b="1", c="1") if sys.argv[2] == "0" else None
+Path.replace = cut
+write(Path(sys.argv[1]), b="2", c="2", d="2")
+"""
+
+
+@pytest.mark.parametrize("moves", range(6))
+def test_a_kill_between_two_files_is_made_good_by_the_next_run(tmp_path, moves):
+    """The mark inside the finished results is written by the first move, files by the next."""
+    out = tmp_path / "out"
+    write(out, a="1", b="1", c="1")
+    (out / "mine").write_text("mine")
+    done = subprocess.run(
+        [sys.executable, "-c", CUT, str(out), str(moves)], cwd=REPOSITORY, check=False
+    )
+    old = {"a": "1", "b": "1", "c": "1", "mine": "mine"}
+    new = {"b": "2", "c": "2", "d": "2", "mine": "mine"}
+    assert (done.returncode == -9) == (moves < 5)
+    ResultFolder(out, "test")  # what the next run does first
+    assert content(out) == (old if moves == 0 else new)
+    assert json.loads((out / MARK).read_text())["files"] == sorted(set(content(out)) - {"mine"})
+
+
+@pytest.mark.parametrize("name", ["../mine", "/mine", "sub/../../mine", ""])
+def test_a_mark_cannot_lead_out_of_its_folder(tmp_path, name):
+    (tmp_path / "mine").write_text("mine")
+    out = tmp_path / "out"
+    write(out, a="1")
+    record = json.loads((out / MARK).read_text())
+    record["files"].append(name)
+    (out / MARK).write_text(json.dumps(record))
+    with pytest.raises(DataError, match="holds other files"):
+        write(out, a="2")
+    assert (tmp_path / "mine").is_file()
+
+
+def test_a_link_inside_does_not_lead_to_removal_elsewhere(tmp_path):
+    out = tmp_path / "out"
+    write(out, **{"room/a": "1"})
+    (out / "room").rename(tmp_path / "elsewhere")
+    (out / "room").symlink_to(tmp_path / "elsewhere")
+    write(out, b="2")
+    assert (tmp_path / "elsewhere" / "a").read_text() == "1"
+
+
+def test_a_file_is_the_old_one_until_the_new_one_is_whole(tmp_path):
+    path = tmp_path / "a.txt"
+    write_text(path, "old")
+    path.chmod(0o600)
+    with pytest.raises(ZeroDivisionError), replacing(path) as part:
+        part.write_text("half")
+        assert path.read_text() == "old"
+        remove_stale(tmp_path)  # another process: this one is held
+        assert part.is_file()
+        raise ZeroDivisionError
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"] and path.read_text() == "old"
+    write_text(path, "new")
+    assert path.read_text() == "new" and path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_device_is_written_to_as_it_is():
+    write_text("/dev/null", "gone")
+    assert Path("/dev/null").is_char_device()
+
+
+def test_an_error_that_is_not_of_the_file_comes_through(tmp_path):
+    with pytest.raises(FileNotFoundError, match="input"), replacing(tmp_path / "a"):
+        open(tmp_path / "input")
+    with pytest.raises(RuntimeError, match="of a library"), replacing(tmp_path / "a"):
+        raise RuntimeError("of a library")
+    with pytest.raises(DataError, match="no such folder"):
+        check_file(tmp_path / "no" / "a")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("damage", [b"", b"\x93NUMPY\x01", bytes(5000), None])
+def test_cut_off_ratings_are_made_again_with_a_note(tmp_path, caplog, damage):
+    from mitsuba_cfs.glare.annual import FIGURES, kept_glare
+
+    keep = tmp_path / "ratings.npy"
+    np.save(keep, np.ones((9, len(FIGURES))))
+    assert kept_glare(keep, 9) is not None
+    keep.write_bytes(keep.read_bytes()[:-100] if damage is None else damage)
+    assert kept_glare(keep, 9) is None
+    assert "rated again" in caplog.text and str(keep) in caplog.text
+    keep.write_text("a letter")
+    with pytest.raises(DataError, match="no file of ratings"):
+        kept_glare(keep, 9)
+    assert keep.read_text() == "a letter"
+
+
+def test_matrices_on_a_full_disk_are_one_error_and_no_bus_error(tmp_path):
+    """A map of a file without blocks ends the process where it is first written to."""
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom mitsuba_cfs import variants\n"
+        "variants.activate()\n"
+        "from mitsuba_cfs.trace.annual_pictures import _storage\n"
+        "_storage((4096, 1024), True, Path(sys.argv[1]))[:] = 1\n"
+    )
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=1m", "none", str(tmp_path)],
+        capture_output=True, check=False,
+    )  # fmt: skip
+    if mounted.returncode:
+        pytest.skip("no disk can be mounted here")
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path)],
+            cwd=REPOSITORY, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+    finally:
+        subprocess.run(["umount", "-l", str(tmp_path)], check=False)
+    assert done.returncode == 1 and "the disk is full" in done.stderr, done
