@@ -51,6 +51,7 @@ class RoomPicture:
     view: View
     room: str
     time: pd.Timestamp  # middle of the hour
+    notes: tuple[str, ...]  # of system and weather
 
 
 def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPicture:
@@ -72,7 +73,10 @@ def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPi
     lit = scene.behind(fenestration(system.visible, system.fine))
     skies = skies_of(weather, [hour], subdivision=quality.subdivision)
     luminance = lit.picture(skies, 0, progress=part(progress, 0.4, 1.0, "picture"))
-    return RoomPicture(luminance, view, space.name or space.guid, weather.midpoints[hour])
+    return RoomPicture(
+        luminance, view, space.name or space.guid, weather.midpoints[hour],
+        (*system.notes, *weather.notes),
+    )  # fmt: skip
 
 
 def hour_of(weather: Weather, at: str) -> int:

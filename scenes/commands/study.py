@@ -41,6 +41,7 @@ def command(
     is new.
     """
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.job.inputs import read_weather
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.store import Store
@@ -57,6 +58,9 @@ def command(
         click.echo(f"auto: {why}")
     if write_ifc is not None:
         building_file(plan)  # or one line that there is none
+    for path in dict.fromkeys(case.weather.path for case in plan.cases):
+        for note in read_weather(path).notes:
+            click.echo(f"note: {note}")
     store = Store(out)
     with ProgressBar() as progress:
         result = run_study(

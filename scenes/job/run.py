@@ -72,6 +72,7 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
         *thermal_notes,
         *_state_notes(inputs, options),
         *notes,
+        *weather.notes,
         *_site_notes(building, weather),
     ]
     return RunResult(

@@ -57,6 +57,7 @@ class Year:
     skies: Skies  # of these
     used: NDArray[np.bool_]  # [H] hours of use
     digest: str  # of all inputs
+    notes: tuple[str, ...] = ()  # of system and weather
 
 
 def read_year(options: YearOptions, progress: Progress = silent) -> Year:
@@ -88,6 +89,7 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
     return Year(
         options, space.name or space.guid, views, place,
         fenestration(system.visible, system.fine), weather, lit, skies, used, digest,
+        (*system.notes, *weather.notes),
     )  # fmt: skip
 
 
