@@ -75,6 +75,7 @@ class SpaceResult:
     seconds: dict[str, float]  # by stage
     operation: OperationResult | None = None  # None: one state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
+    problems: tuple[Problem, ...] = ()  # that tracing found
     like: str = ""  # name of the room alike that these results were computed for; "": this one
 
 

@@ -13,6 +13,7 @@ from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from scenes.job.daylight import daylight_options
+from scenes.job.holes import moved
 from scenes.job.options import RoomOptions
 from scenes.job.windows import States
 from scenes.results import SpaceResult
@@ -58,6 +59,7 @@ def as_room(result: SpaceResult, space: Space) -> SpaceResult:
     daylight, glare = result.daylight, result.glare
     table = daylight.sensor_metrics.copy()
     table[["x", "y", "z"]] += shift
+    name = result.space.name or result.space.guid
     place = tuple((np.asarray(glare.view.position) + shift).tolist())
     return replace(
         result,
@@ -65,7 +67,8 @@ def as_room(result: SpaceResult, space: Space) -> SpaceResult:
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
         glare=replace(glare, view=replace(glare.view, position=place)),
         seconds={},
-        like=result.space.name or result.space.guid,
+        problems=tuple(moved(problem, space, name) for problem in result.problems),
+        like=name,
     )
 
 
