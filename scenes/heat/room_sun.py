@@ -12,6 +12,7 @@ from bim.sensors import sensor_grid, view_point
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import phases
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
@@ -153,7 +154,12 @@ def illuminances(
 
 def _options(trace: TraceTable) -> dict:
     samples = max(trace.patch_samples // BATCHES, 1)
-    return {"samples": samples, "stopping": Stopping(batches=BATCHES), "seed": trace.seed}
+    return {
+        "samples": samples,
+        "stopping": Stopping(batches=BATCHES),
+        "seed": trace.seed,
+        "cache": MatrixCache.of_user(),
+    }
 
 
 def _groups(space: Space, groups: list[WindowGroup]) -> NDArray[np.int64]:
