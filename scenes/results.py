@@ -76,6 +76,7 @@ class SpaceResult:
     operation: OperationResult | None = None  # None: one state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: NDArray[np.float64] | None = None  # [n] of the metric and hours asked for
+    problems: tuple[Problem, ...] = ()  # that tracing found
     like: str = ""  # name of the room alike that these results were computed for; "": this one
 
 

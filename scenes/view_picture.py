@@ -54,6 +54,7 @@ class RoomPicture:
     view: View
     room: str
     time: pd.Timestamp  # middle of the hour
+    notes: tuple[str, ...]  # of system and weather
 
 
 def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPicture:
@@ -77,7 +78,10 @@ def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPi
         annual_sky(weather, sampling.subdivision, hours=[hour])
     )
     luminance = light.picture(0, progress=part(progress, 0.4, 1.0, "picture"))
-    return RoomPicture(luminance, view, space.name or space.guid, weather.midpoints[hour])
+    return RoomPicture(
+        luminance, view, space.name or space.guid, weather.midpoints[hour],
+        (*system.notes, *weather.notes),
+    )  # fmt: skip
 
 
 def hour_of(weather: Weather, at: str) -> int:

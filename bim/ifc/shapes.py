@@ -76,7 +76,7 @@ def read_shapes(
     without: Collection[int] = (),
     cut_openings: bool = True,
 ) -> tuple[dict[int, Shape], list[Problem]]:
-    """Shapes by STEP id; products that cannot be meshed are problems, not errors.
+    """Shapes by STEP id, in the file's order; products that cannot be meshed are problems.
 
     Args:
         progress: called with the fraction done, 0 to 1.
@@ -114,7 +114,9 @@ def read_shapes(
         for p in wanted
         if p.id() not in shapes
     ]
-    return shapes, problems
+    # the iterator gives shapes as its threads finish them, which no two runs do alike: in that
+    # order a model would have another hash in the cache, and other sums, each time it is read
+    return {p.id(): shapes[p.id()] for p in wanted if p.id() in shapes}, problems
 
 
 def _has_body(product: ifcopenshell.entity_instance) -> bool:

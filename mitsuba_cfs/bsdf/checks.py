@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
+from mitsuba_cfs.bsdf.energy import ENERGY_LIMIT, ENERGY_SLACK, excess, gains_energy
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
-from mitsuba_cfs.bsdf.xml import ENERGY_LIMIT
 
 KNOWN_BANDS = ("Visible", "Solar", "CIE-X", "CIE-Y", "CIE-Z")
 BLOCK_NAMES = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
 SUN_DEG = 0.533
-ENERGY_SLACK = 1e-3  # above 1 by which rounded files may be
 RECIPROCITY_SLACK = 0.05  # relative difference that traced or measured data may show
 
 
@@ -87,15 +86,11 @@ def _check_blocks(band: str, bsdf: Bsdf) -> list[Finding]:
 def _check_energy(band: str, bsdf: Bsdf) -> list[Finding]:
     findings = []
     for side in ("front", "back"):
-        name, share = f"{band} {side}", bsdf.scattered(side)
+        share = bsdf.scattered(side)
         if share.max() > 1 + ENERGY_SLACK:
-            worst = int(np.argmax(share))
-            severity = "error" if share.max() > ENERGY_LIMIT else "warning"
-            what = (
-                f"{np.count_nonzero(share > 1 + ENERGY_SLACK)} of {len(share)} directions "
-                f"scatter more than they get, direction {worst} {100 * share[worst]:.1f} %"
-            )
-            findings.append(Finding(severity, name, what, "rooms come out too bright"))
+            severity = "error" if gains_energy(bsdf, share, ENERGY_LIMIT) else "warning"
+            what, text = excess(share, ENERGY_SLACK), "rooms come out too bright"
+            findings.append(Finding(severity, f"{band} {side}", what, text))
     return findings
 
 

@@ -170,6 +170,10 @@ class KlemsBsdf:
         shares = [self.direct_hemispherical(block) for name, block in blocks if name.endswith(side)]
         return sum(shares, np.zeros(self.basis_in.size))
 
+    def incident_weights(self, count: int) -> NDArray[np.float64]:
+        """Projected solid angle of each incident patch [K in] [sr]; `count` is K in."""
+        return self.basis_in.projected_solid_angles()
+
     def is_dummy(self, block: NDArray[np.float64] | None) -> bool:
         """Whether a block passes nothing, so that it is taken for absent as Radiance does."""
         return block is None or self.direct_hemispherical(block).max() <= DUMMY_HEMISPHERICAL

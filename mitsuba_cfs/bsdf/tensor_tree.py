@@ -84,19 +84,19 @@ class TensorTree:
     def _starts(self) -> NDArray[np.int64]:
         return np.concatenate([[0], np.cumsum(self._volume(self.depths))])
 
-    def corners(self) -> NDArray[np.int64]:
-        """Lower corner of each leaf [L, rank], in cells of the deepest level."""
-        corner = np.zeros((len(self.codes), self.rank), dtype=np.int64)
+    def corners(self, axes: int | None = None) -> NDArray[np.int64]:
+        """Lower corner of each leaf [L, axes], in cells of the deepest level; of all axes."""
+        axes = self.rank if axes is None else axes
+        corner = np.zeros((len(self.codes), axes), dtype=np.int64)
         for level in range(self.depth):
             digit = self.codes >> (self.rank * level)
-            for axis in range(self.rank):
+            for axis in range(axes):
                 corner[:, axis] |= ((digit >> axis) & 1) << level
         return corner
 
     def leaf(self, position: ArrayLike) -> NDArray[np.int64]:
         """Index of the leaf that holds each position [.., rank] of the unit hypercube."""
-        cells = 1 << self.depth
-        cell = np.clip((np.asarray(position) * cells).astype(np.int64), 0, cells - 1)
+        cell = _cell(np.asarray(position), 1 << self.depth)
         return np.searchsorted(self.codes, morton(cell, self.depth), side="right") - 1
 
     def sample_grid(self) -> NDArray[np.float64]:
@@ -107,7 +107,12 @@ class TensorTree:
         return self.values[leaf]
 
     def hemispherical(self) -> NDArray[np.float64]:
-        """Share of the light scattered from each incident cell: [2^D, 2^D], rank 3 [2^(D-1)].
+        """Share of the light scattered from each incident cell: [2^D, 2^D], rank 3 [2^(D-1)]."""
+        return self._hemispherical
+
+    @cached_property
+    def _hemispherical(self) -> NDArray[np.float64]:
+        """What `hemispherical` gives, once for each tree: every check of a file asks for it.
 
         Every leaf adds value x outgoing projected solid angle to the block of incident cells that
         it spans; the blocks are summed through their corners.
@@ -115,7 +120,7 @@ class TensorTree:
         cells, width = 1 << self.depth, np.left_shift(1, self.depth - self.depths)
         amount = np.pi * self.values * (width / cells) ** 2
         incident = self.rank - 2
-        low = self.corners()[:, :incident]
+        low = self.corners(incident)
         edges = np.zeros((cells + 1,) * incident)
         for upper in np.ndindex(*(2,) * incident):
             corner = low + np.asarray(upper) * width[:, None]
@@ -131,6 +136,10 @@ class TensorTree:
         Rank 4: squares exchanged and turned by pi, exact.  Rank 3: means over the cells of a dense
         grid of the same depth, of 64 points each.
         """
+        return self._reversed
+
+    @cached_property
+    def _reversed(self) -> TensorTree:
         if self.rank == 3:
             return self._reversed_isotropic()
         cells, width = 1 << self.depth, np.left_shift(1, self.depth - self.depths)
@@ -139,20 +148,23 @@ class TensorTree:
         return TensorTree(4, self.depths[order], self.values[order])
 
     def _reversed_isotropic(self, subdivision: int = 4) -> TensorTree:
-        cells = 1 << self.depth
-        values = np.zeros((cells, cells, cells))
+        from mitsuba_cfs.bsdf.tensor_text import row_major_order
+
+        cells, used = 1 << self.depth, max((1 << self.depth) // 2, 1)
+        known, grid = self.sample_grid(), np.zeros((cells, cells, cells))
         for part in np.ndindex(*(subdivision,) * 3):
             axes = [(np.arange(cells) + (step + 0.5) / subdivision) / cells for step in part]
-            grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-            sine_in = np.maximum(1 - 2 * grid[..., 0], 0.0)
-            u, v = np.moveaxis(square_to_disk(grid[..., 1:]), -1, 0)
+            sine_in = np.maximum(1 - 2 * axes[0][:used, None, None], 0.0)
+            square = np.stack(np.meshgrid(*axes[1:], indexing="ij"), axis=-1)
+            u, v = np.moveaxis(square_to_disk(square), -1, 0)
             sine_out = np.maximum(np.hypot(u, v), 1e-12)
             turned = disk_to_square(np.stack([sine_in * u, -sine_in * v], -1) / sine_out[..., None])
-            position = np.concatenate([0.5 - 0.5 * sine_out[..., None], turned], axis=-1)
-            values += self.values[self.leaf(position)] / subdivision**3
-        values[cells // 2 :] = 0.0  # the half that is not used
-        order = np.argsort(morton(np.stack(np.indices(values.shape), -1), self.depth).ravel())
-        return TensorTree(3, np.full(values.size, self.depth), values.ravel()[order])
+            across = _cell(0.5 - 0.5 * sine_out, cells)
+            grid[:used] += known[across, *np.moveaxis(_cell(turned, cells), -1, 0)]
+        grid /= subdivision**3
+        grid[cells // 2 :] = 0.0  # the half that is not used
+        values = grid.ravel()[row_major_order(3, self.depth)]
+        return TensorTree(3, np.full(values.size, self.depth), values)
 
     @classmethod
     def from_text(cls, text: str, rank: int) -> TensorTree:
@@ -160,6 +172,11 @@ class TensorTree:
         from mitsuba_cfs.bsdf.tensor_text import parse_tree
 
         return cls(rank, *parse_tree(text, rank))
+
+
+def _cell(position: NDArray[np.float64], cells: int) -> NDArray[np.int64]:
+    """Cell [..] of `cells` along an axis that each position from 0 to 1 lies in."""
+    return np.clip((position * cells).astype(np.int64), 0, cells - 1)
 
 
 def morton(cell: NDArray[np.int64], depth: int) -> NDArray[np.int64]:
@@ -204,6 +221,13 @@ class TensorTreeBsdf:
                 share = np.repeat(share, finest // share.shape[axis], axis=axis)
             total = total + share.ravel()
         return total
+
+    def incident_weights(self, count: int) -> NDArray[np.float64]:
+        """Share of the incident hemisphere's projected solid angle of each of `count` cells."""
+        if any(tree.rank == 4 for tree in self.blocks().values()):
+            return np.full(count, 1 / count)
+        sine = 1 - np.arange(count + 1) / count  # at the edges, see the module's head
+        return sine[:-1] ** 2 - sine[1:] ** 2
 
     def is_dummy(self, block: TensorTree | None) -> bool:
         """Whether a tree passes nothing, so that it is taken for absent as Radiance does."""

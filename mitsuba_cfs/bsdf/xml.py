@@ -10,20 +10,21 @@ import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
+from mitsuba_cfs.bsdf.energy import ENERGY_LIMIT, check_energy
 from mitsuba_cfs.bsdf.klems import STANDARD_BASES, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 
-__all__ = ["BsdfFile", "check_energy", "read_bsdf_xml", "write_bsdf_xml"]
+__all__ = ["BsdfFile", "read_bsdf_xml", "write_bsdf_xml"]
 
-ENERGY_LIMIT = 1.01  # hemispherical scattering above which Radiance's loader objects
+MOST_BYTES = 128 << 20  # of a file: tens of times the biggest known; memory is 20 times as much
+MOST_LETTERS = 64  # of a number with what separates it
 UNIT_METRES = {"meter": 1.0, "foot": 0.3048, "inch": 0.0254, "centimeter": 0.01, "millimeter": 1e-3}
 BAND_NAMES = {name.lower(): name for name in ("Visible", "Solar", "CIE-X", "CIE-Y", "CIE-Z")}
 BLOCK_NAMES = {
@@ -37,9 +38,9 @@ BLOCK_NAMES = {
 def read_bsdf_xml(path: str | PathLike[str], *, energy_limit: float = ENERGY_LIMIT) -> BsdfFile:
     """The content of a BSDF XML file: Klems matrices or tensor trees, every band.
 
-    Negative values are read as zero (as Radiance does) and noted.  `DataError` for a file that is
-    not readable, not complete, not finite, or that scatters more than `energy_limit` of the light
-    of any direction.
+    Negative values are read as zero (as Radiance does) and noted, and so are directions that
+    scatter a little more light than they get.  `DataError` for a file that is not readable, not
+    complete, not finite, bigger than 128 MiB, or that scatters too much (`check_energy`).
     """
     notes: list[str] = []
     layer = _optical_layer(path, notes)
@@ -58,38 +59,31 @@ def read_bsdf_xml(path: str | PathLike[str], *, energy_limit: float = ENERGY_LIM
         )
     for band, bsdf in bands.items():
         if band in ("Visible", "Solar"):
-            check_energy(bsdf, energy_limit, file=path, band=band)
+            notes += check_energy(bsdf, energy_limit, file=path, band=band)
     return BsdfFile(bands, **_material(layer, path), notes=tuple(notes))
 
 
-def check_energy(bsdf: Bsdf, limit: float, *, file: str | PathLike[str], band: str) -> None:
-    """`DataError` where a block, or transmission and reflection together, exceed `limit`."""
-    for side in ("front", "back"):
-        blocks = {n: b for n, b in bsdf.blocks().items() if n.endswith(side)}
-        hemispherical = {n: bsdf.direct_hemispherical(b) for n, b in blocks.items()}
-        if len(hemispherical) == 2:
-            hemispherical[f"transmission and reflection {side}"] = bsdf.scattered(side)
-        for name, share in hemispherical.items():
-            if share.max() > limit:
-                where = int(np.argmax(share))
-                raise DataError(
-                    f"incident direction {where} scatters {100 * share.max():.1f} % of its light",
-                    file=file,
-                    element=band,
-                    field=name.replace("_", " "),
-                )
+def _content(path: str | PathLike[str]) -> bytes:
+    """The file's bytes; `DataError` where it cannot be read or is too big to be."""
+    try:
+        with open(path, "rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+    if len(content) > MOST_BYTES:
+        most = f"at most {MOST_BYTES >> 20} MiB are read (a tensor tree can be reduced)"
+        raise DataError(f"is too big: {most}", file=path)
+    return content
 
 
 def _optical_layer(path: str | PathLike[str], notes: list[str]) -> ElementTree.Element:
     """The file's one Optical/Layer element, without namespaces."""
+    content = _content(path)
+    start = max(content.find(b"<"), 0)
+    if content[:start].strip(b" \t\r\n\xef\xbb\xbf"):  # genBSDF may leave a line of its own
+        notes.append(f"{start} bytes before the XML left out")
     try:
-        content = Path(path).read_bytes()
-        start = max(content.find(b"<"), 0)
-        if content[:start].strip(b" \t\r\n\xef\xbb\xbf"):  # genBSDF may leave a line of its own
-            notes.append(f"{start} bytes before the XML left out")
         root = ElementTree.fromstring(content[start:])
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise DataError(f"is not well-formed XML: {error}", file=path) from None
     for element in root.iter():
@@ -139,12 +133,14 @@ class _KlemsReader:
         basis_in = self._basis(element, "ColumnAngleBasis", where, path)
         basis_out = self._basis(element, "RowAngleBasis", where, path)
         text = _text(_need(element, "ScatteringData", path))
-        values = parse_numbers(text, file=path, element=where)
-        expected = basis_in.size * basis_out.size
-        if len(values) != expected:
+        expected, got = basis_in.size * basis_out.size, "far more"
+        if len(text) <= MOST_LETTERS * expected + MOST_LETTERS:
+            values = parse_numbers(text, file=path, element=where)
+            got = str(len(values))
+        if got != str(expected):
             raise DataError(
                 f"expected {basis_out.size} x {basis_in.size} = {expected} values "
-                f"({basis_in.name}), got {len(values)}",
+                f"({basis_in.name}), got {got}",
                 file=path,
                 element=where,
                 field="ScatteringData",
@@ -270,15 +266,15 @@ def _material(layer: ElementTree.Element, path: str | PathLike[str]) -> dict:
             unit = element.get("unit", "Meter")
             if unit.lower() not in UNIT_METRES:
                 raise DataError(f"unknown unit {unit!r}", file=path, element="Material", field=tag)
-            found[tag.lower()] = _number(element, path) * UNIT_METRES[unit.lower()]
-    for tag, name in (
-        ("EmissivityFront", "emissivity_front"),
-        ("EmissivityBack", "emissivity_back"),
-        ("TIR", "infrared_transmittance"),
-        ("ThermalConductivity", "conductivity"),
+            found[tag.lower()] = _number(element, path, 0.0) * UNIT_METRES[unit.lower()]
+    for tag, name, most in (
+        ("EmissivityFront", "emissivity_front", 1.0),
+        ("EmissivityBack", "emissivity_back", 1.0),
+        ("TIR", "infrared_transmittance", 1.0),
+        ("ThermalConductivity", "conductivity", math.inf),
     ):
         if _text(material.find(tag)):
-            found[name] = _number(material.find(tag), path)
+            found[name] = _number(material.find(tag), path, 0.0, most)
     return found
 
 
@@ -295,7 +291,12 @@ def _text(element: ElementTree.Element | None) -> str:
     return "" if element is None else (element.text or "").strip()
 
 
-def _number(element: ElementTree.Element, path: str | PathLike[str]) -> float:
+def _number(
+    element: ElementTree.Element,
+    path: str | PathLike[str],
+    least: float = -math.inf,
+    most: float = math.inf,
+) -> float:
     try:
         value = float(_text(element))
     except ValueError:
@@ -304,4 +305,7 @@ def _number(element: ElementTree.Element, path: str | PathLike[str]) -> float:
         raise DataError(
             f"expected a number, got {_text(element)[:40]!r}", file=path, field=element.tag
         )
+    if not least <= value <= most:
+        bounds = f"of at least {least:g}" if most == math.inf else f"from {least:g} to {most:g}"
+        raise DataError(f"expected a number {bounds}, got {value:g}", file=path, field=element.tag)
     return value

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky import sun
+from mitsuba_cfs.sky.plausible import checked_sun
 from mitsuba_cfs.sky.weather import Weather
 
 COLUMNS = ("time", "global_horizontal", "diffuse_horizontal")
@@ -91,12 +92,13 @@ def read_measured(
         direct_normal=none,
         diffuse_horizontal=none,
     )
-    return measured_weather(
+    weather = measured_weather(
         site,
         table["global_horizontal"].to_numpy(),
         table["diffuse_horizontal"].to_numpy(),
         least_altitude_deg=least_altitude_deg,
     )
+    return checked_sun(weather, path)
 
 
 def _table(path: str | PathLike[str]) -> pd.DataFrame:

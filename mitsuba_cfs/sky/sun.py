@@ -12,6 +12,7 @@ from mitsuba_cfs.sky.weather import Weather
 SUN_ANGLE_DEG = 0.533  # full angle of the disc that Radiance uses
 SUN_RADIUS = np.radians(SUN_ANGLE_DEG / 2)  # [rad]
 SUN_SOLID_ANGLE = 2 * np.pi * (1 - np.cos(SUN_RADIUS))  # [sr]
+SOLAR_CONSTANT = 1361.0  # [W/m2]
 LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam
 
 SUN_MODELS = ("spa", "radiance")
@@ -50,7 +51,11 @@ def _spa_directions(weather: Weather) -> NDArray[np.float64]:
     return direction(angles[:, 0], angles[:, 1])
 
 
-def _radiance_directions(weather: Weather) -> NDArray[np.float64]:
+def declination_and_time(weather: Weather) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Declination [rad] and solar time [h], 12 at noon, of each interval's middle [H].
+
+    Source: Radiance `sun.c`.
+    """
     t = weather.midpoints
     day = t.day_of_year.to_numpy().astype(float)
     hour = (t.hour + t.minute / 60 + t.second / 3600).to_numpy()
@@ -58,7 +63,11 @@ def _radiance_directions(weather: Weather) -> NDArray[np.float64]:
     equation_of_time = 0.170 * np.sin(4 * np.pi / 373 * (day - 80)) - 0.129 * np.sin(
         2 * np.pi / 355 * (day - 8)
     )
-    solar_time = hour + equation_of_time + weather.longitude_deg / 15 - weather.timezone_h
+    return declination, hour + equation_of_time + weather.longitude_deg / 15 - weather.timezone_h
+
+
+def _radiance_directions(weather: Weather) -> NDArray[np.float64]:
+    declination, solar_time = declination_and_time(weather)
     angle = solar_time * np.pi / 12  # 0 at midnight
     latitude = np.radians(weather.latitude_deg)
     sin_l, cos_l = np.sin(latitude), np.cos(latitude)
@@ -115,4 +124,4 @@ def direct_normal_from_global(
     sine = np.asarray(sine_of_altitude, dtype=float)
     usable = sine > np.sin(np.radians(least_altitude_deg))
     normal = np.where(usable, beam / np.where(usable, sine, 1.0), 0.0)
-    return np.clip(normal, 0.0, 1361.0 * 1.035)  # solar constant at perihelion
+    return np.clip(normal, 0.0, SOLAR_CONSTANT * 1.035)  # at perihelion

@@ -7,6 +7,7 @@ from os import PathLike
 
 from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.sky import wea_table, weather_table
+from mitsuba_cfs.sky.plausible import checked_sun
 from mitsuba_cfs.sky.sun import direct_normal_from_global, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 
@@ -37,10 +38,11 @@ def read_wea(path: str | PathLike[str], *, whole_year: bool = True) -> Weather:
         diffuse_horizontal=diffuse,
     )
     if unit == 1:
-        return weather
+        return checked_sun(weather, path)
+    weather = checked_sun(replace(weather, global_horizontal=direct + diffuse), path)
     sine = sun_directions(weather, model="radiance")[:, 2]
     normal = direct_normal_from_global(direct + diffuse, diffuse, sine)
-    return replace(weather, direct_normal=normal, global_horizontal=direct + diffuse)
+    return replace(weather, direct_normal=normal)
 
 
 def write_wea(weather: Weather, path: str | PathLike[str]) -> None:

@@ -47,6 +47,7 @@ class Weather:
     ground_depth_m: FloatArray | None = None  # [G]
     ground_temperature_c: FloatArray | None = None  # [G, 12] monthly, January first
     turned_deg: float = 0.0  # north is so far counter-clockwise of +y, see `turned`
+    notes: tuple[str, ...] = ()  # what the reader made up, or found to be odd
 
     def __post_init__(self) -> None:
         if not -90 <= self.latitude_deg <= 90 or not -180 <= self.longitude_deg <= 180:
@@ -96,11 +97,14 @@ def read_epw(path: str | PathLike[str]) -> Weather:
     """The weather of an EnergyPlus EPW file of a whole year (8760 or 8784 hours, or parts of them).
 
     Dew point, humidity, pressure and sky longwave are derived where the file marks them missing;
-    a missing temperature, irradiance or wind speed is an error.
+    a missing temperature, irradiance or wind speed is an error.  A pressure out of bounds is
+    replaced and noted.  Whether the radiation is that of the stated place and clock is checked.
 
     Raises: `DataError` that names the file, the line and the field.
     Source: EnergyPlus Auxiliary Programs, "EnergyPlus Weather File (EPW) Data Dictionary".
     """
+    from mitsuba_cfs.sky.plausible import checked_sun
+
     head, table = weather_table.epw_lines(path)
     site = weather_table.epw_location(head, path)
     depth, ground = weather_table.epw_ground(head, path)
@@ -116,9 +120,8 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         )
     humidity = np.where(np.isnan(humidity), air.relative_humidity(dry, dew), humidity)
     dew = np.where(np.isnan(dew), air.dew_point(dry, humidity), dew)
-    pressure = column.optional("pressure")
-    standard = air.standard_pressure(site.elevation_m)
-    return Weather(
+    pressure, notes = _pressure(column, site)
+    weather = Weather(
         site=site.name,
         latitude_deg=site.latitude_deg,
         longitude_deg=site.longitude_deg,
@@ -135,13 +138,36 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         dry_bulb_c=dry,
         dew_point_c=dew,
         relative_humidity=humidity,
-        pressure_pa=np.where(np.isnan(pressure), standard, pressure),
+        pressure_pa=pressure,
         wind_speed=column.required("wind speed"),
         wind_direction_deg=column.whole("wind direction"),
         horizontal_infrared=_infrared(column, dry, dew),
         ground_depth_m=depth,
         ground_temperature_c=ground,
+        notes=notes,
     )
+    return checked_sun(weather, path)
+
+
+def _pressure(
+    column: weather_table.EpwColumns, site: weather_table.Location
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Pressure [H] [Pa], the standard atmosphere's where it is missing or impossible, and a note.
+
+    It enters the refraction of the sun's light (its mean) and the density of the outdoor air: an
+    hour of it is not worth a file.
+    """
+    pressure, wrong = column.plausible("pressure")
+    standard = air.standard_pressure(site.elevation_m)
+    notes: tuple[str, ...] = ()
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        notes = (
+            f"Weather {site.name}: {np.count_nonzero(wrong)} impossible pressures, the first in "
+            f"line {column.first_line + row}: {standard:.0f} Pa of the standard atmosphere stand "
+            "in.",
+        )
+    return np.where(np.isnan(pressure), standard, pressure), notes
 
 
 def _infrared(column: weather_table.EpwColumns, dry: FloatArray, dew: FloatArray) -> FloatArray:

@@ -44,7 +44,7 @@ EPW_HEADER = (
     "DESIGN CONDITIONS",
     "TYPICAL/EXTREME PERIODS",
     "GROUND TEMPERATURES",
-    "HOLIDAYS/DAYLIGHT SAVINGS",
+    "HOLIDAYS/DAYLIGHT SAVING",  # SAVINGS in most files, not in those of PVGIS
     "COMMENTS 1",
     "COMMENTS 2",
     "DATA PERIODS",
@@ -204,14 +204,24 @@ class EpwColumns:
             raise self.error(field, rows[first], f"expected a number, got {texts[first]!r}")
         return values
 
-    def optional(self, field: str) -> NDArray[np.float64]:
-        """The field's values [H], NaN where the file marks them missing."""
-        column, missing, low, high = EPW_FIELDS[field]
+    def _values(self, field: str) -> NDArray[np.float64]:
+        column, missing, _, _ = EPW_FIELDS[field]
         blank = np.array([not row[column].strip() for row in self.rows], dtype=bool)
         values = np.full(len(self.rows), np.nan)
         values[~blank] = self._numbers(column, field, np.flatnonzero(~blank))
-        values = np.where(values >= missing, np.nan, values)
-        return checked(self.path, self.first_line, field, values, low, high)
+        return np.where(values >= missing, np.nan, values)
+
+    def optional(self, field: str) -> NDArray[np.float64]:
+        """The field's values [H], NaN where the file marks them missing."""
+        _, _, low, high = EPW_FIELDS[field]
+        return checked(self.path, self.first_line, field, self._values(field), low, high)
+
+    def plausible(self, field: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """The field's values [H], NaN where missing or out of bounds, and where they are so."""
+        _, _, low, high = EPW_FIELDS[field]
+        values = self._values(field)
+        wrong = (values < low) | (values > high)
+        return np.where(wrong, np.nan, values), wrong
 
     def required(self, field: str) -> NDArray[np.float64]:
         """The field's values [H]; `DataError` where one is missing."""

@@ -107,7 +107,8 @@ def accumulate(
     except BaseException:
         keeper.save(state)
         raise
-    state = replace(state, finished=True)
+    # nothing is added any more: seven digits of the error are enough to keep, and to give
+    state = replace(state, finished=True, spread=state.spread.astype(np.float32))
     keeper.save(state)
     return _estimate(state)
 
@@ -153,7 +154,7 @@ class _Keeper:
 def _estimate(state: State) -> Estimate:
     """Mean and standard error of the batches so far."""
     pairs = (state.count - 1) * state.count
-    error = np.sqrt(np.maximum(state.spread, 0) / pairs)
+    error = np.sqrt(np.maximum(state.spread.astype(float), 0) / pairs)
     sum_error = np.sqrt(np.maximum(state.sum_spread, 0) / pairs)
     return Estimate(state.mean, error, sum_error, state.count, state.seconds)
 

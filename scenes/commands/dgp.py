@@ -95,4 +95,6 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     )
     for level, count in table["protection_en17037"].value_counts().items():
         click.echo(f"protection {level}: {count} view(s)")
+    for note in year.notes:
+        click.echo(f"note: {note}")
     click.echo(f"{out / 'views.csv'}")

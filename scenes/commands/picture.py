@@ -79,3 +79,5 @@ def command(building: Path | None, files: tuple[Path, ...], tone: bool, **chosen
         rated = evaluate(lit, view)
         says += f", Ev {rated.Ev:,.0f} lx, DGP {rated.dgp:.3f}, {rated.count} glare source(s)"
     click.echo(f"{says}; {time.perf_counter() - start:.1f} s")
+    for note in found.notes:
+        click.echo(f"note: {note}")

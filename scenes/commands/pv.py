@@ -61,6 +61,8 @@ def command(
             f"{row.yield_kwh:.0f} kWh a year ({row.kwh_per_kw:.0f} kWh/kW), "
             f"mismatch {100 * row.mismatch_loss:.1f} %"
         )
+    for note in climate.notes:
+        click.echo(f"note: {note}")
     click.echo(f"results: {out}")
 
 

@@ -213,6 +213,7 @@ def measured(
         label=label,
         least_altitude_deg=least_altitude,
     )
+    _tell(hours)
     write_wea(hours, out)
     click.echo(f"{out}: {len(hours.times)} time steps of {hours.step_h:g} h")
 
@@ -261,7 +262,14 @@ def read_weather(path: Path) -> Weather:
             start = file.read(6).lower()
     except OSError as error:
         raise DataError(f"cannot be read: {error.strerror}", file=path) from error
-    return read_wea(path, whole_year=False) if start.startswith(b"place") else read_epw(path)
+    found = read_wea(path, whole_year=False) if start.startswith(b"place") else read_epw(path)
+    _tell(found)
+    return found
+
+
+def _tell(weather: Weather) -> None:
+    for note in weather.notes:
+        click.echo(f"note: {note}", err=True)
 
 
 def _command_line() -> str:

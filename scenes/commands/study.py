@@ -43,6 +43,7 @@ def command(
     from mitsuba_cfs.files import check_file
     from mitsuba_cfs.matrices.cache import default_folder
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.job.inputs import read_weather
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.store import Store
@@ -63,6 +64,9 @@ def command(
         click.echo(f"auto: {why}")
     if write_ifc is not None:
         building_file(plan)  # or one line that there is none
+    for path in dict.fromkeys(case.weather.path for case in plan.cases):
+        for note in read_weather(path).notes:
+            click.echo(f"note: {note}")
     with ProgressBar() as progress:
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,

@@ -13,6 +13,7 @@ from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import phases
 from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
@@ -148,6 +149,7 @@ def illuminances(
             seed=trace.seed,
         ),
         five_phase=False,
+        cache=MatrixCache.of_user(),
         progress=part(progress, 0.0, 1.0, "daylight"),
     )
     states = [BsdfOptics(system.visible, system.fine) for system in systems]
@@ -160,7 +162,12 @@ def illuminances(
 
 def _options(trace: TraceTable) -> dict:
     samples = max(trace.patch_samples // BATCHES, 1)
-    return {"samples": samples, "stopping": Stopping(batches=BATCHES), "seed": trace.seed}
+    return {
+        "samples": samples,
+        "stopping": Stopping(batches=BATCHES),
+        "seed": trace.seed,
+        "cache": MatrixCache.of_user(),
+    }
 
 
 def _groups(space: Space, groups: list[WindowGroup]) -> NDArray[np.int64]:

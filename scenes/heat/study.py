@@ -80,7 +80,7 @@ def run_study(study: StudyFile, progress: Progress) -> tuple[list[RoomYear], tup
     thermals = [state_of(s, t) for s, t in zip(systems, study.system, strict=True)]
     building, spaces = rooms_of(study)
     zones = [thermal_room(space, thermals[0].fenestration) for space in spaces]
-    notes = dict.fromkeys(note for t in (*systems, *thermals) for note in t.notes)
+    notes = dict.fromkeys(note for t in (weather, *systems, *thermals) for note in t.notes)
     if study.couple:
         zones, unpaired = coupled_rooms(spaces, zones)
         notes |= dict.fromkeys(unpaired)

@@ -14,6 +14,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
+from scenes.job.holes import moved
 from scenes.job.options import RoomOptions
 from scenes.job.windows import States
 from scenes.results import SpaceResult
@@ -59,6 +60,7 @@ def as_room(result: SpaceResult, space: Space) -> SpaceResult:
     daylight, glare = result.daylight, result.glare
     table = daylight.sensor_metrics.copy()
     table[["x", "y", "z"]] += shift
+    name = result.space.name or result.space.guid
     place = tuple((np.asarray(glare.view.position) + shift).tolist())
     return replace(
         result,
@@ -66,7 +68,8 @@ def as_room(result: SpaceResult, space: Space) -> SpaceResult:
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
         glare=replace(glare, view=replace(glare.view, position=place)),
         seconds={},
-        like=result.space.name or result.space.guid,
+        problems=tuple(moved(problem, space, name) for problem in result.problems),
+        like=name,
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Space
+from bim.model import Building, Problem, Space
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import glare
@@ -35,6 +35,7 @@ from scenes.heat.study import state_of
 from scenes.job.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.job.daylight import room_daylight, room_scene
 from scenes.job.glare import default_hours, room_glare, wanted_hours
+from scenes.job.holes import hole_problems
 from scenes.job.inputs import System
 from scenes.job.operation import Operation, operated, shading_states
 from scenes.job.options import RoomOptions
@@ -95,6 +96,7 @@ def compute_room(
     room = _Room(building, space, systems, weather, options, operation, skies, cache, progress)
     hours = wanted_hours(options.picture_hours, weather.midpoints, skies.lit)
     daylight = room.timed("daylight", room.daylight)
+    holes = room.timed("holes", room.holes)
     year, rated = None, GlareResults(room.scene.view, ())
     if options.annual_glare:
         year = room.timed("annual glare", room.annual_glare)
@@ -103,7 +105,9 @@ def compute_room(
     dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
     heat, balance = room.timed("thermal", lambda: room.thermal(daylight))
     ran = None if operation is None else room.operation_result(balance)
-    return SpaceResult(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp)
+    return SpaceResult(
+        space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes
+    )
 
 
 class _Room:
@@ -194,6 +198,10 @@ class _Room:
             return self.light
         filled = PathSystems(self.scene, self.light.filled.systems, self.options.sampling)
         return filled.light(self.skies)
+
+    def holes(self) -> tuple[Problem, ...]:
+        """What of the light leaves through no window."""
+        return hole_problems(self.space, self.scene, self.options, self.cache, silent)
 
     def annual_glare(self) -> pd.DataFrame:
         """Glare of every hour."""

@@ -65,6 +65,7 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
     results, problems, notes = _rooms(inputs, skies, options, progress)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
+    holes = [problem for result in results for problem in result.problems]
     manifest = _manifest(options, variant, inputs, used, results)
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
@@ -72,6 +73,8 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
         *thermal_notes,
         *_state_notes(inputs, options),
         *notes,
+        *(f"{hole.what}: {hole.consequence}." for hole in holes),
+        *weather.notes,
         *_site_notes(building, weather),
     ]
     return RunResult(
@@ -79,7 +82,7 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
         weather.midpoints,
         sun,
         tuple(results),
-        (*building.problems, *problems),
+        (*building.problems, *problems, *holes),
         manifest,
         tuple(dict.fromkeys(notes)),
         options.method,

@@ -61,6 +61,7 @@ class Year:
     sky: AnnualSky  # of the hours L with the sun up
     used: NDArray[np.bool_]  # [H] hours of use
     digest: str  # of all inputs
+    notes: tuple[str, ...] = ()  # of system and weather
 
 
 def read_year(options: YearOptions, progress: Progress = silent) -> Year:
@@ -88,6 +89,7 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
     return Year(
         options, space.name or space.guid, views, scene,
         BsdfOptics(system.visible, system.fine), weather, sky, used, digest,
+        (*system.notes, *weather.notes),
     )  # fmt: skip
 
 

@@ -68,19 +68,19 @@ def _read_year(options, _progress):
 
     weather = read_epw(options.weather)
     views = [NamedView("eye001_1", fisheye([0, 0, 1], [0, 1, 0], 64))]
-    lit = np.arange(100, 4000, 100)
+    sky = SimpleNamespace(lit=np.arange(100, 4000, 100))
     used = working_hours(weather, 8.0, 18.0)
-    return Year(options, "A", views, None, None, weather, lit, None, used, options.metric)
+    return Year(options, "A", views, None, None, weather, sky, used, options.metric)
 
 
 def _rate_views(year, kept, _progress):
     from scenes.year_of_glare.year import FIGURES, ViewYear
 
-    times = year.weather.midpoints[year.lit]
+    times = year.weather.midpoints[year.sky.lit]
     ratings = pd.DataFrame({name: np.linspace(0.2, 0.5, len(times)) for name in FIGURES}, times)
     (kept / "0123456789abcdef01234567.npy").write_bytes(b"ratings")
     picture = np.full((64, 64), 500.0, np.float32)
-    worst = year.lit[0 if year.options.seed == 0 else 1]  # other hours with another seed
+    worst = year.sky.lit[0 if year.options.seed == 0 else 1]  # other hours with another seed
     yield ViewYear(year.views[0], ratings, {year.weather.midpoints[worst]: picture}, 1.0)
 
 

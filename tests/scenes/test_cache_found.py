@@ -1,0 +1,92 @@
+"""The same command twice, each time a process of its own, traces nothing the second time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.demo.make_facade import facade
+from tests.scenes.study_files import study_file
+
+REPOSITORY = Path(__file__).parents[2]
+PV = """
+[module]
+select = 'IfcElement, material="PV laminate", Name="PV 09 row 1 column 1"'
+short_circuit_current = 8.6
+open_circuit_voltage = 37.4
+current = 8.05
+voltage = 29.8
+cells = 60
+"""
+THERMAL = f"""
+weather = "{WEATHER}"
+[box]
+width = 4.0
+depth = 5.0
+height = 3.0
+[[box.window]]
+x = 0.5
+sill = 1.0
+width = 3.0
+height = 1.5
+[[system]]
+bsdf = "{VENETIAN_BLIND}"
+[trace]
+patch_samples = 256
+sensor_samples = 256
+"""
+
+
+def run_arguments(folder: Path) -> list[str]:
+    files = [str(OFFICE), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND)]
+    return ["run", *files, "--space", "A", "--quick"]
+
+
+def thermal_arguments(folder: Path) -> list[str]:
+    path = folder / "room.toml"
+    path.write_text(THERMAL)
+    return ["thermal", str(path)]
+
+
+def pv_arguments(folder: Path) -> list[str]:
+    model, study = folder / "facade.ifc", folder / "pv.toml"
+    facade().write(str(model))
+    study.write_text(PV)
+    return ["pv", str(model), "--weather", str(WEATHER), "--study", str(study)]
+
+
+def study_arguments(folder: Path) -> list[str]:
+    return ["study", str(study_file(folder))]
+
+
+COMMANDS = {
+    "run": (run_arguments, {"view-matrix", "daylight-matrix", "escape"}),
+    "thermal": (thermal_arguments, {"absorption-matrix", "daylight-matrix", "sky-irradiance"}),
+    "pv": (pv_arguments, {"sky-irradiance"}),
+    "study": (study_arguments, {"view-matrix", "daylight-matrix", "escape"}),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_second_time_everything_is_found(tmp_path, name):
+    """In another folder of results, with other hash seeds; a kept file that is written anew would
+    be another file (inode), for it is replaced as a whole."""
+    arguments, expected = COMMANDS[name]
+    command, cache = arguments(tmp_path), tmp_path / "cache"
+    kept = []
+    for seed in ("1", "2"):
+        environment = os.environ | {"CFS_CACHE": str(cache), "PYTHONHASHSEED": seed}
+        done = subprocess.run(
+            [sys.executable, "-m", "scenes.cli", *command, "--out", str(tmp_path / f"out{seed}")],
+            cwd=REPOSITORY, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+        kept.append({path.name: path.stat().st_ino for path in cache.glob("*.npz")})
+    labels = {file.rpartition("-")[0] for file in kept[0]}
+    assert expected <= labels, labels
+    assert kept[0] == kept[1]
