@@ -90,7 +90,7 @@ def _room_picture(_options, _progress):
 
     view = fisheye([0, 0, 1], [0, 1, 0], 64)
     luminance = np.full((64, 64), 500.0, np.float32)
-    return RoomPicture(luminance, view, "A", pd.Timestamp("2000-06-21 12:30"))
+    return RoomPicture(luminance, view, "A", pd.Timestamp("2000-06-21 12:30"), ())
 
 
 def _calibrated(size, **_options):
