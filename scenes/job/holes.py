@@ -44,7 +44,7 @@ def _problem(space: Space, points: np.ndarray, found: Escape) -> Problem:
     towards = WHERE.get(SIDES[side], f"to the {SIDES[side]}")
     what = (
         f"room {space.name or space.guid} is open: up to {100 * found.share[worst]:.0f} % of what "
-        f"a sensor sees lies behind no window and no wall ({name} at {_place(points[worst])}; "
+        f"a sensor sees is neither wall nor window ({name} at {_place(points[worst])}; "
         f"{count} of {sensors} sensors above {100 * MOST_LOST:g} %); most of it leaves "
         f"{towards} near {_place(found.place[side])}"
     )
