@@ -40,7 +40,6 @@ LIMITED = {
     "drjit": TRACING,
     "ifcopenshell": IFC,
     "matplotlib": PLOTTING,
-    "plotly": PLOTTING,
 }
 LONGEST_MODULE = 400
 CATCH_ALL_NAMES = {"utils.py", "util.py", "common.py", "helpers.py", "misc.py"}
