@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+from scenes.commands.parameters import FILE
 
 
 @click.command()
@@ -40,23 +40,29 @@ def command(
     results: the same command goes on after an interruption, and a longer grid computes only what
     is new.
     """
-    from scenes.commands.progress_bar import ProgressBar
-    from scenes.study.automatic import settled
-    from scenes.study.plan import plan_of
+    from scenes.study.files import check_files, one_building
+    from scenes.study.schedule import check_dask
     from scenes.study.store import Store
-    from scenes.study.study import run_study
     from scenes.study.study_file import read_study
-    from scenes.study.write_ifc import building_file, write_study_ifc
-    from scenes.study_report import write_study_report
 
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, **asked)
+    if write_ifc is not None:
+        one_building(room.building for room in parsed.room)
+    if scheduler is not None:
+        check_dask()
+    check_files(parsed)  # before anything heavy is loaded
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.study.automatic import settled
+    from scenes.study.plan import plan_of
+    from scenes.study.study import run_study
+    from scenes.study.write_ifc import write_study_ifc
+    from scenes.study_report import write_study_report
+
     plan = settled(parsed, plan_of(parsed))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
-    if write_ifc is not None:
-        building_file(plan)  # or one line that there is none
     store = Store(out)
     with ProgressBar() as progress:
         result = run_study(
@@ -69,14 +75,20 @@ def command(
     )
     if result.clock:
         click.echo(f"auto: {result.clock}")
-    if result.failed == len(result.results):
-        raise click.ClickException("no case could be computed")
+    failed, total = result.failed, len(result.results)
+    if failed == total:
+        raise click.ClickException(f"{failed} of {total} cases failed: {result.first_error}")
     store.write("report.html", lambda path: write_study_report(result, path))
     click.echo(f"report: {out / 'report.html'}")
     if write_ifc is not None:
         for problem in write_study_ifc(result, write_ifc):
             click.echo(f"note: {problem.where}: {problem.what}")
         click.echo(f"building with results: {write_ifc}")
+    if failed:
+        raise click.ClickException(
+            f"{failed} of {total} cases failed, the first: {result.first_error}; "
+            f"the others are kept, and the same command tries these again"
+        )
 
 
 def _tell(case, result, ready: int, total: int) -> None:

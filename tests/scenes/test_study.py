@@ -33,7 +33,7 @@ bsdf = "{VENETIAN_BLIND}"
 g_value = 0.3
 """
 WRONG = {
-    "no system": ("", BOX + CLIMATE, "system: Field required"),
+    "no system": ("", BOX + CLIMATE, "system: is missing"),
     "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: Extra inputs"),
     "unknown method": (
         'methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: Input should be",
