@@ -6,15 +6,15 @@ from pathlib import Path
 
 import click
 
+from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 _DEFAULT = YearOptions(Path(), Path(), Path())
 
 
 @click.command()
-@click.argument("building", type=FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
 @click.option("--weather", type=FILE, default=WEATHER, help="EPW file, hourly [the demo's].")
 @click.option(
     "--cfs", "system", type=FILE, default=VENETIAN_BLIND, help="BSDF XML file [the demo's]."
@@ -75,13 +75,17 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     start, end = chosen["occupied"]
     if start >= end:
         raise click.UsageError(f"--occupied {start} {end}: expected the first hour before the last")
+    from scenes.year_of_glare.files import read_files
+
+    options = YearOptions(building or OFFICE, **chosen)
+    files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare.year import rate_views, read_year
 
     kept = outputs.kept_folder(out)
     with ProgressBar() as progress:
-        year = read_year(YearOptions(building or OFFICE, **chosen), progress)
+        year = read_year(options, progress, files)
         rows = [outputs.write_view(year, v, out) for v in rate_views(year, kept, progress)]
     table = outputs.write_summary(year, rows, out)
     worst = table.loc[table["highest_dgp"].idxmax()]

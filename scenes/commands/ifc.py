@@ -4,26 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
-from rich.table import Table
 
-from bim.fenestration import ShadingState, read_g_table
-from bim.ifc.attach import attach as attach_to_ifc
-from bim.ifc.survey import markdown
-from bim.ifc.survey import survey as surveyed
-from bim.model import Building, Space
-from bim.read_ifc import read_ifc
-from bim.to_energyplus import write_epjson
-from bim.to_gltf import write_gltf
-from bim.to_mitsuba import write_mitsuba
-from bim.to_radiance import identifier, write_radiance
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
-from scenes.commands.progress_bar import ProgressBar
+from scenes.commands.parameters import FILE, IFC_FILE
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from bim.model import Building, Space
 
 
 @click.group()
@@ -32,10 +23,15 @@ def command() -> None:
 
 
 @command.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--csv", "table", type=click.Path(path_type=Path), help="Also write the problems.")
 def check(building: Path, table: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
+    from rich.console import Console
+
+    from bim.read_ifc import read_ifc
+    from scenes.commands.progress_bar import ProgressBar
+
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     console = Console(width=None if Console().is_terminal else 200)
@@ -54,7 +50,7 @@ def check(building: Path, table: Path | None) -> None:
 
 
 @command.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--window", "windows", multiple=True, metavar="GUID", help="A window or door.")
 @click.option("--type", "types", multiple=True, metavar="NAME", help="Windows of a type.")
 @click.option("--all", "every_window", is_flag=True, help="Every window.")
@@ -82,6 +78,9 @@ def attach(
     """Write BSDF, angular g-values and U into an IFC file's windows."""
     if bsdf is None and g_table is None and u_value is None:
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
+    from bim.fenestration import ShadingState, read_g_table
+    from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+
     file = None if bsdf is None else read_bsdf_xml(bsdf)
     copied = file is not None and not reference
     one = ShadingState(
@@ -90,6 +89,8 @@ def attach(
         None if g_table is None else read_g_table(g_table),
         u_value,
     )
+    from bim.ifc.attach import attach as attach_to_ifc
+
     count = attach_to_ifc(
         building, out, one, windows=windows, types=types, every_window=every_window,
         bsdf_reference=bsdf if reference else None,
@@ -98,7 +99,7 @@ def attach(
 
 
 @command.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--space", "names", multiple=True, help="Name or GUID; default: all.")
 @click.option(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
@@ -121,6 +122,13 @@ def export(
     """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing."""
     if radiance is None and mitsuba is None and epjson is None and gltf is None:
         raise click.UsageError("nothing to write: give --radiance, --mitsuba, --epjson or --gltf")
+    from bim.read_ifc import read_ifc
+    from bim.to_energyplus import write_epjson
+    from bim.to_gltf import write_gltf
+    from bim.to_mitsuba import write_mitsuba
+    from bim.to_radiance import identifier, write_radiance
+    from scenes.commands.progress_bar import ProgressBar
+
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     spaces = _chosen(read, names, building)
@@ -148,6 +156,10 @@ def export(
 @click.option("--markdown", "out", type=click.Path(path_type=Path), help="Also write the table.")
 def survey(files: tuple[Path, ...], out: Path | None) -> None:
     """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
+    from bim.ifc.survey import markdown
+    from bim.ifc.survey import survey as surveyed
+    from scenes.commands.progress_bar import ProgressBar
+
     rows = []
     with ProgressBar() as progress:
         for row in surveyed(files):
@@ -170,6 +182,8 @@ def _chosen(building: Building, names: tuple[str, ...], path: Path) -> tuple[Spa
 
 def _rooms(building: Building) -> Table:
     """One line for each room, drawn figures beside those that the file states."""
+    from rich.table import Table
+
     table = Table(title=f"Rooms of {building.name}", title_justify="left")
     table.add_column("room")
     table.add_column("storey")
@@ -193,6 +207,8 @@ def _number(value: float | None) -> str:
 
 
 def _problems(building: Building) -> Table:
+    from rich.table import Table
+
     table = Table(title="Problems", title_justify="left")
     for head in ("where", "what", "consequence or repair"):
         table.add_column(head, overflow="fold")

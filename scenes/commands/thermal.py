@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+from scenes.commands.parameters import FILE
 
 
 @click.command()
@@ -19,15 +19,18 @@ def command(study: Path, out: Path) -> None:
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
     files) and their control, gains, outdoor air and set points; docs/thermal.md lists every field.
     """
-    from scenes.commands.progress_bar import ProgressBar
-    from scenes.heat.study import run_study
+    from scenes.heat.files import read_files
     from scenes.heat.study_file import read_study
     from scenes.result_folder import check_folder
 
     parsed = read_study(study)
     check_folder(out)
+    files = read_files(parsed)  # before anything heavy is loaded
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.heat.study import run_study
+
     with ProgressBar() as progress:
-        rooms, notes = run_study(parsed, progress)
+        rooms, notes = run_study(parsed, progress, files)
     _write(rooms, notes, parsed, out)
     for room in rooms:
         summary = room.summary

@@ -21,7 +21,7 @@ from mitsuba_cfs.trace.view_matrix import view_matrix
 from scenes.heat.study_file import TraceTable
 from scenes.job.daylight import Skies
 from scenes.job.inputs import System
-from scenes.job.thermal import ThermalSystem
+from scenes.job.thermal_system import ThermalSystem
 from thermal.climate import Solar
 
 FloatArray = NDArray[np.float64]

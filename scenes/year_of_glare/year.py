@@ -23,9 +23,10 @@ from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.matrix import sun_up
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.inputs import chosen_spaces, read_system, read_weather, sha256
+from scenes.job.inputs import chosen_spaces, sha256
 from scenes.methods.phases import PhaseSystem, phase_scene
 from scenes.methods.place import Fenestration, Place, Quality, Skies, fenestration, skies_of
+from scenes.year_of_glare.files import YearFiles, read_files
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
 
@@ -59,9 +60,15 @@ class Year:
     digest: str  # of all inputs
 
 
-def read_year(options: YearOptions, progress: Progress = silent) -> Year:
-    """Read and check all inputs, the quick ones first; `DataError` where one cannot be used."""
-    system, weather = read_system(options.system), read_weather(options.weather)
+def read_year(
+    options: YearOptions, progress: Progress = silent, files: YearFiles | None = None
+) -> Year:
+    """Read and check all inputs, the building last; `DataError` where one cannot be used.
+
+    Args: files: what `read_files` has read of the options; read now without.
+    """
+    files = files or read_files(options)
+    system, weather = files.system, files.weather
     progress("inputs", 0.1)
     building = read_ifc(options.building, progress=part(progress, 0.1, 0.6, "inputs"))
     names = () if options.space is None else (options.space,)
