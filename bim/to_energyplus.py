@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bim.defaults import WINDOW_FRAME
 from bim.model import Building, Construction, Face, Space, Window
 from bim.planes import merged_polygons, plane_through
+from mitsuba_cfs.files import write_text
 
 VERSION = "25.2"
 THINNEST = 0.003  # thinner layers have no mass worth a conduction transfer function [m]
@@ -41,7 +42,7 @@ def write_epjson(
     model = _frame(building)
     for number, space in enumerate(building.spaces if spaces is None else spaces):
         _zone(model, f"Z{number} {_name(space.name)}", space, u_value, g_value, air_changes)
-    Path(path).write_text(json.dumps(model, indent=1), encoding="utf-8")
+    write_text(path, json.dumps(model, indent=1))
 
 
 def _frame(building: Building) -> dict:

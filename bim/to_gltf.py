@@ -9,6 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from bim.model import Building
+from mitsuba_cfs.files import write_bytes
 
 COLOURS = {  # red, green, blue, opacity, 0 to 255
     "floor": (181, 137, 0, 255),
@@ -39,7 +40,7 @@ def write_gltf(building: Building, path: str | Path, *, outdoors: bool = True) -
         triangles = np.concatenate([element.triangles for element in building.elements])
         _add(scene, "outdoors", triangles, "outdoors")
     scene.apply_transform(TO_GLTF)
-    Path(path).write_bytes(scene.export(file_type="glb"))
+    write_bytes(path, scene.export(file_type="glb"))
 
 
 def _add(scene: trimesh.Scene, name: str, triangles: NDArray[np.float64], kind: str) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Space
 from bim.sensors import view_point
+from mitsuba_cfs.files import replacing, write_bytes
 
 FIELD_OF_VIEW_DEG = 90.0
 PIXELS, SAMPLES, DEPTH = 512, 256, 8
@@ -58,7 +59,8 @@ def write_mitsuba(
         ElementTree.SubElement(pane, "float", name="int_ior", value=str(GLASS_INDEX))
     ElementTree.indent(scene)
     path = folder / "scene.xml"
-    ElementTree.ElementTree(scene).write(path, encoding="utf-8", xml_declaration=True)
+    with replacing(path) as part:
+        ElementTree.ElementTree(scene).write(part, encoding="utf-8", xml_declaration=True)
     return path
 
 
@@ -89,7 +91,7 @@ def _mesh(
     corners = np.concatenate(triangles).reshape(-1, 3)
     mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     relative = f"meshes/{label}.ply"
-    (folder / relative).write_bytes(mesh.export(file_type="ply", vertex_normal=False))
+    write_bytes(folder / relative, mesh.export(file_type="ply", vertex_normal=False))
     shape = ElementTree.SubElement(scene, "shape", type="ply", id=label)
     ElementTree.SubElement(shape, "string", name="filename", value=relative)
     ElementTree.SubElement(shape, "boolean", name="face_normals", value="true")

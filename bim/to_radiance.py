@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bim.model import Building, Element, Face, Space
 from bim.sensors import sensor_grid, view_point
 from bim.to_tracer import window_groups
+from mitsuba_cfs.files import write_text
 
 SKY = """# receivers of daylight: the ground, then the sky in Reinhart's patches
 #@rfluxmtx h=u u=Y
@@ -106,7 +107,7 @@ def identifier(name: str) -> str:
 
 
 def _write(path: Path, parts: Iterable[str]) -> Path:
-    path.write_text("".join(parts), encoding="ascii")
+    write_text(path, "".join(parts), encoding="ascii")
     return path
 
 

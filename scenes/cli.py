@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import errno
 import logging
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module, metadata
 from importlib.util import find_spec
 
 import click
+
+from scenes.streams import open_streams
 
 # name: help in one line. The module scenes.commands.<name> defines `command`.
 COMMANDS = {
@@ -30,6 +32,15 @@ COMMANDS = {
     "bench": "Accuracy and speed against other programs, on this machine.",
 }
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
+SIGNALLED = 128  # and the signal's number
+
+
+class Terminated(BaseException):
+    """The program was told to end: whatever is open is cleared away on the way out."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(number)
 
 
 class LazyGroup(click.Group):
@@ -84,9 +95,19 @@ def cfs(verbose: int) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run `cfs` and exit: 0 done, 1 a problem with the input, 2 wrong usage, 130 interrupted.
 
-    A problem gives one line on stderr; with CFS_DEBUG=1 also its traceback.
+    143 and 129: ended by SIGTERM or SIGHUP.  A problem gives one line on stderr; with CFS_DEBUG=1
+    also its traceback.
     """
+    open_streams()
+    for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:  # not under nohup
+            signal.signal(number, _terminate)
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+
+
+def _terminate(number: int, _frame: object) -> None:
+    raise Terminated(number)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -101,10 +122,10 @@ def run(arguments: Sequence[str]) -> int:
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         return INTERRUPTED
+    except Terminated as ended:
+        click.echo("terminated", err=True)
+        return SIGNALLED + ended.number
     except Exception as error:
-        if isinstance(error, OSError) and error.errno == errno.EPIPE:
-            sys.stdout = open(os.devnull, "w")  # `cfs ... | head`: nobody reads on
-            return FAILED
         line = _user_line(error)
         if line is None or os.environ.get("CFS_DEBUG") == "1":
             raise

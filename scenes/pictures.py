@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing
 from mitsuba_cfs.glare.areas import angles_to
 from mitsuba_cfs.glare.evaluation import GlareResult
 from mitsuba_cfs.glare.glare_view import in_picture_order
@@ -122,7 +122,8 @@ def write_tone_mapped(path: Path, pixels: NDArray, *, scale: bool = False, title
         scale: with a bar of greys that tells their luminance, and a title.
     """
     if not scale:
-        _try(lambda: imsave(path, tone_mapped(pixels)), path)
+        with replacing(path) as part:
+            imsave(part, tone_mapped(pixels))
         return
     luminance = _luminance(pixels)
     low, high = scale_limits(luminance)
@@ -222,11 +223,5 @@ def _figure(shape: tuple[int, ...]) -> Figure:
 
 
 def _save(figure: Figure, path: Path) -> None:
-    _try(lambda: figure.savefig(path), path)
-
-
-def _try(write, path: Path) -> None:
-    try:
-        write()
-    except OSError as error:
-        raise DataError(f"cannot be written ({error.strerror})", file=path) from None
+    with replacing(path) as part:
+        figure.savefig(part)

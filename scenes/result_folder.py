@@ -1,63 +1,286 @@
-"""A folder of results that appears when all is written, in the place of an earlier one."""
+"""A folder of results: known by what it holds, replaced when all is written, nothing else touched.
+
+The mark of a folder, `cfs-results.json`, names this program, the command and every file that it
+wrote. Only those are ever replaced or removed.
+"""
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path, PurePosixPath
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import (
+    TEMPORARY,
+    reason,
+    remove_stale,
+    stale,
+    temporary_folder,
+    write_text,
+)
 
-MARK = "run.json"  # a folder that holds it is an earlier result and may be replaced
-
-
-def check_folder(folder: Path) -> None:
-    """Raise `DataError` where results could not be put at the end of a run."""
-    if folder.exists() and not folder.is_dir():
-        raise DataError("is a file; results need a folder", file=folder, field="--out")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
-        raise DataError(
-            f"holds other files (and no {MARK} of an earlier run)", file=folder, field="--out"
-        )
-    try:
-        folder.absolute().parent.mkdir(parents=True, exist_ok=True)
-        Path(tempfile.mkdtemp(prefix=".cfs-", dir=folder.absolute().parent)).rmdir()
-    except OSError as error:
-        message = f"cannot be written: {error.strerror or error}"
-        raise DataError(message, file=folder, field="--out") from error
+MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
 
 
-@contextmanager
-def result_folder(folder: Path) -> Iterator[Path]:
-    """A temporary folder that takes the name `folder` at the end, or goes where an error comes.
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """What a mark says: the command that made the folder, and the files that it wrote."""
 
-    Whoever writes into it puts `MARK` there, so that the next run may replace it.
+    command: str
+    files: tuple[str, ...] = ()  # relative, with forward slashes
+    removed: tuple[str, ...] = ()  # of finished results: earlier files that go for them
+
+    @classmethod
+    def read(cls, folder: Path) -> Mark | None:
+        """The mark of a folder; None where there is none of ours."""
+        try:
+            record = json.loads((folder / MARK).read_text(encoding="utf-8"))
+            known = record["program"] == PROGRAM and record["format"] == FORMAT
+            names = (tuple(map(str, record[key])) for key in ("files", "removed"))
+            mark = cls(str(record["command"]), *names)
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return mark if known and all(map(_inside, mark.files + mark.removed)) else None
+
+    def write(self, folder: Path) -> None:
+        """Write the mark into its folder."""
+        record = {
+            "program": PROGRAM, "format": FORMAT, "version": metadata.version(PROGRAM),
+            "command": self.command, "files": sorted(self.files), "removed": sorted(self.removed),
+        }  # fmt: skip
+        write_text(folder / MARK, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
+
+
+class ResultFolder:
+    """The folder that a command writes its results into.
+
+    Made before the work, it refuses what could not be written at its end; nothing is left of that.
     """
-    check_folder(folder)
-    target = folder.absolute()
-    temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        temporary.chmod(0o755)
-        yield temporary
-        _take_place(temporary, target)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
+
+    def __init__(
+        self,
+        folder: Path,
+        command: str,
+        *,
+        inputs: Iterable[Path | None] = (),
+        adding: bool = False,
+        field: str = "--out",
+    ) -> None:
+        """Check the folder.
+
+        Args:
+            command: that writes; a folder of another command is refused.
+            inputs: files of the command; the folder may not be or contain one.
+            adding: earlier results stay, and the folder may hold other files.
+            field: the option that named the folder.
+
+        Raises: `DataError` where the folder is not ours to write into, or cannot be written to.
+        """
+        self.folder, self._command, self._adding, self._field = folder, command, adding, field
+        self._place = Path(os.path.realpath(folder))
+        if not adding:
+            self._refuse_inputs(inputs)
+        if self._place.exists() and not self._place.is_dir():
+            raise self._error("is a file; results need a folder")
+        try:
+            self._finish_cut_off()
+            self._mark = self._own_mark()
+            self._try_to_write()
+        except OSError as error:
+            raise self._error(f"cannot be written: {reason(error)}") from error
+
+    @contextmanager
+    def replaced(self, gone: Callable[[str], bool] | None = None) -> Iterator[Path]:
+        """A temporary folder whose files take the place of the earlier results at the end.
+
+        Args: gone: which earlier files go, by name; by default all, or none where the folder is
+            for adding to.
+
+        With an error, the earlier results stay as they are. Files of others are never touched:
+        where one has the name of a result, the new results go into a folder beside it.
+        """
+        new = not self._place.exists()
+        made = _make_folders(self._place.parent if new else self._place)
+        try:
+            with temporary_folder(self._place.parent if new else self._place) as part:
+                with self._named(part):
+                    yield part
+                    self._finish(part, gone)
+                    if new and _renamed(part, self._place):
+                        return
+                    self._put_in_place(part)
+        finally:
+            _remove_empty(made)
+
+    def _finish(self, part: Path, gone: Callable[[str], bool] | None) -> None:
+        """Give the finished results their mark, which is all that putting them in place needs."""
+        files = tuple(_files(part))
+        earlier = set(self._mark.files) - set(files)
+        if gone is not None:
+            earlier = set(filter(gone, earlier))
+        elif self._adding:
+            earlier = set()
+        Mark(self._command, files, tuple(earlier)).write(part)
+
+    def kept(self, name: str) -> Path:
+        """A folder inside for what is kept while the command works; it is never cleared."""
+        try:
+            (self._place / name).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._error(f"cannot be written: {reason(error)}") from error
+        self._mark.write(self._place)
+        return self.folder / name
+
+    def _refuse_inputs(self, inputs: Iterable[Path | None]) -> None:
+        here = Path(os.path.realpath(os.curdir))
+        if here.is_relative_to(self._place):
+            raise self._error("is or contains the current folder: name one for results alone")
+        for one in inputs:
+            if one is not None and Path(os.path.realpath(one)).is_relative_to(self._place):
+                raise self._error(
+                    f"is or contains the input {one}: name a folder for results alone"
+                )
+
+    def _finish_cut_off(self) -> None:
+        """Do what a killed process left: finished results go in place, the rest goes."""
+        for part in stale(self._place):
+            if part.is_dir() and Mark.read(part) is not None:
+                self._mark = Mark.read(self._place) or Mark(self._command)
+                self._put_in_place(part)
+        remove_stale(self._place)
+        remove_stale(self._place.parent)
+
+    def _own_mark(self) -> Mark:
+        """The mark of the earlier results, or an empty one."""
+        mark = Mark.read(self._place)
+        if mark is None:
+            others = self._place.is_dir() and any(
+                not TEMPORARY.fullmatch(one.name) for one in self._place.iterdir()
+            )
+            if others and not self._adding:
+                raise self._error(
+                    f"holds other files (and no {MARK} of earlier results): name another folder"
+                )
+            return Mark(self._command)
+        if mark.command != self._command:
+            raise self._error(f"holds results of `cfs {mark.command}`: name another folder")
+        return mark
+
+    def _try_to_write(self) -> None:
+        made = _make_folders(self._place)
+        try:
+            with temporary_folder(self._place):
+                pass
+        finally:
+            _remove_empty(made)
+
+    def _put_in_place(self, part: Path) -> None:
+        """Move the finished files in; the mark is the last, and a cut is taken up from `part`."""
+        old, done = set(self._mark.files), Mark.read(part)
+        moved = sorted(name for name in done.files if os.path.lexists(part / name))
+        for name in moved:
+            if name not in old and _taken(self._place, name):
+                self._set_aside(part, name)
+        for name in moved:
+            (self._place / name).parent.mkdir(parents=True, exist_ok=True)
+            (part / name).replace(self._place / name)
+        _remove(self._place, old.intersection(done.removed))
+        files = old.difference(done.removed).union(done.files)
+        self._mark = Mark(done.command, tuple(files))
+        self._mark.write(self._place)
+
+    def _set_aside(self, part: Path, name: str) -> None:
+        """Keep finished results that have no place, and say where."""
+        number = 1
+        while (aside := self._place / f"results-{number}").exists():
+            number += 1
+        part.replace(aside)
+        raise self._error(
+            f"holds {name}, which no earlier run wrote; the new results are in {aside.name}"
+        )
+
+    @contextmanager
+    def _named(self, part: Path) -> Iterator[None]:
+        """Errors that name the temporary folder name the user's in its place."""
+        try:
+            yield
+        except DataError as error:
+            if error.file is None or not Path(error.file).is_relative_to(part):
+                raise
+            file = self.folder / Path(error.file).relative_to(part)
+            raise DataError(
+                error.message, file=file, element=error.element, field=error.field
+            ) from error
+        except OSError as error:
+            if error.filename is None or not Path(error.filename).is_relative_to(part):
+                raise
+            file = self.folder / Path(error.filename).relative_to(part)
+            raise DataError(f"cannot be written: {reason(error)}", file=file) from error
+
+    def _error(self, message: str) -> DataError:
+        return DataError(message, file=self.folder, field=self._field)
 
 
-def _take_place(temporary: Path, target: Path) -> None:
-    """Rename the finished folder, keeping the earlier one until that is done."""
-    old = None
-    if target.exists():
-        old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.parent))
-        target.replace(old)
+def _inside(name: str) -> bool:
+    """Whether a name of a mark stays inside its folder."""
+    path = PurePosixPath(name)
+    return bool(name) and not path.is_absolute() and ".." not in path.parts and "\\" not in name
+
+
+def _files(folder: Path) -> Iterator[str]:
+    """The names of all files in a folder and its folders."""
+    for path in folder.rglob("*"):
+        if path.is_file():
+            yield path.relative_to(folder).as_posix()
+
+
+def _taken(place: Path, name: str) -> bool:
+    """Whether a name cannot be given to a result without touching something else."""
+    path = place / name
+    folders = [one for one in path.parents if one.is_relative_to(place) and one != place]
+    return os.path.lexists(path) or any(os.path.lexists(p) and not p.is_dir() for p in folders)
+
+
+def _remove(place: Path, names: Iterable[str]) -> None:
+    """Remove files of ours, and the folders that are empty then."""
+    for name in names:
+        path = place / name
+        if not Path(os.path.realpath(path.parent)).is_relative_to(place):
+            continue  # a link put there since leads elsewhere
+        if path.is_file() or path.is_symlink():
+            path.unlink(missing_ok=True)
+        for folder in path.parents:
+            if folder == place:
+                break
+            with suppress(OSError):  # not empty: something of others is in it
+                folder.rmdir()
+
+
+def _renamed(part: Path, place: Path) -> bool:
+    """Whether the finished folder has its name, where there is none of that name."""
     try:
-        temporary.replace(target)
+        part.rename(place)
     except OSError:
-        if old is not None:
-            old.replace(target)
-        raise
-    if old is not None:
-        shutil.rmtree(old, ignore_errors=True)
+        if not place.is_dir():
+            raise
+        return False
+    return True
+
+
+def _make_folders(folder: Path) -> list[Path]:
+    """Make a folder with those that it lies in; the ones that were not there."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    """Remove folders, the innermost first, that nothing was put into."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()

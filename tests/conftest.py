@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,15 @@ llvm.select_library()
 REPOSITORY = Path(__file__).parent.parent
 REAL_DATA = REPOSITORY.parent / "shared" / "data"
 REFERENCE_DATA = REPOSITORY.parent / "shared" / "reference"
+
+
+def default_signals() -> None:
+    """For `preexec_fn`: a child that signals can end, also where this suite ignores them.
+
+    So it is under `make test &` and `nohup`; a child inherits what is ignored.
+    """
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        signal.signal(getattr(signal, name), signal.SIG_DFL)
 
 
 @pytest.fixture(scope="session")

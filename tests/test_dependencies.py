@@ -15,7 +15,7 @@ REPOSITORY = Path(__file__).parent.parent
 PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
 PEERS = {"pyradiance", "pyenergyplus-lbnl", "pywincalc"}
 RUN_BY_NAME = {"ruff"}  # the Makefile's
-# Loaded by another package: where it is asked for, a call of this name is seen in our source
+# Loaded by another package, where our source has this attribute
 LOADED_BY = {"pyarrow": "to_parquet"}  # pandas
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
 
@@ -38,7 +38,7 @@ def _modules() -> dict[str, set[str]]:
 
 
 def _used(folders: Iterable[str]) -> set[str]:
-    """Modules imported or looked for, and with a dot what is called, in all Python files."""
+    """Modules imported or looked for, and with a dot all attributes, in all Python files."""
     used: set[str] = set()
     for folder in folders:
         for path in (REPOSITORY / folder).rglob("*.py"):
@@ -47,9 +47,10 @@ def _used(folders: Iterable[str]) -> set[str]:
                     used |= {alias.name.partition(".")[0] for alias in node.names}
                 elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                     used.add(node.module.partition(".")[0])
+                elif isinstance(node, ast.Attribute):
+                    used.add(f".{node.attr}")
                 elif isinstance(node, ast.Call):
                     called = ast.unparse(node.func).rpartition(".")[2]
-                    used.add(f".{called}")
                     looked_for = called in {"find_spec", "importorskip"} and node.args
                     if looked_for and isinstance(node.args[0], ast.Constant):
                         used.add(str(node.args[0].value).partition(".")[0])

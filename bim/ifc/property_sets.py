@@ -8,7 +8,7 @@ from pathlib import Path
 import ifcopenshell
 import ifcopenshell.guid
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing
 
 Entity = ifcopenshell.entity_instance
 
@@ -64,9 +64,8 @@ def _take_off(model: ifcopenshell.file, target: Entity, name: str) -> None:
 
 def save(model: ifcopenshell.file, out: str | Path) -> None:
     """Write the model; a file of that name is replaced only once the new one is whole."""
-    part = Path(out).with_name(Path(out).name + ".part")
-    try:
-        model.write(str(part))
-        part.replace(out)
-    except (OSError, RuntimeError) as error:
-        raise DataError(f"cannot be written: {error}", file=out) from None
+    with replacing(out) as part:
+        try:
+            model.write(str(part))
+        except RuntimeError as error:  # no reason is given
+            raise RuntimeError(f"IfcOpenShell cannot write {out}: {error}") from error

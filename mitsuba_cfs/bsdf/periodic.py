@@ -13,6 +13,8 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.files import replacing
+
 
 @dataclass(frozen=True)
 class SlatMaterial:
@@ -160,7 +162,7 @@ def write_radiance(
     """
     triangles, material = layer.tile(columns, rows)
     triangles = triangles - [0.0, 0.0, layer.depth_range[0]]
-    with open(path, "w", encoding="ascii") as file:
+    with replacing(path) as part, open(part, "w", encoding="ascii") as file:
         file.writelines(_radiance_lines(layer, triangles * [-1, 1, -1], material))
 
 

@@ -12,6 +12,7 @@ from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_text import format_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree
+from mitsuba_cfs.files import replacing
 
 HEADER = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -32,7 +33,7 @@ SPECTRA = {
 
 def write_bsdf_xml(bsdf: BsdfFile, path: str | PathLike[str], *, digits: int = 7) -> None:
     """Write `bsdf` as an LBNL BSDF XML file, values with `digits` significant digits."""
-    with open(path, "w", encoding="utf-8") as file:
+    with replacing(path) as part, open(part, "w", encoding="utf-8") as file:
         file.writelines(_lines(bsdf, digits))
 
 

@@ -6,6 +6,7 @@ taken in batches, so that each batch is one product of matrices; only the rating
 
 from __future__ import annotations
 
+import logging
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import View
@@ -25,6 +27,9 @@ from mitsuba_cfs.progress import Progress, silent
 BATCH_BYTES = 128 * 2**20  # of the pictures of a batch of hours
 ROW_BYTES = 16 * 2**20  # of a matrix that lies on disk, read at a time
 FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance")
+MAGIC = b"\x93NUMPY"  # first bytes of a file of ratings
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,10 +208,17 @@ def _begin(keep: Path | None, hours: int) -> NDArray[np.float64]:
     try:
         table = np.load(keep, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
-        raise DataError(f"cannot be read: {error}", file=keep) from error
+        with open(keep, "rb") as file:
+            start = file.read(len(MAGIC))
+        if start.strip(b"\0") and start != MAGIC[: len(start)]:
+            raise DataError("is no file of ratings", file=keep) from error
+        log.warning("%s: ignored, it is cut off or damaged; the hours are rated again", keep)
+        keep.unlink()
+        return empty
     if table.shape != empty.shape:
         raise DataError(
-            f"ratings of shape {table.shape}, expected {empty.shape}: of another year", file=keep
+            f"ratings of shape {table.shape}, expected {empty.shape}: of another year (delete it)",
+            file=keep,
         )
     return table
 
@@ -216,7 +228,5 @@ def _save(keep: Path | None, table: NDArray[np.float64]) -> None:
     if keep is None:
         return
     keep.parent.mkdir(parents=True, exist_ok=True)
-    part = keep.with_suffix(".part")
-    with part.open("wb") as file:
+    with replacing(keep) as part, open(part, "wb") as file:
         np.save(file, table)
-    os.replace(part, keep)

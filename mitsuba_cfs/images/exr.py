@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from os import PathLike
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing
 from mitsuba_cfs.images.view import View, format_view, parse_view
 
 
@@ -35,15 +35,8 @@ def write_exr(
         about["VIEW"] = format_view(view)
     if comment:
         about["COMMENT"] = comment
-    path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.touch()  # tells why not, if it cannot be
+    with replacing(path) as part:
         bitmap.write(str(part), mi.Bitmap.FileFormat.OpenEXR)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise DataError(f"cannot be written ({error.strerror})", file=path) from None
 
 
 def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | None]:

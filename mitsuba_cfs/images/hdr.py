@@ -10,7 +10,6 @@ Source: Radiance file format notes and the behaviour of `getinfo`, `pvalue`, `vw
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.images import rgbe as codec
 from mitsuba_cfs.images.view import View, format_view, view_changes
 
@@ -198,15 +198,4 @@ def write_hdr(
     written = {name: key for key, name in FORMATS.items()}[colours]
     lines += [f"FORMAT={written}", "", f"-Y {height} +X {width}", ""]
     body = codec.encode_scanlines(codec.rgbe_from_pixels(pixels * exposure))
-    _replace(Path(path), "\n".join(lines).encode("latin-1", "replace") + body)
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """Write beside the target and rename, so that no half picture is ever seen."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise DataError(f"cannot be written ({error.strerror})", file=path) from None
+    write_bytes(path, "\n".join(lines).encode("latin-1", "replace") + body)

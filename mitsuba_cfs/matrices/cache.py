@@ -10,7 +10,6 @@ import hashlib
 import logging
 import os
 import sys
-import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass, fields, is_dataclass
@@ -20,6 +19,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing
 
 VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
@@ -41,10 +43,16 @@ class State:
 
 
 def default_folder() -> Path:
-    """`$CFS_CACHE`, or the folder `cfs` in the user's cache folder of this platform."""
+    """`$CFS_CACHE`, or the folder `cfs` in the user's cache folder of this platform.
+
+    Raises: `DataError` where $CFS_CACHE names a file.
+    """
     chosen = os.environ.get(VARIABLE)
     if chosen:
-        return Path(chosen).expanduser()
+        folder = Path(chosen).expanduser()
+        if any(one.exists() and not one.is_dir() for one in (folder, *folder.parents)):
+            raise DataError("is a file; the cache needs a folder", file=folder, field=VARIABLE)
+        return folder
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
@@ -123,15 +131,11 @@ class CacheEntry:
 
         A folder that cannot be written to costs a warning, not the run.
         """
-        part = None
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(
-                dir=self.path.parent, prefix=self.path.stem, suffix=".part", delete=False
-            ) as file:
-                part = Path(file.name)
+            with replacing(self.path) as part:
                 np.savez(
-                    file,
+                    part,
                     count=state.count,
                     mean=state.mean,
                     spread=state.spread,
@@ -139,13 +143,10 @@ class CacheEntry:
                     seconds=state.seconds,
                     finished=state.finished,
                 )
-            part.replace(self.path)
             if state.finished:
                 self.cache.trim(keep=self.path)
-        except OSError as error:
-            log.warning("%s: the matrix is not kept: %s", self.path, error.strerror or error)
-            if part is not None:
-                part.unlink(missing_ok=True)
+        except (OSError, DataError) as error:
+            log.warning("the matrix is not kept: %s", error)
 
 
 def digest(*values: object) -> str:

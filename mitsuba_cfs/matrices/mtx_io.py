@@ -5,18 +5,17 @@ A matrix in memory is [rows, columns, components]; Radiance's own have three com
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing
 
 FORMATS = {"ascii": None, "float": np.float32, "double": np.float64}
 LUMINANCE_WEIGHTS = (0.265, 0.670, 0.065)  # R, G, B of Radiance; 179 lm/W makes it luminance
@@ -109,15 +108,9 @@ def write_matrix(
     if FORMATS[format] is not None:
         head.append(f"BigEndian={int(sys.byteorder == 'big')}")
     text = "\n".join([MAGIC.decode(), *head, f"FORMAT={format}", "", ""])
-    part = Path(f"{os.fspath(path)}.part")
-    try:
-        with open(part, "wb") as file:
-            file.write(text.encode("utf-8"))
-            _write_values(file, values, FORMATS[format])
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise DataError(f"cannot be written: {error.strerror}", file=path) from error
+    with replacing(path) as part, open(part, "wb") as file:
+        file.write(text.encode("utf-8"))
+        _write_values(file, values, FORMATS[format])
 
 
 def luminance(

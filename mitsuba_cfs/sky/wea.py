@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.sky import wea_table, weather_table
 from mitsuba_cfs.sky.sun import direct_normal_from_global, sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -62,7 +61,4 @@ def write_wea(weather: Weather, path: str | PathLike[str]) -> None:
             t.month, t.day, hour, weather.direct_normal, weather.diffuse_horizontal, strict=True
         )
     ]
-    try:
-        Path(path).write_text(head + "".join(lines), encoding="ascii", errors="replace")
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", file=path) from error
+    write_bytes(path, (head + "".join(lines)).encode("ascii", "replace"))

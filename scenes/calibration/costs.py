@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import platform
-import tempfile
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_text
 from mitsuba_cfs.matrices.cache import default_folder
 from scenes.cost.measure import Cost
 
@@ -75,11 +75,7 @@ class Calibration:
         """Keep it; the file is the old one or the new one at any time."""
         table = asdict(self)
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".json")
-        with open(handle, "w", encoding="utf-8") as file:
-            json.dump(table, file, indent=2)
-            file.write("\n")
-        os.replace(part, path)
+        write_text(path, json.dumps(table, indent=2) + "\n")
 
     @classmethod
     def of(cls, table: dict) -> Calibration:

@@ -21,6 +21,7 @@ def command(only: tuple[str, ...], names_only: bool, json_file: Path | None) -> 
     ratio = (their time x their error^2) / (our time x our error^2), first in elapsed time, then in
     processor time.  Kernels are compiled before the clock starts.
     """
+    from mitsuba_cfs.files import check_file, write_text
     from scenes.benchmarks.harness import PeerMissing, benchmarks
     from scenes.commands.progress_bar import ProgressBar
 
@@ -31,8 +32,8 @@ def command(only: tuple[str, ...], names_only: bool, json_file: Path | None) -> 
     if names_only:
         click.echo("\n".join(found))
         return
-    if json_file is not None and not json_file.absolute().parent.is_dir():
-        raise click.UsageError(f"--json {json_file}: no such folder")
+    if json_file is not None:
+        check_file(json_file, field="--json")
     records = []
     for name in only or found:
         try:
@@ -44,7 +45,7 @@ def command(only: tuple[str, ...], names_only: bool, json_file: Path | None) -> 
         records.append(result.record())
         click.echo(_table(result))
         if json_file is not None:  # after each, so that an interrupted run keeps what it has
-            json_file.write_text(json.dumps(records, indent=1))
+            write_text(json_file, json.dumps(records, indent=1) + "\n")
     if not records:
         raise click.ClickException("no benchmark could run")
 

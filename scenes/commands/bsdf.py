@@ -14,6 +14,7 @@ from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, replacing, write_table
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
@@ -179,13 +180,15 @@ def plot(file: Path, incident: tuple[float, float], band: str, output: Path) -> 
         raise DataError(f"has no {band} band", file=file)
     direction = _from_radiance(np.array([[*incident, 0.0, 0.0]]))[0][0]
     title = f"{file.name}, {band}, light from theta {incident[0]:g}°, phi {incident[1]:g}°"
+    check_file(output, inputs=[file])
     figure = plot_hemispheres(data.bands[band], direction, title)
     known = figure.canvas.get_supported_filetypes()
     if output.suffix.lstrip(".").lower() not in known:
         raise click.UsageError(
             f"--out {output}: expected a file name that ends in .png, .pdf, .svg"
         )
-    figure.savefig(output)
+    with replacing(output) as part:
+        figure.savefig(part)
 
 
 @command.command()
@@ -223,8 +226,7 @@ def generate(output: Path, **options) -> None:
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
 
-    if not output.absolute().parent.is_dir():
-        raise click.UsageError(f"--out {output}: no such folder")
+    check_file(output, inputs=[options["geometry"]])
     with ProgressBar() as progress:
         file, exact = generated_file(progress=progress, **options)
     write_bsdf_xml(file, output)
@@ -244,12 +246,12 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, outp
     from scenes.bsdf_combination import combined_file
 
     for option, path in (("--out", output), ("--absorptances", absorptances)):
-        if path is not None and not path.absolute().parent.is_dir():
-            raise click.UsageError(f"{option} {path}: no such folder")
+        if path is not None:
+            check_file(path, field=option, inputs=layers)
     file, table = combined_file(layers, name)
     write_bsdf_xml(file, output)
     if absorptances is not None:
-        table.to_csv(absorptances, index=False, float_format="%.6g")
+        write_table(table, absorptances, index=False, float_format="%.6g")
     for band in file.bands:
         tau = direct_hemispherical(file.band(band), "transmission_front", [0.0, 0.0, 1.0])[0]
         click.echo(f"{output}: {band}: transmittance at normal incidence {tau:.4f}")

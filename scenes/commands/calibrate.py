@@ -22,10 +22,14 @@ def command(size: int, out: Path | None) -> None:
     A room of 3.65 x 4.60 x 3.00 m behind the demo's blind: seconds for each scene, each system in
     it and each time step.  Let nothing else run meanwhile.
     """
+    from mitsuba_cfs.files import check_file
     from scenes.calibration.costs import calibration_file
     from scenes.calibration.measure import calibrated
     from scenes.commands.progress_bar import ProgressBar
 
+    target = out or calibration_file()
+    if out is not None:
+        check_file(out)
     with ProgressBar() as progress:
         found = calibrated(size, progress=progress)
     click.echo(f"{found.machine}; pictures of {found.picture_size} x {found.picture_size} pixels")
@@ -35,6 +39,5 @@ def command(size: int, out: Path | None) -> None:
             f"{c.method:14} {c.metric:12} {c.per_scene:10.2f} {c.per_system:11.2f} "
             f"{c.per_step:10.4f}"
         )
-    target = out or calibration_file()
     found.write(target)
     click.echo(f"kept: {target}")

@@ -18,4 +18,4 @@ from scenes.job.options import JobOptions
 )  # fmt: skip
 def command(out: Path) -> None:
     """Run the main job on a two-room office with exterior venetian blinds in Chicago."""
-    run_to_folder(JobOptions(OFFICE, WEATHER, VENETIAN_BLIND), out)
+    run_to_folder(JobOptions(OFFICE, WEATHER, VENETIAN_BLIND), out, "demo")

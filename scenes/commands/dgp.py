@@ -75,19 +75,23 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     start, end = chosen["occupied"]
     if start >= end:
         raise click.UsageError(f"--occupied {start} {end}: expected the first hour before the last")
+    from scenes.result_folder import ResultFolder
     from scenes.year_of_glare.files import read_files
 
     options = YearOptions(building or OFFICE, **chosen)
-    files = read_files(options)  # before anything heavy is loaded
+    files = (building, chosen["weather"], chosen["system"], *map(Path, chosen["views"]))
+    folder = ResultFolder(out, "dgp", inputs=files)
+    read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare.year import rate_views, read_year
 
-    kept = outputs.kept_folder(out)
     with ProgressBar() as progress:
-        year = read_year(options, progress, files)
-        rows = [outputs.write_view(year, v, out) for v in rate_views(year, kept, progress)]
-    table = outputs.write_summary(year, rows, out)
+        year = read_year(options, progress, read)
+        views = rate_views(year, folder.kept(outputs.KEPT), progress)
+        with folder.replaced() as place:
+            rows = [outputs.write_view(year, rated, place) for rated in views]
+            table = outputs.write_summary(year, rows, place)
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
         f"{year.room}: {len(table)} view(s), {len(year.lit)} hours with the sun up.  Highest "

@@ -9,8 +9,10 @@ import click
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, write_table
 from scenes.commands import glare_flags
 from scenes.commands.glare_flags import Request
+from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
     from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
@@ -50,7 +52,7 @@ def command(words: tuple[str, ...]) -> None:
         click.echo(VERSION)
         return
     paths = pictures(request.paths or [Path("/dev/stdin")])
-    _check_files(request)
+    _check_files(request, paths)
     options = glare_flags.options(request)
     from mitsuba_cfs.glare.glare_view import GlareView
     from mitsuba_cfs.images.hdr import read_hdr
@@ -68,6 +70,22 @@ def command(words: tuple[str, ...]) -> None:
         _write_table(table, rows)
 
 
+def _check_files(request: Request, paths: list[Path]) -> None:
+    """Refuse, before anything is read, what could not be read or written later."""
+    for flag in ("-A", "-vf"):
+        path = request.value(flag)
+        if path is not None and not path.is_file():
+            raise DataError("no such file", file=path, field=flag)
+    for flag in ("-c", "--csv", "--png"):
+        target = request.value(flag)
+        if target is None:
+            continue
+        if flag == "--png" or (flag == "-c" and (len(paths) > 1 or target.is_dir())):
+            ResultFolder(target, "glare", adding=True, field=flag)
+        else:
+            check_file(target, field=flag, inputs=paths)
+
+
 def pictures(paths: list[Path]) -> list[Path]:
     """The picture files that the paths stand for, folders as what is in them."""
     found: list[Path] = []
@@ -82,14 +100,6 @@ def pictures(paths: list[Path]) -> list[Path]:
         else:
             raise DataError("no such file", file=path)
     return found
-
-
-def _check_files(request: Request) -> None:
-    """Refuse what could not be read once the pictures are rated."""
-    for flag in ("-A", "-vf"):
-        path = request.value(flag)
-        if path is not None and not path.is_file():
-            raise DataError("no such file", file=path, field=flag)
 
 
 def _one(
@@ -253,14 +263,17 @@ def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, 
         from mitsuba_cfs.images.hdr import write_hdr
         from scenes.pictures import check_radiance
 
-        target = check / f"{path.stem}_check.hdr" if several or check.is_dir() else check
-        if several:
-            check.mkdir(parents=True, exist_ok=True)
         uniform, blue = request.given.get("-u"), "-T" in request.given
         pixels = check_radiance(result, uniform, show_task=blue)
-        write_hdr(target, pixels, result.geometry.view, comments=(VERSION,))
+        view, about = result.geometry.view, (VERSION,)
+        if several or check.is_dir():
+            with ResultFolder(check, "glare", adding=True, field="-c").replaced() as place:
+                write_hdr(place / f"{path.stem}_check.hdr", pixels, view, comments=about)
+        else:
+            write_hdr(check, pixels, view, comments=about)
     if (folder := request.value("--png")) is not None:
-        _write_png(folder, path.stem, picture, result, request.given.get("--scale"))
+        with ResultFolder(folder, "glare", adding=True, field="--png").replaced() as place:
+            _write_png(place, path.stem, picture, result, request.given.get("--scale"))
 
 
 def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, limits) -> None:
@@ -268,7 +281,6 @@ def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, l
     from mitsuba_cfs.glare.glare_view import in_picture_order
     from scenes import pictures as drawn
 
-    folder.mkdir(parents=True, exist_ok=True)
     title = f"{name}   DGP {result.dgp:.3f} ({glare_class(result.dgp)}), E_v {result.Ev:,.0f} lx"
     valid = in_picture_order(result.geometry.valid)
     colour = picture.pixels if picture.colours == "rgb" else picture.luminance
@@ -287,7 +299,4 @@ def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, l
 def _write_table(path: Path, rows: list[dict]) -> None:
     import pandas as pd
 
-    try:
-        pd.DataFrame(rows).to_csv(path, index=False, float_format="%.6g")
-    except OSError as error:
-        raise DataError(f"cannot be written ({error.strerror})", file=path) from None
+    write_table(pd.DataFrame(rows), path, index=False, float_format="%.6g")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,12 +11,16 @@ from typing import TYPE_CHECKING
 import click
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, write_table, write_text
 from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from bim.model import Building, Space
+
+SUFFIXES = {"--radiance": (".rad", ".pts", ".vf"), "--mitsuba": (".xml", ".ply")}
 
 
 @click.group()
@@ -27,6 +33,8 @@ def command() -> None:
 @click.option("--csv", "table", type=click.Path(path_type=Path), help="Also write the problems.")
 def check(building: Path, table: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
+    if table is not None:
+        check_file(table, field="--csv", inputs=[building])
     from rich.console import Console
 
     from bim.read_ifc import read_ifc
@@ -46,7 +54,8 @@ def check(building: Path, table: Path | None) -> None:
         import pandas as pd
 
         rows = [(p.where, p.what, p.consequence) for p in read.problems]
-        pd.DataFrame(rows, columns=["where", "what", "consequence"]).to_csv(table, index=False)
+        columns = ["where", "what", "consequence"]
+        write_table(pd.DataFrame(rows, columns=columns), table, index=False)
 
 
 @command.command()
@@ -78,6 +87,7 @@ def attach(
     """Write BSDF, angular g-values and U into an IFC file's windows."""
     if bsdf is None and g_table is None and u_value is None:
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
+    check_file(out, inputs=[bsdf, g_table])  # the building may be written back
     from bim.fenestration import ShadingState, read_g_table
     from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 
@@ -122,27 +132,41 @@ def export(
     """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing."""
     if radiance is None and mitsuba is None and epjson is None and gltf is None:
         raise click.UsageError("nothing to write: give --radiance, --mitsuba, --epjson or --gltf")
+    for field, path in (("--epjson", epjson), ("--gltf", gltf)):
+        if path is not None:
+            check_file(path, field=field, inputs=[building])
+    formats: dict[Path, list[str]] = {}
+    for option, parent in (("--radiance", radiance), ("--mitsuba", mitsuba)):
+        if parent is not None:
+            formats.setdefault(parent, []).append(option)
+    folders = {
+        parent: ResultFolder(parent, "ifc export", adding=True, field=options[0])
+        for parent, options in formats.items()
+    }
     from bim.read_ifc import read_ifc
     from bim.to_energyplus import write_epjson
     from bim.to_gltf import write_gltf
     from bim.to_mitsuba import write_mitsuba
-    from bim.to_radiance import identifier, write_radiance
+    from bim.to_radiance import write_radiance
     from scenes.commands.progress_bar import ProgressBar
 
+    writers = {"--radiance": write_radiance, "--mitsuba": write_mitsuba}
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     spaces = _chosen(read, names, building)
-    for parent, write in ((radiance, write_radiance), (mitsuba, write_mitsuba)):
-        for space in spaces if parent is not None else ():
-            if not space.windows:
-                continue
-            folder = parent / identifier(space.name)
-            try:
-                write(space, read, folder)
-            except ValueError as error:  # a void too low for a work plane or an eye
-                click.echo(f"{space.name}: left out: {error}", err=True)
-                continue
-            click.echo(folder)
+    for parent, folder in folders.items():
+        written: list[str] = []
+        kinds = {suffix for option in formats[parent] for suffix in SUFFIXES[option]}
+
+        def of_these(name: str, written=written, kinds=kinds) -> bool:
+            return name.partition("/")[0] in written and Path(name).suffix in kinds
+
+        with folder.replaced(gone=of_these) as place:
+            written += _export_rooms(
+                read, spaces, place, [writers[option] for option in formats[parent]]
+            )
+        for name in written:
+            click.echo(parent / name)
     if epjson is not None:
         write_epjson(read, epjson, spaces=spaces)
         click.echo(epjson)
@@ -151,11 +175,36 @@ def export(
         click.echo(gltf)
 
 
+def _export_rooms(
+    building: Building, spaces: Sequence[Space], place: Path, writers: Sequence[Callable]
+) -> list[str]:
+    """Write a folder for each room with a window; their names."""
+    from bim.to_radiance import identifier
+
+    written = []
+    for space in spaces:
+        name = identifier(space.name)
+        name = f"{name}_{identifier(space.guid)}" if (place / name).exists() else name
+        try:
+            for write in writers if space.windows else ():
+                write(space, building, place / name)
+        except ValueError as error:  # a void too low for a work plane or an eye
+            if isinstance(error, DataError):
+                raise
+            click.echo(f"{space.name}: left out: {error}", err=True)
+            shutil.rmtree(place / name, ignore_errors=True)
+            continue
+        written += [name] if space.windows else []
+    return written
+
+
 @command.command()
 @click.argument("files", type=FILE, nargs=-1, required=True, metavar="BUILDING.ifc...")
 @click.option("--markdown", "out", type=click.Path(path_type=Path), help="Also write the table.")
 def survey(files: tuple[Path, ...], out: Path | None) -> None:
     """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
+    if out is not None:
+        check_file(out, field="--markdown", inputs=files)
     from bim.ifc.survey import markdown
     from bim.ifc.survey import survey as surveyed
     from scenes.commands.progress_bar import ProgressBar
@@ -166,7 +215,7 @@ def survey(files: tuple[Path, ...], out: Path | None) -> None:
             rows.append(row)
             progress("files", len(rows) / len(files))
             if out is not None:  # what is done is kept if the rest is broken off
-                out.write_text(markdown(rows) + "\n", encoding="utf-8")
+                write_text(out, markdown(rows) + "\n")
     click.echo(markdown(rows))
 
 

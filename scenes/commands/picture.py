@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from mitsuba_cfs.files import check_file
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.picture_options import SUFFIXES, PictureOptions
@@ -49,8 +50,7 @@ def command(building: Path | None, files: tuple[Path, ...], tone: bool, **chosen
     for file in files:
         if file.suffix not in SUFFIXES:
             raise click.UsageError(f"--out {file}: expected one of {', '.join(SUFFIXES)}")
-        if not file.absolute().parent.is_dir():
-            raise click.UsageError(f"--out {file}: no such folder")
+        check_file(file)
     from scenes.picture_files import read_files
 
     start = time.perf_counter()

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from scenes.commands.parameters import FILE, IFC_FILE
+
+if TYPE_CHECKING:
+    from scenes.result_folder import ResultFolder
 
 
 @click.command()
@@ -27,11 +31,11 @@ def command(
     """
     from mitsuba_cfs.sky.weather import read_epw
     from scenes.photovoltaics.study_file import read_pv_study
-    from scenes.result_folder import check_folder
+    from scenes.result_folder import ResultFolder
 
     study = read_pv_study(study_file)
     climate = read_epw(weather)
-    check_folder(out)
+    folder = ResultFolder(out, "pv", inputs=(building, weather, study_file))
     # all that is small is read: what is heavy is loaded now
     from mitsuba_cfs import variants
     from mitsuba_cfs.matrices.cache import MatrixCache
@@ -50,7 +54,7 @@ def command(
             "study": study.model_dump(mode="json"), "seed": seed,
             "relative_standard_error_of_diffuse": result.irradiance.diffuse_error,
         }  # fmt: skip
-        _write(result, record, out)
+        _write(result, record, folder)
         progress("results", 1.0)
     for row in result.yield_table().itertuples():
         click.echo(
@@ -61,26 +65,25 @@ def command(
     click.echo(f"results: {out}")
 
 
-def _write(result, record: dict, out: Path) -> None:
+def _write(result, record: dict, results: ResultFolder) -> None:
     """Tables, hourly power, pictures."""
     import pandas as pd
 
+    from mitsuba_cfs.files import write_table, write_text
     from scenes.photovoltaics.picture import view_directions, write_irradiation_picture
-    from scenes.result_folder import MARK, result_folder
 
     times = result.weather.times[result.irradiance.steps]
     power = pd.DataFrame(
         {one.name: one.alternating_current for one in result.yields},
         index=pd.Index(times, name="time"),
     )
-    with result_folder(out) as folder:
-        result.module_table().round(4).to_csv(folder / "modules.csv", index=False)
-        result.yield_table().round(4).to_csv(folder / "yield.csv", index=False)
-        power.astype("float32").to_parquet(folder / "power_w.parquet")
+    with results.replaced() as folder:
+        write_table(result.module_table().round(4), folder / "modules.csv", index=False)
+        write_table(result.yield_table().round(4), folder / "yield.csv", index=False)
+        write_table(power.astype("float32"), folder / "power_w.parquet")
         problems = [(p.where, p.what, p.consequence) for p in result.problems]
-        pd.DataFrame(problems, columns=["where", "what", "consequence"]).to_csv(
-            folder / "problems.csv", index=False
-        )
+        table = pd.DataFrame(problems, columns=["where", "what", "consequence"])
+        write_table(table, folder / "problems.csv", index=False)
         for name, towards in view_directions(result):
             write_irradiation_picture(folder / f"irradiation_{name}.png", result, towards)
-        (folder / MARK).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")

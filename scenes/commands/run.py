@@ -110,12 +110,16 @@ def command(
     )
 
 
-def run_to_folder(options: JobOptions, out: Path) -> None:
+def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     """Run the job with a progress bar, write its files and say what came out."""
+    from mitsuba_cfs.matrices.cache import default_folder
     from scenes.job.files import read_files
-    from scenes.result_folder import check_folder
+    from scenes.result_folder import ResultFolder
 
-    check_folder(out)
+    inputs = (options.building, options.weather, options.system, options.operation)
+    folder = ResultFolder(out, command, inputs=inputs)
+    if options.cache:
+        default_folder()  # or one line that it cannot be one
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.job.outputs import write_results
@@ -125,7 +129,7 @@ def run_to_folder(options: JobOptions, out: Path) -> None:
     with ProgressBar() as progress:
         result = run_job(options, progress, files)
         progress("results", 0.0)
-        write_results(result, out, write_report)
+        write_results(result, folder, write_report)
         progress("results", 1.0)
     for room in result.spaces:
         click.echo(summary_line(room))

@@ -11,6 +11,7 @@ import click
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, write_table
 from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
 from mitsuba_cfs.sky.cie import KINDS
 from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_MODELS, SUN_PATCHES
@@ -96,6 +97,7 @@ def matrix(
 
     Patch 0 is the ground; the others are in the order of gendaymtx, whose options these are.
     """
+    check_file(out, field="OUT", inputs=[weather])
     from mitsuba_cfs.sky.matrix import sun_matrix
     from scenes.commands.progress_bar import ProgressBar
 
@@ -148,6 +150,7 @@ def positions(weather: Path, out: Path, sun_model: str) -> None:
     Middle of the interval, altitude and azimuth (clockwise from north) in degrees, unit vector
     (x east, y north, z up), and the irradiances.
     """
+    check_file(out, field="OUT", inputs=[weather])
     import pandas as pd
 
     from mitsuba_cfs.sky import sun as sun_positions
@@ -166,10 +169,7 @@ def positions(weather: Path, out: Path, sun_model: str) -> None:
             "diffuse_horizontal": hours.diffuse_horizontal,
         }
     )
-    try:
-        table.to_csv(out, index=False, float_format="%.6f")
-    except OSError as error:
-        raise DataError(f"cannot be written: {error.strerror}", file=out) from error
+    write_table(table, out, index=False, float_format="%.6f")
     click.echo(f"{out}: {len(table)} time steps, {int((towards[:, 2] > 0).sum())} with the sun up")
 
 
@@ -178,6 +178,7 @@ def positions(weather: Path, out: Path, sun_model: str) -> None:
 @out_argument
 def wea(weather: Path, out: Path) -> None:
     """Write the irradiances of WEATHER (EPW) as a Radiance WEA file OUT."""
+    check_file(out, field="OUT", inputs=[weather])
     from mitsuba_cfs.sky.wea import write_wea
 
     hours = read_weather(weather)
@@ -210,6 +211,7 @@ def measured(
     TABLE is a CSV file with the columns time, global_horizontal and diffuse_horizontal [W/m2];
     direct normal is (global - diffuse)/sin(altitude).
     """
+    check_file(out, field="OUT", inputs=[table])
     from mitsuba_cfs.sky.measured import read_measured
     from mitsuba_cfs.sky.wea import write_wea
 
@@ -247,6 +249,7 @@ def cie(
 
     KIND: overcast, clear, intermediate, uniform, or 1 to 15 of ISO 15469.
     """
+    check_file(out, field="OUT")
     number = int(kind_of_sky) if kind_of_sky.isdecimal() else kind_of_sky
     if number not in (*KINDS, *range(1, 16)):
         raise click.BadParameter(f"expected {', '.join(KINDS)} or 1 to 15", param_hint="KIND")

@@ -40,6 +40,7 @@ def command(
     results: the same command goes on after an interruption, and a longer grid computes only what
     is new.
     """
+    from mitsuba_cfs.files import check_file
     from scenes.study.files import check_files, one_building
     from scenes.study.schedule import check_dask
     from scenes.study.store import Store
@@ -48,7 +49,9 @@ def command(
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, **asked)
+    store = Store(out, inputs=(study, *parsed.files))
     if write_ifc is not None:
+        check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
         one_building(room.building for room in parsed.room)
     if scheduler is not None:
         check_dask()
@@ -56,19 +59,21 @@ def command(
     from scenes.commands.progress_bar import ProgressBar
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
-    from scenes.study.study import run_study
+    from scenes.study.study import run_study, write_study
     from scenes.study.write_ifc import write_study_ifc
     from scenes.study_report import write_study_report
 
     plan = settled(parsed, plan_of(parsed))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
-    store = Store(out)
     with ProgressBar() as progress:
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
             progress=progress, told=_tell,
         )  # fmt: skip
+    nothing = result.failed == len(result.results)
+    report = None if nothing else lambda path: write_study_report(result, path)
+    write_study(parsed, result, store, report)
     click.echo(
         f"{len(result.results)} cases: {result.reused} were there, {result.failed} failed, "
         f"{result.seconds:.0f} s; table: {out / 'results.parquet'}"
@@ -76,9 +81,8 @@ def command(
     if result.clock:
         click.echo(f"auto: {result.clock}")
     failed, total = result.failed, len(result.results)
-    if failed == total:
+    if nothing:
         raise click.ClickException(f"{failed} of {total} cases failed: {result.first_error}")
-    store.write("report.html", lambda path: write_study_report(result, path))
     click.echo(f"report: {out / 'report.html'}")
     if write_ifc is not None:
         for problem in write_study_ifc(result, write_ifc):

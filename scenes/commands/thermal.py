@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from scenes.commands.parameters import FILE
+
+if TYPE_CHECKING:
+    from scenes.result_folder import ResultFolder
 
 
 @click.command()
@@ -21,17 +25,18 @@ def command(study: Path, out: Path) -> None:
     """
     from scenes.heat.files import read_files
     from scenes.heat.study_file import read_study
-    from scenes.result_folder import check_folder
+    from scenes.result_folder import ResultFolder
 
     parsed = read_study(study)
-    check_folder(out)
+    inputs = (study, parsed.weather, parsed.building, *(one.bsdf for one in parsed.system))
+    folder = ResultFolder(out, "thermal", inputs=inputs)
     files = read_files(parsed)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.heat.study import run_study
 
     with ProgressBar() as progress:
         rooms, notes = run_study(parsed, progress, files)
-    _write(rooms, notes, parsed, out)
+    _write(rooms, notes, parsed, folder)
     for room in rooms:
         summary = room.summary
         click.echo(
@@ -45,21 +50,21 @@ def command(study: Path, out: Path) -> None:
     click.echo(f"results: {out}")
 
 
-def _write(rooms, notes: tuple[str, ...], study, out: Path) -> None:
+def _write(rooms, notes: tuple[str, ...], study, results: ResultFolder) -> None:
     """All files of a study."""
     import pandas as pd
 
-    from scenes.result_folder import MARK, result_folder
+    from mitsuba_cfs.files import write_table, write_text
 
-    with result_folder(out) as folder:
+    with results.replaced() as folder:
         for number, room in enumerate(rooms, 1):
             name = "hours.csv" if len(rooms) == 1 else f"hours_{number}.csv"
-            room.hours.round(4).to_csv(folder / name)
+            write_table(room.hours.round(4), folder / name)
         table = pd.DataFrame(
             [{"room": r.name, "floor_m2": r.floor_area} | r.summary for r in rooms]
         )
-        table.round(4).to_csv(folder / "summary.csv", index=False)
+        write_table(table.round(4), folder / "summary.csv", index=False)
         months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
-        months.to_csv(folder / "discomfort_by_month.csv")
+        write_table(months, folder / "discomfort_by_month.csv")
         record = {"study": study.model_dump(mode="json"), "notes": list(notes)}
-        (folder / MARK).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")

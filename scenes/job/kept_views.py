@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from scipy import sparse
 
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing
 from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
@@ -55,13 +57,12 @@ def _read(path: Path, view: View) -> ViewMatrices:
 
 def _write(path: Path, found: ViewMatrices) -> None:
     """Write the matrices; the file is the old one or the new one at any time."""
-    part = None
-    try:
+    # a folder that cannot be written to costs the keeping, not the run
+    with suppress(OSError, DataError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-            part = Path(file.name)
+        with replacing(path) as part:
             np.savez(
-                file,
+                part,
                 pixels=found.pixels,
                 indirect=found.indirect.rows,
                 lit=found.lit.rows,
@@ -72,7 +73,3 @@ def _write(path: Path, found: ViewMatrices) -> None:
                 seen_indptr=found.seen.indptr,
                 seen_shape=np.array(found.seen.shape),
             )
-        part.replace(path)
-    except OSError:  # a folder that cannot be written to costs the keeping, not the run
-        if part is not None:
-            part.unlink(missing_ok=True)

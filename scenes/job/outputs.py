@@ -8,30 +8,31 @@ from pathlib import Path
 
 import pandas as pd
 
+from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from scenes.job.daylight import illuminance_table
 from scenes.job.glare import glare_table
 from scenes.pictures import write_falsecolour
-from scenes.result_folder import MARK, result_folder
+from scenes.result_folder import ResultFolder
 from scenes.results import RunResult, SpaceResult
 
 
-def write_results(result: RunResult, folder: Path, write_report=None) -> None:
-    """Write all files of a run; an earlier result of that name is replaced at the end.
+def write_results(result: RunResult, folder: ResultFolder, write_report=None) -> None:
+    """Write all files of a run; earlier results are replaced at the end.
 
     Args: write_report: `scenes.report.write_report`, or None for no report.
     """
-    with result_folder(folder) as temporary:
+    with folder.replaced() as temporary:
         several = len(result.spaces) > 1
         for room, name in zip(result.spaces, room_names(result), strict=True):
             place = temporary / name if several else temporary
             place.mkdir(exist_ok=True)
             _write_room(result, room, place)
-        _problems(result).to_csv(temporary / "problems.csv", index=False)
+        write_table(_problems(result), temporary / "problems.csv", index=False)
         if write_report is not None:
             write_report(result, temporary / "report.html")
         text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
-        (temporary / MARK).write_text(text + "\n", encoding="utf-8")
+        write_text(temporary / "run.json", text + "\n")
 
 
 def room_names(result: RunResult) -> list[str]:
@@ -45,7 +46,8 @@ def room_names(result: RunResult) -> list[str]:
 
 
 def _write_room(result: RunResult, room: SpaceResult, place: Path) -> None:
-    illuminance_table(room.daylight, result.times).to_parquet(place / "illuminance.parquet")
+    table = illuminance_table(room.daylight, result.times)
+    write_table(table, place / "illuminance.parquet")
     metrics = room.daylight.sensor_metrics.copy()
     metrics["relative_standard_error"] = room.daylight.relative_error
     _csv(metrics, place / "daylight_metrics.csv")
@@ -68,7 +70,7 @@ def _write_room(result: RunResult, room: SpaceResult, place: Path) -> None:
 
 def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:
     """A table with six significant digits, the same in every run."""
-    table.to_csv(path, index=index, float_format="%.6g")
+    write_table(table, path, index=index, float_format="%.6g")
 
 
 def _problems(result: RunResult) -> pd.DataFrame:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bim.planes import area_vectors
 from bim.rays import ray_mesh
+from mitsuba_cfs.files import replacing
 from scenes.figures.scale import ColourScale
 from scenes.photovoltaics.study import PvResult
 
@@ -112,7 +113,8 @@ def write_irradiation_picture(path: Path, result: PvResult, towards: NDArray[np.
     axes.set_title(f"Annual irradiation of the modules, seen from {azimuth:.0f} degrees")
     colours = ScalarMappable(Normalize(scale.low, scale.high), scale.colours)
     figure.colorbar(colours, ax=axes, label="kWh/m² a", fraction=0.025, pad=0.01)
-    figure.savefig(path, bbox_inches="tight")
+    with replacing(path) as part:
+        figure.savefig(part, bbox_inches="tight")
     plt.close(figure)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
+from mitsuba_cfs.files import write_text
 from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d, room_name
@@ -26,7 +27,7 @@ SCRIPTS = ("tables.js", "pointer.js", "viewer.js")
 
 def write_report(result: RunResult, path: Path) -> None:
     """Write the report of a run as one self-contained HTML file."""
-    Path(path).write_text(report_html(result), encoding="utf-8")
+    write_text(path, report_html(result))
 
 
 def report_html(result: RunResult) -> str:

@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_bytes, write_table, write_text
 from mitsuba_cfs.matrices.cache import UNREADABLE
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-MARK = "study.json"  # a folder that holds it is a study's
+from scenes.result_folder import ResultFolder
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,23 +43,19 @@ class CaseResult:
 
 
 class Store:
-    """A study's folder; every file in it is the old one or the new one at any time."""
+    """A study's folder: each finished case is kept at once, tables and report come at the end."""
 
-    def __init__(self, folder: Path) -> None:
-        """Raises: `DataError` for a folder that holds other things or cannot be written to."""
+    def __init__(self, folder: Path, *, inputs: Iterable[Path | None] = ()) -> None:
+        """Raises: `DataError` for a folder that is not a study's or cannot be written to.
+
+        Args: inputs: the study's files; the folder may not be or contain one.
+        """
         self.folder = folder
-        if folder.exists() and not folder.is_dir():
-            raise DataError("is a file; a study needs a folder", file=folder, field="--out")
-        if folder.is_dir() and any(folder.iterdir()) and not (folder / MARK).is_file():
-            message = f"holds other files (and no {MARK} of a study)"
-            raise DataError(message, file=folder, field="--out")
-        try:
-            (folder / "cases").mkdir(parents=True, exist_ok=True)
-            self.write("study.json.probe", lambda path: path.write_text(""))
-            (folder / "study.json.probe").unlink()
-        except OSError as error:
-            message = f"cannot be written: {error.strerror or error}"
-            raise DataError(message, file=folder, field="--out") from error
+        self._results = ResultFolder(folder, "study", inputs=inputs)
+
+    def open(self) -> None:
+        """Make the folder, for cases to be kept in."""
+        self._results.kept("cases")
 
     def load(self, key: str) -> CaseResult | None:
         """The finished case of that key; None where there is none, or none that can be read."""
@@ -78,35 +67,25 @@ class Store:
 
     def save(self, result: CaseResult) -> None:
         """Keep a finished case."""
-        content = result.to_bytes()
-        self.write(f"cases/{result.key}.npz", lambda path: path.write_bytes(content))
+        write_bytes(self._place(result.key), result.to_bytes())
 
-    def write(self, name: str, write: Callable[[Path], object]) -> None:
-        """Make a file by `write(path)` under another name, and give it its own when it is whole."""
-        target = self.folder / name
-        handle, part = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
-        os.close(handle)
-        try:
-            write(Path(part))
-            os.chmod(part, 0o644)
-            os.replace(part, target)
-        except BaseException:
-            Path(part).unlink(missing_ok=True)
-            raise
+    def write(
+        self, rows: Iterable[dict], manifest: dict, report: Callable[[Path], object] | None = None
+    ) -> None:
+        """Write the table of all cases, what the study was made of, and its report.
 
-    def write_tables(self, rows: Iterable[dict]) -> pd.DataFrame:
-        """The table of all cases as results.parquet and results.csv."""
+        Args: report: writes it to a path; without, an earlier report goes: it tells other numbers.
+        """
         import pandas as pd
 
         table = pd.DataFrame(list(rows))
-        self.write("results.parquet", lambda path: table.to_parquet(path, index=False))
-        self.write("results.csv", lambda path: table.to_csv(path, index=False, float_format="%.6g"))
-        return table
-
-    def write_mark(self, manifest: dict) -> None:
-        """What the study was made of."""
-        text = json.dumps(manifest, indent=2, ensure_ascii=False, default=str) + "\n"
-        self.write(MARK, lambda path: path.write_text(text, encoding="utf-8"))
+        text = json.dumps(manifest, indent=2, ensure_ascii=False, default=str)
+        with self._results.replaced() as place:
+            write_table(table, place / "results.parquet", index=False)
+            write_table(table, place / "results.csv", index=False, float_format="%.6g")
+            write_text(place / "study.json", text + "\n")
+            if report is not None:
+                report(place / "report.html")
 
     def _place(self, key: str) -> Path:
         return self.folder / "cases" / f"{key}.npz"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def run_study(
     progress: Progress = silent,
     told: Callable[[Case, CaseResult, int, int], None] | None = None,
 ) -> StudyResult:
-    """Compute what the folder does not have yet, and write the table.
+    """Compute what the folder does not have yet; `write_study` writes what comes of it.
 
     Finished cases are kept one by one: a run that is cut off goes on where it was.
 
@@ -95,7 +96,7 @@ def run_study(
     """
     start = time.monotonic()
     plan = plan or plan_of(study)
-    store.write_mark(manifest(study, plan))
+    store.open()
     cases = {case.key: case for case in plan.cases}
     found = {key: result for key in cases if (result := store.load(key)) is not None}
     reused, total = len(found), len(cases)
@@ -109,9 +110,14 @@ def run_study(
         if told is not None:
             told(cases[result.key], result, len(found), total)
     results = tuple(found[case.key] for case in plan.cases)
-    finished = StudyResult(study.title, plan, results, reused, round(time.monotonic() - start, 3))
-    store.write_tables(finished.rows())
-    return finished
+    return StudyResult(study.title, plan, results, reused, round(time.monotonic() - start, 3))
+
+
+def write_study(
+    study: StudyFile, result: StudyResult, store: Store, report: Callable[[Path], object] | None
+) -> None:
+    """Write table, manifest and report of a study in the place of earlier ones."""
+    store.write(result.rows(), manifest(study, result.plan), report)
 
 
 def described(case: Case, space: Space) -> dict:

@@ -113,6 +113,13 @@ class StudyFile(_Table):
         _unique("methods", self.methods)
         return self
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Every file that the study names."""
+        named = [room.building for room in self.room] + [system.bsdf for system in self.system]
+        named += [climate.weather for climate in self.climate] + [self.operation]
+        return tuple(path for path in named if path is not None)
+
 
 def _unique(key: str, values) -> None:
     seen = set()

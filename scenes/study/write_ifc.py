@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from bim.ifc.results_write import SET_NAME, write_results
 from bim.model import Problem, Space
+from mitsuba_cfs.files import replacing
 from scenes.study.case import Case, Source
 from scenes.study.files import one_building
 from scenes.study.store import CaseResult
@@ -30,9 +29,7 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
         if not result.error
     ]
     problems: dict[tuple[str, str], Problem] = {}
-    handle, part = tempfile.mkstemp(dir=out.absolute().parent, prefix=".", suffix=".ifc")
-    os.close(handle)
-    try:
+    with replacing(out, field="--write-ifc") as part:
         for name, cases in _by_variant(done).items():
             values = {}
             for case, result in cases:
@@ -40,12 +37,7 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
                 values |= _values(space, case, result)
             found = write_results(source, values, part, set_name=f"{SET_NAME}: {name}")
             problems |= {(p.where, p.what): p for p in found}
-            source = Path(part)
-        os.chmod(part, 0o644)
-        os.replace(part, out)
-    except BaseException:
-        Path(part).unlink(missing_ok=True)
-        raise
+            source = part
     return tuple(problems.values())
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
+from mitsuba_cfs.files import write_text
 from scenes.report import page as run_page
 from scenes.report import tables
 from scenes.report.names import glossary
@@ -31,7 +32,7 @@ MOST_CASES = 60  # that have a section of their own: some 200 kB each
 
 def write_study_report(study: StudyResult, path: Path) -> None:
     """Write the report of a study as one self-contained HTML file."""
-    Path(path).write_text(study_report_html(study), encoding="utf-8")
+    write_text(path, study_report_html(study))
 
 
 def study_report_html(study: StudyResult) -> str:

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import replacing, write_table, write_text
 from mitsuba_cfs.glare.classes import (
     CLASSES,
     LIMITS,
@@ -28,7 +28,7 @@ from scenes.figures.carpet import day_grid
 from scenes.pictures import write_check_picture, write_falsecolour
 from scenes.year_of_glare.year import ViewYear, Year, used_dgp
 
-KEPT, MARK = "ratings", "glare_year.json"
+KEPT = "ratings"  # folder of the finished ratings, inside that of the results
 LOWEST, HIGHEST = 0.15, 0.60  # ends of the heat map's scale
 COLOURS = LinearSegmentedColormap.from_list(
     "glare",
@@ -37,27 +37,10 @@ COLOURS = LinearSegmentedColormap.from_list(
 )  # fmt: skip
 
 
-def kept_folder(folder: Path) -> Path:
-    """The folder of finished ratings in a folder of results; both are made."""
-    if folder.exists() and not folder.is_dir():
-        raise DataError("is a file; results need a folder", file=folder, field="--out")
-    strange = folder.is_dir() and any(folder.iterdir()) and not (folder / KEPT).is_dir()
-    if strange:
-        raise DataError(
-            f"holds other files (and no {KEPT} of an earlier run)", file=folder, field="--out"
-        )
-    try:
-        (folder / KEPT).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        message = f"cannot be written: {error.strerror or error}"
-        raise DataError(message, file=folder, field="--out") from error
-    return folder / KEPT
-
-
 def write_view(year: Year, rated: ViewYear, folder: Path) -> dict[str, object]:
     """Write a view's ratings, heat map and pictures; its row of `views.csv`."""
     name = rated.view.name
-    rated.ratings.to_parquet(folder / f"{name}.parquet")
+    write_table(rated.ratings, folder / f"{name}.parquet")
     row = view_row(year, rated)
     write_heat_map(folder / f"{name}_heat_map.png", year, rated)
     for moment, picture in rated.pictures.items():
@@ -125,13 +108,14 @@ def write_heat_map(path: Path, year: Year, rated: ViewYear) -> None:
     bar = figure.colorbar(image, cax=figure.add_axes((0.88, 0.15, 0.02, 0.70)), extend="both")
     bar.set_ticks([0.15, 0.25, *LIMITS, 0.60], labels=["0.15", "0.25", *map(str, LIMITS), "0.60"])
     bar.ax.tick_params(labelsize=8)
-    figure.savefig(path)
+    with replacing(path) as part:
+        figure.savefig(part)
 
 
 def write_summary(year: Year, rows: list[dict[str, object]], folder: Path) -> pd.DataFrame:
     """Write the table of views and what the run was made from; the table."""
     table = pd.DataFrame(rows)
-    table.to_csv(folder / "views.csv", index=False)
+    write_table(table, folder / "views.csv", index=False)
     options = year.options
     manifest = {
         "room": year.room,
@@ -140,7 +124,7 @@ def write_summary(year: Year, rows: list[dict[str, object]], folder: Path) -> pd
         "hours_with_sun": len(year.lit),
         "version": metadata.version("mitsuba-cfs"),
     }
-    (folder / MARK).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+    write_text(folder / "glare_year.json", json.dumps(manifest, indent=2) + "\n")
     return table
 
 

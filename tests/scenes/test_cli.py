@@ -17,6 +17,7 @@ import pytest
 from mitsuba_cfs.errors import DataError, VariantError
 from scenes import cli
 from scenes.commands.progress_bar import ProgressBar
+from tests.conftest import default_signals
 from thermal.errors import ThermalInputError
 
 
@@ -167,6 +168,7 @@ def test_interrupt_from_the_keyboard_ends_quietly() -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=default_signals,
     )
     assert process.stdout is not None
     assert process.stdout.readline().strip() == "ready"

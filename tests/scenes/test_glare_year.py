@@ -36,8 +36,9 @@ def test_views_are_rated_and_written_and_a_second_run_takes_them_up(year, tmp_pa
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare import year as module
 
-    kept = outputs.kept_folder(tmp_path / "out")
-    folder = kept.parent
+    folder = tmp_path / "out"
+    kept = folder / outputs.KEPT
+    kept.mkdir(parents=True)
     found = list(module.rate_views(year, kept))
     rows = [outputs.write_view(year, each, folder) for each in found]
     table = outputs.write_summary(year, rows, folder)

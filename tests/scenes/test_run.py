@@ -39,7 +39,8 @@ def results(tmp_path_factory) -> Path:
 
 def test_files_of_a_run(results):
     assert {path.name for path in results.iterdir()} == {
-        "report.html", "run.json", "problems.csv", "illuminance.parquet", "daylight_metrics.csv",
+        "report.html", "run.json", "cfs-results.json", "problems.csv",
+        "illuminance.parquet", "daylight_metrics.csv",
         "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv",
         "view_06-21_12h.hdr", "view_06-21_12h.png",
     }  # fmt: skip

@@ -22,7 +22,7 @@ from scenes.study.schedule import computed
 from scenes.study.store import CaseResult, Store
 from scenes.study.study import run_study
 from scenes.study.study_file import read_study
-from tests.conftest import REPOSITORY
+from tests.conftest import REPOSITORY, default_signals
 from tests.scenes.study_files import BOX, CLIMATE, FEW_RAYS, SYSTEM, study_file
 from tests.scenes.study_noted import noted
 
@@ -249,8 +249,9 @@ def test_an_interrupted_study_goes_on(tmp_path):
     path.write_text(text)
     command = [sys.executable, "-c", code, str(path), "--out", str(tmp_path / "out")]
     process = subprocess.Popen(
-        command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+        command, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=default_signals,
+    )  # fmt: skip
     cases = tmp_path / "out" / "cases"
 
     def finished() -> list[Path]:  # a case being written has another name

@@ -140,7 +140,7 @@ def test_faults(epw, tmp_path):
         cfs_sky("matrix", tmp_path / "nowhere.epw", out)
     with pytest.raises(DataError, match="no illuminance"):
         cfs_sky("matrix", epw, out, "--measured")
-    with pytest.raises(DataError, match="cannot be written"):
+    with pytest.raises(DataError, match="no such folder"):
         cfs_sky("matrix", epw, tmp_path / "no" / "x.smx")
     assert cfs_sky("matrix", epw, out, "-m", "3").exit_code == 2
     assert not out.exists()

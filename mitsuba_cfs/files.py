@@ -1,0 +1,209 @@
+"""Files that are whole or not there: written beside their place and renamed at the end.
+
+A process holds a lock on what it is writing, so that what a killed one left is known and removed.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+from mitsuba_cfs.errors import DataError
+
+try:
+    import fcntl
+except ImportError:  # Windows: what a killed process left stays
+    fcntl = None  # type: ignore[assignment]
+
+TEMPORARY = re.compile(r"\.cfs-[0-9a-f]{8}\.part(\.\w+)?")  # names of our temporaries
+REASONS = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the disk quota is used up",
+    errno.EFBIG: "the file would be larger than allowed (ulimit -f)",
+    errno.EROFS: "the file system is read-only",
+}
+
+
+def reason(error: OSError) -> str:
+    """Why something could not be written, in words."""
+    return REASONS.get(error.errno or 0) or error.strerror or " ".join(str(error).split())
+
+
+@contextmanager
+def replacing(path: str | PathLike[str], *, field: str | None = None) -> Iterator[Path]:
+    """A temporary file beside `path` that takes its name at the end, or goes where an error comes.
+
+    A link is followed to the file that it names; a device or pipe is written to as it is.
+
+    Raises: `DataError` that names `path` and says why it cannot be written.
+    """
+    if os.path.isdir(path):
+        raise DataError("is a folder; expected a file", file=path, field=field)
+    if os.path.exists(path) and not os.path.isfile(path):
+        with _told(path, Path(path), field):
+            yield Path(path)
+        return
+    target = Path(os.path.realpath(path))
+    with _told(path, target, field):
+        remove_stale(target.parent)
+        part, release = _held(target.parent, target.suffix, lambda part: part.touch(exist_ok=False))
+    try:
+        with _told(path, part, field, probe=part):
+            yield part
+            if target.exists():
+                part.chmod(target.stat().st_mode & 0o777)
+            part.replace(target)
+    except DataError as error:
+        part.unlink(missing_ok=True)
+        if error.file is None or Path(error.file) != part:
+            raise
+        raise DataError(error.message, file=path, field=field) from error  # of a writer inside
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    finally:
+        release()
+
+
+@contextmanager
+def temporary_folder(parent: Path) -> Iterator[Path]:
+    """A folder inside `parent` to fill and then to rename; what is left of it goes at the end."""
+    part, release = _held(parent, "", Path.mkdir)
+    try:
+        yield part
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+        release()
+
+
+def write_text(path: str | PathLike[str], text: str, *, encoding: str = "utf-8") -> None:
+    """Write a text file; it is the old one or the new one at any time."""
+    with replacing(path) as part:
+        part.write_text(text, encoding=encoding)
+
+
+def write_bytes(path: str | PathLike[str], data: bytes) -> None:
+    """Write a file; it is the old one or the new one at any time."""
+    with replacing(path) as part:
+        part.write_bytes(data)
+
+
+def write_table(table, path: str | PathLike[str], **options: object) -> None:
+    """Write a pandas table as its suffix says, `.parquet` or text; options of its writer."""
+    with replacing(path) as part:
+        write = table.to_parquet if part.suffix == ".parquet" else table.to_csv
+        write(part, **options)
+
+
+def check_file(
+    path: str | PathLike[str], *, field: str = "--out", inputs: Iterable[Path | None] = ()
+) -> None:
+    """Raise `DataError` where a file could not be put at the end of the work, or is an input."""
+    if any(one is not None and _same(one, path) for one in inputs):
+        raise DataError("is an input of this command", file=path, field=field)
+    if os.path.isdir(path):
+        raise DataError("is a folder; expected a file", file=path, field=field)
+    if os.path.exists(path) and not os.path.isfile(path):
+        return
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise DataError("no such folder", file=target.parent, field=field)
+    with _told(path, target, field):
+        part, release = _held(target.parent, "", lambda part: part.touch(exist_ok=False))
+        part.unlink()
+        release()
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove the temporaries in a folder whose process was killed."""
+    for part in stale(folder):
+        shutil.rmtree(part, ignore_errors=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def stale(folder: Path) -> Iterator[Path]:
+    """The temporaries in a folder that no process holds, each held while it is looked at."""
+    with suppress(OSError):
+        for part in [one for one in folder.iterdir() if TEMPORARY.fullmatch(one.name)]:
+            with suppress(OSError):
+                handle = os.open(part, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
+                try:
+                    if _locked(handle, wait=False):
+                        yield part
+                finally:
+                    os.close(handle)
+
+
+def _held(
+    folder: Path, suffix: str, make: Callable[[Path], object]
+) -> tuple[Path, Callable[[], None]]:
+    """A new temporary that is this process's alone, and what gives it free."""
+    while True:
+        part = folder / f".cfs-{secrets.token_hex(4)}.part{suffix}"
+        make(part)
+        if fcntl is None:
+            return part, lambda: None
+        handle = os.open(part, os.O_RDONLY)
+        _locked(handle, wait=True)
+        if part.exists():  # else another process took it for a dead one's before it was held
+            return part, partial(os.close, handle)
+        os.close(handle)
+
+
+def _locked(handle: int, *, wait: bool) -> bool:
+    """Whether the lock is this process's now; never where the file system has no locks."""
+    if fcntl is None:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        return False
+    return True
+
+
+@contextmanager
+def _told(
+    path: str | PathLike[str], place: Path, field: str | None, *, probe: Path | None = None
+) -> Iterator[None]:
+    """Turn a failure to write `place` into one line about the file that the user named.
+
+    Args: probe: our own file, where a failure without a reason is looked into.
+    """
+    try:
+        yield
+    except (OSError, RuntimeError) as error:  # RuntimeError: libraries in C++ on a full disk
+        why: OSError | None = None
+        if isinstance(error, OSError):
+            about = place if error.filename is None else Path(os.fsdecode(error.filename))
+            own = TEMPORARY.fullmatch(about.name) and about.parent == place.parent
+            if not own and about not in (place, place.parent, Path(path)):
+                raise
+            why = error
+        if probe is not None and getattr(error, "errno", None) is None:
+            why = _write_failure(probe) or why
+        if why is None:
+            raise
+        raise DataError(f"cannot be written: {reason(why)}", file=path, field=field) from error
+
+
+def _write_failure(part: Path) -> OSError | None:
+    """What keeps one more block from the end of the file; None where nothing does."""
+    try:
+        with open(part, "ab") as file:
+            file.write(bytes(65536))
+    except OSError as error:
+        return error
+    return None
+
+
+def _same(one: str | PathLike[str], other: str | PathLike[str]) -> bool:
+    return os.path.realpath(one) == os.path.realpath(other)

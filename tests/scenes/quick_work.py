@@ -1,0 +1,185 @@
+"""Every command on its own way from its options to its files, with made-up results for its rays.
+
+`python -m tests.scenes.quick_work COMMAND...` is such a `cfs`.  With CFS_TEST_STOP=FILE it makes
+that file and stands still just before the first result takes its place.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+
+from mitsuba_cfs.files import TEMPORARY
+
+STOP = "CFS_TEST_STOP"
+
+
+def _run_job(_options, *_others, **_more):
+    from tests.report.synthetic import run_result
+
+    result = run_result(picture_size=64, pictures=1)
+    spaces = []
+    for room in result.spaces:
+        metrics = room.daylight.room_metrics | {"sda300_50": 50.0, "da300": 50.0}
+        spaces.append(replace(room, daylight=replace(room.daylight, room_metrics=metrics)))
+    return replace(result, spaces=tuple(spaces))
+
+
+def _thermal(_study, _progress):
+    hours = pd.DataFrame({"air_c": np.linspace(15.0, 30.0, 8760)})
+    summary = dict.fromkeys(
+        ("operative_min_c", "operative_max_c", "heating_kwh", "cooling_kwh",
+         "comfortable_h ASHRAE 55 80 %"), 1.0,
+    )  # fmt: skip
+    room = SimpleNamespace(
+        name="A", floor_area=10.0, hours=hours, summary=summary,
+        months=pd.DataFrame({"discomfort": np.zeros(12)}),
+    )  # fmt: skip
+    return (room,), ()
+
+
+def _pv(_building, weather, _study, **_options):
+    yields = pd.DataFrame(
+        {"subsystem": ["roof"], "modules": [1], "peak_kw": [1.0], "yield_kwh": [900.0],
+         "kwh_per_kw": [900.0], "mismatch_loss": [0.01]}
+    )  # fmt: skip
+    steps = np.arange(100)
+    return SimpleNamespace(
+        weather=weather, irradiance=SimpleNamespace(steps=steps, diffuse_error=0.01),
+        yields=(SimpleNamespace(name="roof", alternating_current=np.ones(100)),), problems=(),
+        yield_table=lambda: yields, module_table=lambda: yields,
+    )  # fmt: skip
+
+
+def _read_year(options, _progress):
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.metrics.schedules import working_hours
+    from mitsuba_cfs.sky.weather import read_epw
+    from scenes.year_of_glare.views import NamedView
+    from scenes.year_of_glare.year import Year
+
+    weather = read_epw(options.weather)
+    views = [NamedView("eye001_1", fisheye([0, 0, 1], [0, 1, 0], 64))]
+    lit = np.arange(100, 4000, 100)
+    used = working_hours(weather, 8.0, 18.0)
+    return Year(options, "A", views, None, None, weather, lit, None, used, options.metric)
+
+
+def _rate_views(year, kept, _progress):
+    from scenes.year_of_glare.year import FIGURES, ViewYear
+
+    times = year.weather.midpoints[year.lit]
+    ratings = pd.DataFrame({name: np.linspace(0.2, 0.5, len(times)) for name in FIGURES}, times)
+    (kept / "0123456789abcdef01234567.npy").write_bytes(b"ratings")
+    picture = np.full((64, 64), 500.0, np.float32)
+    worst = year.lit[0 if year.options.seed == 0 else 1]  # other hours with another seed
+    yield ViewYear(year.views[0], ratings, {year.weather.midpoints[worst]: picture}, 1.0)
+
+
+def _room_picture(_options, _progress):
+    from mitsuba_cfs.images.view import fisheye
+    from scenes.view_picture import RoomPicture
+
+    view = fisheye([0, 0, 1], [0, 1, 0], 64)
+    luminance = np.full((64, 64), 500.0, np.float32)
+    return RoomPicture(luminance, view, "A", pd.Timestamp("2000-06-21 12:30"))
+
+
+def _calibrated(size, **_options):
+    from scenes.calibration.costs import Calibration
+    from scenes.cost.measure import Cost
+
+    return Calibration("m", "now", size, (Cost("five-phase", "DGP", 1.0, 1.0, 1.0),))
+
+
+def _benchmarks():
+    from scenes.benchmarks.harness import Comparison, Run
+
+    run = Run("cfs", 1.0, 1.0, 0.1)
+    return {"quick": lambda _progress: Comparison("quick", "nothing", run, run)}
+
+
+def _generated_file(**_options):
+    from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+    from scenes.demo import VENETIAN_BLIND
+
+    return read_bsdf_xml(VENETIAN_BLIND), "made up"
+
+
+def _case(case):
+    from scenes.study.store import CaseResult
+    from tests.scenes.study_noted import SAID
+
+    return CaseResult(case.key, {"angle": case.orientation_deg} | dict.fromkeys(SAID, 0.0))
+
+
+def _study_report(_result, path):
+    path.write_text("<html></html>")
+
+
+WORK = {
+    "scenes.job.run.run_job": _run_job,
+    "scenes.heat.study.run_study": _thermal,
+    "scenes.photovoltaics.study.run_pv": _pv,
+    "scenes.photovoltaics.picture.view_directions": lambda _result: [],
+    "scenes.year_of_glare.year.read_year": _read_year,
+    "scenes.year_of_glare.year.rate_views": _rate_views,
+    "scenes.commands.picture.room_picture": _room_picture,
+    "scenes.calibration.measure.calibrated": _calibrated,
+    "scenes.benchmarks.harness.benchmarks": _benchmarks,
+    "scenes.bsdf_generation.generated_file": _generated_file,
+    "scenes.study.one_case.compute_case": _case,
+    "scenes.study_report.write_study_report": _study_report,
+}
+
+
+def quick_work(give: Callable[[object, str, object], object] = setattr, among: str = "") -> None:
+    """Give the commands made-up results: `give(module, name, value)` for each function.
+
+    Args: among: only for modules that this command needs; the others load for long.
+    """
+    needs = {
+        "run": "scenes.job", "demo": "scenes.job", "thermal": "scenes.heat.study", "pv": "photovol",
+        "dgp": "year_of_glare", "picture": "commands.picture", "calibrate": "calibration",
+        "bench": "benchmarks", "bsdf": "bsdf_generation", "study": "scenes.study",
+    }  # fmt: skip
+    for name, function in WORK.items():
+        if among and needs.get(among, "none") not in name:
+            continue
+        module, _, attribute = name.rpartition(".")
+        give(import_module(module), attribute, function)
+        if name.startswith("scenes.study.one_case"):
+            give(import_module("scenes.study.study"), attribute, function)
+
+
+def stop_before_the_first_result(announce: Path) -> None:
+    """Stand still where the first finished file or folder is about to take its place."""
+    for name in ("replace", "rename"):
+        move = getattr(Path, name)
+
+        def stopping(self, target, *, move=move):
+            if not any(TEMPORARY.fullmatch(part) for part in Path(target).parts):
+                announce.touch()
+                time.sleep(60)
+            return move(self, target)
+
+        setattr(Path, name, stopping)
+
+
+if __name__ == "__main__":
+    import sys
+
+    from scenes import cli
+
+    quick_work(among=sys.argv[1])
+    if STOP in os.environ:
+        stop_before_the_first_result(Path(os.environ[STOP]))
+    cli.main(sys.argv[1:])
