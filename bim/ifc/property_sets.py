@@ -8,7 +8,7 @@ from pathlib import Path
 import ifcopenshell
 import ifcopenshell.guid
 
-from mitsuba_cfs.files import replacing
+from mitsuba_cfs.files import write_text
 
 Entity = ifcopenshell.entity_instance
 
@@ -64,8 +64,5 @@ def _take_off(model: ifcopenshell.file, target: Entity, name: str) -> None:
 
 def save(model: ifcopenshell.file, out: str | Path) -> None:
     """Write the model; a file of that name is replaced only once the new one is whole."""
-    with replacing(out) as part:
-        try:
-            model.write(str(part))
-        except RuntimeError as error:  # no reason is given
-            raise RuntimeError(f"IfcOpenShell cannot write {out}: {error}") from error
+    # not `model.write`: on a full disk it says nothing, or not why, and leaves a file of its own
+    write_text(out, model.to_string())

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import replacing
+from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.images.view import View, format_view, parse_view
 
 
@@ -35,8 +35,9 @@ def write_exr(
         about["VIEW"] = format_view(view)
     if comment:
         about["COMMENT"] = comment
-    with replacing(path) as part:
-        bitmap.write(str(part), mi.Bitmap.FileFormat.OpenEXR)
+    stream = mi.MemoryStream()  # Mitsuba's own file says nothing of a full disk
+    bitmap.write(stream, mi.Bitmap.FileFormat.OpenEXR)
+    write_bytes(path, stream.raw_buffer())
 
 
 def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | None]:

@@ -41,6 +41,7 @@ def command(
     is new.
     """
     from mitsuba_cfs.files import check_file
+    from mitsuba_cfs.matrices.cache import default_folder
     from scenes.study.files import check_files, one_building
     from scenes.study.schedule import check_dask
     from scenes.study.store import Store
@@ -50,6 +51,7 @@ def command(
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, **asked)
     store = Store(out, inputs=(study, *parsed.files))
+    default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
         one_building(room.building for room in parsed.room)

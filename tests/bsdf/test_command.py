@@ -120,8 +120,8 @@ def test_generate_refuses_what_cannot_be(tmp_path, options, message):
 
 def test_generate_wants_a_folder_to_write_to(tmp_path):
     options = "--depth-mm 80 --spacing-mm 72 --visible 0.5".split()
-    answer = run("generate", *options, "--out", tmp_path / "no" / "x.xml")
-    assert "no such folder" in str(answer.exception)
+    with pytest.raises(DataError, match="no such folder"):
+        run("generate", *options, "--out", tmp_path / "no" / "x.xml")
 
 
 def test_generate_writes_a_file_that_reads(variant, tmp_path):

@@ -123,7 +123,7 @@ def test_folder_table_and_pictures(picture, tmp_path, capfd):
     assert out[0].endswith("dark.hdr: imperceptible") and len(out) == 4
     rows = pd.read_csv(table)
     assert list(rows["class"]) == ["imperceptible", "intolerable"] and rows["sources"][0] == 0
-    names = sorted(p.name for p in drawn.iterdir())
+    names = sorted(p.name for p in drawn.glob("*.png"))
     assert names == [
         "dark.png",
         "dark_falsecolour.png",
