@@ -16,7 +16,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.job.operation import Operation, check_states, read_operation
 from scenes.job.options import JobOptions
-from scenes.job.picture_hours import check_form, wanted_hours
+from scenes.job.picture_hours import check_hours, wanted_hours
 from scenes.job.thermal_system import checked_system
 
 
@@ -37,9 +37,9 @@ def read_files(options: JobOptions) -> JobFiles:
     check_head(options.building)
     corrections_beside(options.building)
     check_names(options.spaces)
-    check_form(options.picture_hours)
+    check_hours(options.picture_hours)
     weather = read_weather(options.weather)
-    _check_hours(options, weather)
+    check_hours(options.picture_hours, weather.midpoints)
     operation = None if options.operation is None else read_operation(options.operation)
     system = None
     if options.system is not None:
@@ -47,6 +47,7 @@ def read_files(options: JobOptions) -> JobFiles:
         checked_system(system, options.system)
     if operation is not None:
         _check_operation(operation, system)
+    _check_sun(options, weather)
     return JobFiles(weather, system, operation)
 
 
@@ -57,7 +58,8 @@ def check_names(names: tuple[str, ...], field: str = "--space") -> None:
             raise DataError("expected the name or GUID of a room, got nothing", field=field)
 
 
-def _check_hours(options: JobOptions, weather: Weather) -> None:
+def _check_sun(options: JobOptions, weather: Weather) -> None:
+    """Whether the sun is up in the hours asked for; where it is takes a second to load."""
     if options.picture_hours:
         from mitsuba_cfs.sky.sun import is_up, sun_directions
 

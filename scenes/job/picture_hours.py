@@ -24,15 +24,21 @@ def wanted_hours(
         wanted: "MM-DD HH": the hour that begins then.
         times: [H] middles of the hours; lit: [L] hours with the sun up.
     """
+    check_hours(wanted, times)
     return [_hour(text, times, set(lit.tolist())) for text in wanted]
 
 
-def check_form(wanted: tuple[str, ...]) -> None:
-    """Raise `PictureHourError` for a text that is no hour; a weather is not needed for that."""
+def check_hours(wanted: tuple[str, ...], times: pd.DatetimeIndex | None = None) -> None:
+    """Raise `PictureHourError` for a text that is no hour, or none of the year where it is given.
+
+    Where the sun is then is another matter, and takes longer to know.
+    """
     for text in wanted:
         if not re.fullmatch(r"\d\d-\d\d \d\d", text):
             message = f"--picture {text!r}: expected month, day and hour as in '06-21 12'"
             raise PictureHourError(message)
+        if times is not None and hour_index(text, times) is None:
+            raise PictureHourError(f"--picture {text!r}: the weather has no such hour")
 
 
 def hour_index(text: str, times: pd.DatetimeIndex) -> int | None:
@@ -42,10 +48,7 @@ def hour_index(text: str, times: pd.DatetimeIndex) -> int | None:
 
 
 def _hour(text: str, times: pd.DatetimeIndex, lit: set[int]) -> int:
-    check_form((text,))
     hour = hour_index(text, times)
-    if hour is None:
-        raise PictureHourError(f"--picture {text!r}: the weather has no such hour")
-    if hour not in lit:
+    if hour is None or hour not in lit:
         raise PictureHourError(f"--picture {text!r}: the sun is below the horizon then")
     return hour
