@@ -41,5 +41,5 @@ $(VENV)/.dev: $(INPUTS)
 	@touch $@ $(VENV)/.run
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis out cfs-demo
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache out cfs-demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -141,25 +141,17 @@ def run(arguments: Sequence[str]) -> int:
 
 def _user_line(error: Exception) -> str | None:
     """The one line that tells the user what is wrong; None for a fault of the program's own."""
-    from mitsuba_cfs.errors import CfsError
-    from mitsuba_cfs.files import reason
-    from thermal.errors import ThermalInputError
+    from scenes.user_errors import one_line, user_message
 
     if isinstance(error, click.UsageError):
         path = error.ctx.command_path if error.ctx else "cfs"
-        return _one_line(f"{path}: {error.format_message()} (see {path} --help)")
+        return one_line(f"{path}: {error.format_message()} (see {path} --help)")
     if isinstance(error, click.ClickException):
-        return _one_line(f"error: {error.format_message()}")
-    if isinstance(error, (CfsError, ThermalInputError)):
-        return _one_line(f"error: {error}")
-    if isinstance(error, OSError) and error.errno is not None:
-        where = "" if error.filename is None else f"{error.filename}: "
-        return _one_line(f"error: {where}{reason(error)}")
-    if isinstance(error, MemoryError):
-        return "error: out of memory"
+        return one_line(f"error: {error.format_message()}")
     if type(error).__module__.startswith("pydantic"):
         return _validation_line(error)
-    return None
+    message = user_message(error)
+    return None if message is None else f"error: {message}"
 
 
 def _validation_line(error: Exception) -> str | None:
@@ -171,11 +163,7 @@ def _validation_line(error: Exception) -> str | None:
     first, *others = error.errors(include_url=False)
     field = ".".join(str(part) for part in first["loc"])
     more = f" (and {len(others)} more)" if others else ""
-    return _one_line(f"error: {error.title}: {field}: {first['msg']}{more}")
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
+    return " ".join(f"error: {field}: {first['msg']}{more}".split())
 
 
 if __name__ == "__main__":

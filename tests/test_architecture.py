@@ -47,7 +47,6 @@ LIMITED = {
     "drjit": TRACING,
     "ifcopenshell": IFC,
     "matplotlib": PLOTTING,
-    "plotly": PLOTTING,
 }
 EVIDENCE = "scenes/evidence/"  # imports the product, never the other way
 LONGEST_MODULE = 400

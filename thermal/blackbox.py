@@ -140,8 +140,10 @@ def layer_absorptances(
         require(bool(np.all((values >= 0) & (values <= 1))), f"{item}: {label}", "outside 0 to 1")
     excess = float(np.max(tau + rho, initial=0.0)) - 1.0
     require(excess <= 0.02, f"{item}: absorptance", f"tau + rho exceeds 1 by {excess:.3f}")
-    short = float(np.max(tau - g, initial=0.0))
-    require(short <= 0.01, f"{item}: g", f"lies {short:.3f} below the solar transmittance")
+    worst = np.unravel_index(np.argmax(tau - g), np.shape(tau - g))
+    least, stated = (float(np.broadcast_to(v, np.shape(tau - g))[worst]) for v in (tau, g))
+    message = f"{stated:g} is below the solar transmittance {least:.3f}, the least that g can be"
+    require(least - stated <= 0.01, f"{item}: g", message)
     alpha, q_i = np.maximum(1.0 - tau - rho, 0.0), np.maximum(g - tau, 0.0)
     inner = (q_i / u_value - alpha * r_outer) / r
     kept = np.clip(inner, 0.0, alpha)

@@ -96,7 +96,10 @@ def inward_share(
 ) -> float:
     """Share N of the absorbed sun that reaches the room: (g - tau)/(1 - tau - rho)."""
     require_range(g_value, 0.0, 1.0, f"{item}: g")
-    message = f"{g_value:g} is below tau {transmittance:.3f}"
+    message = (
+        f"{g_value:g} is below the solar transmittance {transmittance:.3f}, the least that g can "
+        "be: g = tau + what of the absorbed sun goes inwards"
+    )
     require(g_value >= transmittance - 0.01, f"{item}: g", message)
     absorptance = 1.0 - transmittance - reflectance
     if absorptance < 1e-3:

@@ -23,12 +23,12 @@ import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import ifcopenshell
-import ifcopenshell.util.selector
-
-from bim.ifc.elements import cad_layers_of
 from mitsuba_cfs.errors import DataError
+
+if TYPE_CHECKING:
+    import ifcopenshell
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
 KEYS = {"leave_out", "only", "join", "surroundings", "reflectance"}
@@ -78,15 +78,16 @@ class Corrections:
 
 def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[int]:
     """STEP ids of the elements that a selector chooses; `DataError` where it is none."""
+    # here, so that a mistake in the small file is found before these are loaded
+    from ifcopenshell.util.selector import filter_elements
+
+    from bim.ifc.elements import cad_layers_of
+
     found: set[int] = set()
     for group in re.findall(r'(?:"[^"]*"|[^"+])+', query) if LAYER.search(query) else [query]:
         rest = LAYER.sub("", group).strip(" ,")
         try:
-            elements = (
-                ifcopenshell.util.selector.filter_elements(model, rest)
-                if rest
-                else set(model.by_type("IfcProduct"))
-            )
+            elements = filter_elements(model, rest) if rest else set(model.by_type("IfcProduct"))
         except Exception as error:  # the selector's parser raises many types
             reason = str(error).strip().splitlines()[0] if str(error).strip() else "no selector"
             raise DataError(reason, file=file or None, field=query) from None

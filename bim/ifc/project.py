@@ -14,34 +14,23 @@ import ifcopenshell.util.unit
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
 from bim.model import Problem
 from mitsuba_cfs.errors import DataError
-
-SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
 
 
 def open_ifc(path: str | Path) -> ifcopenshell.file:
     """The opened model (.ifc, or .ifczip with one model); `DataError` where it is none."""
     path = Path(path)
-    if not path.is_file():
-        raise DataError("no such file", file=path)
-    if path.suffix.lower() in (".ifczip", ".zip"):
-        return _open_zipped(path)
-    with path.open("rb") as stream:
-        start = stream.read(4096)
-    if b"ISO-10303-21" not in start:
-        raise DataError("not an IFC file: 'ISO-10303-21' is missing at its start", file=path)
-    return _open_step(path, path)
+    check_head(path)
+    return _open_zipped(path) if path.suffix.lower() in ZIPPED else _open_step(path, path)
 
 
 def _open_zipped(path: Path) -> ifcopenshell.file:
     try:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
-            names = [name for name in archive.namelist() if name.lower().endswith(".ifc")]
-            if len(names) != 1:
-                raise DataError(f"expected one .ifc inside, found {len(names)}", file=path)
             inner = Path(folder) / "model.ifc"
-            inner.write_bytes(archive.read(names[0]))
+            inner.write_bytes(archive.read(model_name(archive, path)))
             return _open_step(inner, path)
     except (zipfile.BadZipFile, NotImplementedError) as error:
         raise DataError(f"cannot be unzipped: {error}", file=path) from None
@@ -52,7 +41,7 @@ def _open_step(path: Path, shown: Path) -> ifcopenshell.file:
     try:
         model = ifcopenshell.open(str(path))
     except Exception as error:  # the parser raises several unrelated types
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        reason = (str(error).strip().splitlines() or ["the parser gives no reason"])[0]
         raise DataError(f"cannot be read as IFC: {reason}", file=shown) from None
     if not model.schema.startswith(SCHEMAS):
         raise DataError(f"schema {model.schema}, expected one of {SCHEMAS}", file=shown)
@@ -80,7 +69,7 @@ def _mend_stars(model: ifcopenshell.file) -> None:
 def ending_problems(path: str | Path) -> list[Problem]:
     """A problem where a STEP file has lost its end."""
     path = Path(path)
-    if path.suffix.lower() in (".ifczip", ".zip"):
+    if path.suffix.lower() in ZIPPED:
         return []
     with path.open("rb") as stream:
         stream.seek(max(path.stat().st_size - 4096, 0))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
@@ -31,6 +30,8 @@ def klems_of(bsdf: Bsdf, basis: KlemsBasis = KLEMS_FULL, *, samples: int = 64) -
 
 def _block(bsdf: Bsdf, name: str, basis: KlemsBasis, samples: int) -> NDArray[np.float64]:
     """One block [K out, K in] [1/sr]."""
+    from scipy.stats import qmc  # half a second, for trees only
+
     transmits, front = name.startswith("transmission"), name.endswith("front")
     K, patches = basis.size, np.arange(basis.size)
     total, towards = np.zeros((K, K)), []

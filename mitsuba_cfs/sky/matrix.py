@@ -10,6 +10,7 @@ from scipy import sparse
 
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky import sun as sun_module
+from mitsuba_cfs.sky.options import PARTS, SUN_PATCHES
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import PerezSky, perez_sky, relative_luminance
 from mitsuba_cfs.sky.weather import Weather
@@ -17,8 +18,6 @@ from mitsuba_cfs.sky.weather import Weather
 FloatArray = NDArray[np.float64]
 
 BANDS = ("visible", "solar")
-PARTS = ("all", "sky", "sun")
-SUN_PATCHES = 4  # gendaymtx spreads the sun over this many patches
 DARK = 1e-4  # [W/m2] gendaymtx's night: direct normal plus diffuse at or below it
 DEFAULT_DEW_POINT_C = 11.0  # gendaymtx's, for files without one
 CHUNK_BYTES = 2**20  # size of one temporary array: it stays in the cache, four times the speed

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky import sun
+from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG
 from mitsuba_cfs.sky.plausible import checked_sun
 from mitsuba_cfs.sky.weather import Weather
 
 COLUMNS = ("time", "global_horizontal", "diffuse_horizontal")
-LABELS = {"start": 0.0, "middle": 0.5, "end": 1.0}  # where in its interval a time stands
 MOST_IRRADIANCE = 1800.0  # [W/m2] broken clouds can double a clear sky's diffuse light
 
 
@@ -25,7 +25,7 @@ def measured_weather(
     diffuse_horizontal: ArrayLike,
     *,
     sun_model: str = "spa",
-    least_altitude_deg: float = sun.LEAST_ALTITUDE_DEG,
+    least_altitude_deg: float = LEAST_ALTITUDE_DEG,
 ) -> Weather:
     """`site` (place and times) with the direct normal irradiance that two measurements imply.
 
@@ -55,7 +55,7 @@ def read_measured(
     timezone_h: float,
     elevation_m: float = 0.0,
     label: str = "middle",
-    least_altitude_deg: float = sun.LEAST_ALTITUDE_DEG,
+    least_altitude_deg: float = LEAST_ALTITUDE_DEG,
 ) -> Weather:
     """Weather of a CSV file with the columns time, global_horizontal, diffuse_horizontal [W/m2].
 

@@ -7,15 +7,13 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.sky import air
+from mitsuba_cfs.sky.options import LEAST_ALTITUDE_DEG, SUN_MODELS
 from mitsuba_cfs.sky.weather import Weather
 
 SUN_ANGLE_DEG = 0.533  # full angle of the disc that Radiance uses
 SUN_RADIUS = np.radians(SUN_ANGLE_DEG / 2)  # [rad]
 SUN_SOLID_ANGLE = 2 * np.pi * (1 - np.cos(SUN_RADIUS))  # [sr]
 SOLAR_CONSTANT = 1361.0  # [W/m2]
-LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam
-
-SUN_MODELS = ("spa", "radiance")
 
 
 def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float64]:

@@ -36,6 +36,7 @@ class Calibration:
     made: str  # date and time
     picture_size: int  # pixels of a side of the pictures that were rated
     costs: tuple[Cost, ...]  # of methods and metrics; of a room's heat as `HEAT`
+    origin: str = "costs measured on this machine by `cfs calibrate`"
 
     def pairs(self) -> list[tuple[str, str]]:
         """Methods and glare metrics that were measured."""
@@ -77,19 +78,23 @@ class Calibration:
         write_text(path, json.dumps(table, indent=2) + "\n")
 
     @classmethod
+    def of(cls, table: dict) -> Calibration:
+        """The calibration that `dataclasses.asdict` made a table of."""
+        costs = tuple(Cost(**record) for record in table["costs"])
+        return cls(**table | {"costs": costs})
+
+    @classmethod
     def read(cls, path: Path) -> Calibration:
         """The calibration of a file.
 
         Raises: `DataError` where there is none, or none that can be read.
         """
         try:
-            table = json.loads(path.read_text(encoding="utf-8"))
-            costs = tuple(Cost(**record) for record in table.pop("costs"))
-            return cls(**table, costs=costs)
+            return cls.of(json.loads(path.read_text(encoding="utf-8")))
         except FileNotFoundError:
             raise DataError("is not there: run `cfs calibrate` first", file=path) from None
         except (ValueError, KeyError, TypeError) as error:
-            message = f"is no calibration ({error}): run `cfs calibrate`"
+            message = f"is no calibration ({error}): delete it, or run `cfs calibrate`"
             raise DataError(message, file=path) from error
 
 

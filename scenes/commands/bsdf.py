@@ -173,20 +173,21 @@ def _from_radiance(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @click.option("--out", "output", type=FILE, required=True, help="PNG, PDF or SVG to write.")
 def plot(file: Path, incident: tuple[float, float], band: str, output: Path) -> None:
     """Draw both hemispheres for the light from one direction (Radiance's frame, degrees)."""
-    from scenes.bsdf_plots import plot_hemispheres
+    from matplotlib.backend_bases import FigureCanvasBase
 
+    if output.suffix.lstrip(".").lower() not in FigureCanvasBase.get_supported_filetypes():
+        raise click.UsageError(
+            f"--out {output}: expected a file name that ends in .png, .pdf, .svg"
+        )
+    check_file(output, inputs=[file])
     data = read_bsdf_xml(file, energy_limit=np.inf)
     if band not in data.bands:
         raise DataError(f"has no {band} band", file=file)
     direction = _from_radiance(np.array([[*incident, 0.0, 0.0]]))[0][0]
     title = f"{file.name}, {band}, light from theta {incident[0]:g}°, phi {incident[1]:g}°"
-    check_file(output, inputs=[file])
+    from scenes.bsdf_plots import plot_hemispheres
+
     figure = plot_hemispheres(data.bands[band], direction, title)
-    known = figure.canvas.get_supported_filetypes()
-    if output.suffix.lstrip(".").lower() not in known:
-        raise click.UsageError(
-            f"--out {output}: expected a file name that ends in .png, .pdf, .svg"
-        )
     with replacing(output) as part:
         figure.savefig(part)
 

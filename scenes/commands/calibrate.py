@@ -24,12 +24,13 @@ def command(size: int, out: Path | None) -> None:
     """
     from mitsuba_cfs.files import check_file
     from scenes.calibration.costs import calibration_file
-    from scenes.calibration.measure import calibrated
-    from scenes.commands.progress_bar import ProgressBar
 
     target = out or calibration_file()
     if out is not None:
         check_file(out)
+    from scenes.calibration.measure import calibrated
+    from scenes.commands.progress_bar import ProgressBar
+
     with ProgressBar() as progress:
         found = calibrated(size, progress=progress)
     click.echo(f"{found.machine}; pictures of {found.picture_size} x {found.picture_size} pixels")

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import click
 
+from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 _DEFAULT = YearOptions(Path(), Path(), Path())
 
 
 @click.command()
-@click.argument("building", type=FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
 @click.option("--weather", type=FILE, default=WEATHER, help="EPW file, hourly [the demo's].")
 @click.option(
     "--cfs", "system", type=FILE, default=VENETIAN_BLIND, help="BSDF XML file [the demo's]."
@@ -75,15 +75,19 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     start, end = chosen["occupied"]
     if start >= end:
         raise click.UsageError(f"--occupied {start} {end}: expected the first hour before the last")
-    from scenes.commands.progress_bar import ProgressBar
     from scenes.result_folder import ResultFolder
+    from scenes.year_of_glare.files import read_files
+
+    options = YearOptions(building or OFFICE, **chosen)
+    files = (building, chosen["weather"], chosen["system"], *map(Path, chosen["views"]))
+    folder = ResultFolder(out, "dgp", inputs=files)
+    read = read_files(options)  # before anything heavy is loaded
+    from scenes.commands.progress_bar import ProgressBar
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare.year import rate_views, read_year
 
-    files = (building, chosen["weather"], chosen["system"], *map(Path, chosen["views"]))
-    folder = ResultFolder(out, "dgp", inputs=files)
     with ProgressBar() as progress:
-        year = read_year(YearOptions(building or OFFICE, **chosen), progress)
+        year = read_year(options, progress, read)
         views = rate_views(year, folder.kept(outputs.KEPT), progress)
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -14,30 +15,28 @@ import click
 
 from mitsuba_cfs import llvm
 
-REQUIRED = (
-    "mitsuba-cfs", "mitsuba", "drjit", "numpy", "scipy", "pandas", "pvlib", "ifcopenshell",
-    "trimesh", "manifold3d", "shapely", "colour-science", "pythermalcomfort", "numba",
-    "matplotlib", "plotly",
-)  # fmt: skip
+PROGRAM = "mitsuba-cfs"
 PEERS = {
     "pyradiance": "Radiance",
     "pyenergyplus-lbnl": "EnergyPlus",
     "pywincalc": "WINDOW",
-    "frads": "frads",
 }
 TIME_LIMIT = 120  # seconds for the self-test; it takes two
 
 
 @click.command()
 def command() -> None:
-    """Print versions, the variant chosen and why, LLVM libraries, peers, and run a self-test."""
-    _print_versions()
+    """Print versions, the variant chosen and why, LLVM libraries, peers, and run a self-test.
+
+    Where something is wrong the last line says what, and what to do; the exit code is then 1.
+    """
+    fault = _print_versions()
     _print_llvm()
     _print_gpus()
     _print_peers()
-    fault = self_test()
-    if fault:
-        raise click.ClickException(fault)
+    tested = self_test()
+    if fault or tested:  # what is missing may be why the test failed: it goes first
+        raise click.ClickException(fault or tested)
 
 
 def self_test() -> str | None:
@@ -53,14 +52,16 @@ def self_test() -> str | None:
         return f"self-test: {_cause(done.returncode, done.stderr)}; {llvm.INSTALL_HINT}"
     found = json.loads(done.stdout.splitlines()[-1])
     click.echo(f"{'variant':<16} {found['variant']} ({found['reason']})")
-    if found["variant"].startswith("scalar"):
-        click.echo(f"{'warning':<16} only slow single images work: {llvm.INSTALL_HINT}")
     traced = f"{found['rays']} rays: view factor {found['traced']:.5f}"
     click.echo(
         f"{'self-test':<16} {'passed' if found['agrees'] else 'FAILED'}: {traced}, "
         f"closed form {found['expected']:.5f}, {found['seconds']:.1f} s"
     )
-    return None if found["agrees"] else "self-test: the traced rays miss the closed form"
+    if not found["agrees"]:
+        return f"self-test: the traced rays miss the closed form; {llvm.INSTALL_HINT}"
+    if found["variant"].startswith("scalar"):
+        return f"rays are traced one by one: only slow single images work; {llvm.INSTALL_HINT}"
+    return None
 
 
 def _cause(code: int, stderr: str) -> str:
@@ -72,10 +73,26 @@ def _cause(code: int, stderr: str) -> str:
     return f"aborted by signal {-code}: {last}" if code < 0 else last
 
 
-def _print_versions() -> None:
+def _print_versions() -> str | None:
+    """Print the version of each package that the program needs; which are missing, if any."""
     click.echo(f"{'python':<16} {platform.python_version()} on {platform.platform()}")
-    for name in REQUIRED:
-        click.echo(f"{name:<16} {_version(name) or 'MISSING'}")
+    missing = []
+    for name in (PROGRAM, *required()):
+        version = _version(name)
+        click.echo(f"{name:<16} {version or 'MISSING'}")
+        missing += [] if version else [name]
+    if not missing:
+        return None
+    return f"not installed: {', '.join(missing)}; pip install {' '.join(missing)}"
+
+
+def required() -> list[str]:
+    """The packages that the installed program needs, without those of its extras."""
+    try:
+        lines = metadata.requires(PROGRAM) or []
+    except metadata.PackageNotFoundError:
+        return []
+    return [re.match(r"[\w.-]+", line)[0] for line in lines if "extra ==" not in line]
 
 
 def _print_llvm() -> None:

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table
-from mitsuba_cfs.glare import areas, report
-from mitsuba_cfs.glare.classes import glare_class
-from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
-from mitsuba_cfs.glare.field_of_view import seen
-from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
-from mitsuba_cfs.images.hdr import Picture, read_hdr, write_hdr
-from mitsuba_cfs.images.view import View
 from scenes.commands import glare_flags
 from scenes.commands.glare_flags import Request
 from scenes.result_folder import ResultFolder
+
+if TYPE_CHECKING:
+    from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
+    from mitsuba_cfs.glare.glare_view import GlareView
+    from mitsuba_cfs.images.hdr import Picture
+    from mitsuba_cfs.images.view import View
 
 SUFFIXES = {".hdr", ".pic"}
 CUTS = {1: "total", 2: "both eyes"}
@@ -51,9 +51,12 @@ def command(words: tuple[str, ...]) -> None:
     if "-v" in request.given:
         click.echo(VERSION)
         return
-    options = glare_flags.options(request)
     paths = pictures(request.paths or [Path("/dev/stdin")])
-    _check_outputs(request, paths)
+    _check_files(request, paths)
+    options = glare_flags.options(request)
+    from mitsuba_cfs.glare.glare_view import GlareView
+    from mitsuba_cfs.images.hdr import read_hdr
+
     rows, geometry = [], None
     for path in paths:
         picture = read_hdr(path)
@@ -67,8 +70,12 @@ def command(words: tuple[str, ...]) -> None:
         _write_table(table, rows)
 
 
-def _check_outputs(request: Request, paths: list[Path]) -> None:
-    """Refuse, before anything is read, what could not be written at the end."""
+def _check_files(request: Request, paths: list[Path]) -> None:
+    """Refuse, before anything is read, what could not be read or written later."""
+    for flag in ("-A", "-vf"):
+        path = request.value(flag)
+        if path is not None and not path.is_file():
+            raise DataError("no such file", file=path, field=flag)
     for flag in ("-c", "--csv", "--png"):
         target = request.value(flag)
         if target is None:
@@ -88,8 +95,10 @@ def pictures(paths: list[Path]) -> list[Path]:
             if not inside:
                 raise DataError("no .hdr or .pic file in this folder", file=path)
             found += inside
-        else:
+        elif path.exists():
             found.append(path)
+        else:
+            raise DataError("no such file", file=path)
     return found
 
 
@@ -103,6 +112,10 @@ def _one(
     several: bool,
 ) -> dict | None:
     """Rate one picture and print it; its row of the table."""
+    from mitsuba_cfs.glare import report
+    from mitsuba_cfs.glare.classes import glare_class
+    from mitsuba_cfs.glare.evaluation import evaluate
+
     luminance = picture.luminance
     if "-I" in request.given:
         luminance = filled(luminance, *request.given["-I"][1:])
@@ -196,6 +209,9 @@ def filled(luminance: np.ndarray, highest: int, lowest: int) -> np.ndarray:
 
 def _lines(result: GlareResult, request: Request) -> list[str]:
     """What is printed of one picture."""
+    from mitsuba_cfs.glare import areas, report
+    from mitsuba_cfs.images.hdr import read_hdr
+
     given, lines = request.given, []
     if "-V" in given:
         return [f"{result.Ev:f}"]
@@ -231,6 +247,10 @@ def notices(result: GlareResult) -> list[str]:
 
 def _write_cut(luminance, geometry: GlareView, cut: int, request: Request) -> None:
     """The picture with its field of view cut, for -g."""
+    from mitsuba_cfs.glare.field_of_view import seen
+    from mitsuba_cfs.glare.glare_view import in_picture_order
+    from mitsuba_cfs.images.hdr import write_hdr
+
     if cut not in CUTS or "-c" not in request.given:
         raise click.UsageError("-g needs 1 or 2, and -c FILE for the picture")
     inside = in_picture_order(seen(geometry, CUTS[cut]))
@@ -240,6 +260,7 @@ def _write_cut(luminance, geometry: GlareView, cut: int, request: Request) -> No
 def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, several) -> None:
     """The check picture of -c, and what --png asks for."""
     if (check := request.value("-c")) is not None:
+        from mitsuba_cfs.images.hdr import write_hdr
         from scenes.pictures import check_radiance
 
         uniform, blue = request.given.get("-u"), "-T" in request.given
@@ -256,6 +277,8 @@ def _write_pictures(path: Path, picture: Picture, result: GlareResult, request, 
 
 
 def _write_png(folder: Path, name: str, picture: Picture, result: GlareResult, limits) -> None:
+    from mitsuba_cfs.glare.classes import glare_class
+    from mitsuba_cfs.glare.glare_view import in_picture_order
     from scenes import pictures as drawn
 
     title = f"{name}   DGP {result.dgp:.3f} ({glare_class(result.dgp)}), E_v {result.Ev:,.0f} lx"

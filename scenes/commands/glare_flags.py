@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.glare.areas import Zones
-from mitsuba_cfs.glare.evaluation import BACKGROUNDS, GlareOptions, Task
-from mitsuba_cfs.images.view import View, view_changes
+
+if TYPE_CHECKING:
+    from mitsuba_cfs.glare.evaluation import GlareOptions
+    from mitsuba_cfs.images.view import View
 
 # flag: (types of its arguments, their names, help)
 FLAGS: dict[str, tuple[tuple[type, ...], str, str]] = {
@@ -101,6 +103,8 @@ def _values(flag: str, types: tuple[type, ...], names: str, words: tuple[str, ..
 
 def _view_option(request: Request, words: tuple[str, ...], at: int) -> int:
     """Take one option of Radiance's view syntax; the place after it."""
+    from mitsuba_cfs.images.view import view_changes
+
     for length in (1, 2, 4):
         changes = view_changes(" ".join(words[at : at + length]))
         if changes:
@@ -111,6 +115,9 @@ def _view_option(request: Request, words: tuple[str, ...], at: int) -> int:
 
 def options(request: Request) -> GlareOptions:
     """How the request wants glare rated."""
+    from mitsuba_cfs.glare.areas import Zones
+    from mitsuba_cfs.glare.evaluation import BACKGROUNDS, GlareOptions, Task
+
     task = request.given.get("-T", request.given.get("-t"))
     zones = request.given.get("-L", request.given.get("-l"))
     corrections = request.value("-C")
@@ -146,6 +153,8 @@ def _choice(request: Request, flag: str, meanings: dict[int, str], default: str)
 
 def given_view(request: Request, width: int, height: int) -> View | None:
     """The view of the command line, None where it has none; it must have type and both sizes."""
+    from mitsuba_cfs.images.view import View, view_changes
+
     changes = dict(request.view)
     if (path := request.value("-vf")) is not None:
         try:

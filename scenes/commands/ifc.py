@@ -6,29 +6,21 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
-from rich.table import Table
 
-from bim.fenestration import ShadingState, read_g_table
-from bim.ifc.attach import attach as attach_to_ifc
-from bim.ifc.survey import markdown
-from bim.ifc.survey import survey as surveyed
-from bim.model import Building, Space
-from bim.read_ifc import read_ifc
-from bim.to_energyplus import write_epjson
-from bim.to_gltf import write_gltf
-from bim.to_mitsuba import write_mitsuba
-from bim.to_radiance import identifier, write_radiance
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table, write_text
-from scenes.commands.progress_bar import ProgressBar
+from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.result_folder import ResultFolder
 
-SUFFIXES = {write_radiance: (".rad", ".pts", ".vf"), write_mitsuba: (".xml", ".ply")}
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from bim.model import Building, Space
+
+SUFFIXES = {"--radiance": (".rad", ".pts", ".vf"), "--mitsuba": (".xml", ".ply")}
 
 
 @click.group()
@@ -37,12 +29,17 @@ def command() -> None:
 
 
 @command.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--csv", "table", type=click.Path(path_type=Path), help="Also write the problems.")
 def check(building: Path, table: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
     if table is not None:
         check_file(table, field="--csv", inputs=[building])
+    from rich.console import Console
+
+    from bim.read_ifc import read_ifc
+    from scenes.commands.progress_bar import ProgressBar
+
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     console = Console(width=None if Console().is_terminal else 200)
@@ -62,7 +59,7 @@ def check(building: Path, table: Path | None) -> None:
 
 
 @command.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--window", "windows", multiple=True, metavar="GUID", help="A window or door.")
 @click.option("--type", "types", multiple=True, metavar="NAME", help="Windows of a type.")
 @click.option("--all", "every_window", is_flag=True, help="Every window.")
@@ -91,6 +88,9 @@ def attach(
     if bsdf is None and g_table is None and u_value is None:
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
     check_file(out, inputs=[bsdf, g_table])  # the building may be written back
+    from bim.fenestration import ShadingState, read_g_table
+    from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+
     file = None if bsdf is None else read_bsdf_xml(bsdf)
     copied = file is not None and not reference
     one = ShadingState(
@@ -99,6 +99,8 @@ def attach(
         None if g_table is None else read_g_table(g_table),
         u_value,
     )
+    from bim.ifc.attach import attach as attach_to_ifc
+
     count = attach_to_ifc(
         building, out, one, windows=windows, types=types, every_window=every_window,
         bsdf_reference=bsdf if reference else None,
@@ -107,7 +109,7 @@ def attach(
 
 
 @command.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--space", "names", multiple=True, help="Name or GUID; default: all.")
 @click.option(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
@@ -133,26 +135,36 @@ def export(
     for field, path in (("--epjson", epjson), ("--gltf", gltf)):
         if path is not None:
             check_file(path, field=field, inputs=[building])
-    writers: dict[Path, list] = {}
-    for parent, write in ((radiance, write_radiance), (mitsuba, write_mitsuba)):
+    formats: dict[Path, list[str]] = {}
+    for option, parent in (("--radiance", radiance), ("--mitsuba", mitsuba)):
         if parent is not None:
-            writers.setdefault(parent, []).append(write)
-    option = "--mitsuba" if radiance is None else "--radiance"
+            formats.setdefault(parent, []).append(option)
     folders = {
-        parent: ResultFolder(parent, "ifc export", adding=True, field=option) for parent in writers
+        parent: ResultFolder(parent, "ifc export", adding=True, field=options[0])
+        for parent, options in formats.items()
     }
+    from bim.read_ifc import read_ifc
+    from bim.to_energyplus import write_epjson
+    from bim.to_gltf import write_gltf
+    from bim.to_mitsuba import write_mitsuba
+    from bim.to_radiance import write_radiance
+    from scenes.commands.progress_bar import ProgressBar
+
+    writers = {"--radiance": write_radiance, "--mitsuba": write_mitsuba}
     with ProgressBar() as progress:
         read = read_ifc(building, progress=progress)
     spaces = _chosen(read, names, building)
     for parent, folder in folders.items():
         written: list[str] = []
-        kinds = {suffix for write in writers[parent] for suffix in SUFFIXES[write]}
+        kinds = {suffix for option in formats[parent] for suffix in SUFFIXES[option]}
 
         def of_these(name: str, written=written, kinds=kinds) -> bool:
             return name.partition("/")[0] in written and Path(name).suffix in kinds
 
         with folder.replaced(gone=of_these) as place:
-            written += _export_rooms(read, spaces, place, writers[parent])
+            written += _export_rooms(
+                read, spaces, place, [writers[option] for option in formats[parent]]
+            )
         for name in written:
             click.echo(parent / name)
     if epjson is not None:
@@ -167,6 +179,8 @@ def _export_rooms(
     building: Building, spaces: Sequence[Space], place: Path, writers: Sequence[Callable]
 ) -> list[str]:
     """Write a folder for each room with a window; their names."""
+    from bim.to_radiance import identifier
+
     written = []
     for space in spaces:
         name = identifier(space.name)
@@ -191,6 +205,10 @@ def survey(files: tuple[Path, ...], out: Path | None) -> None:
     """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
     if out is not None:
         check_file(out, field="--markdown", inputs=files)
+    from bim.ifc.survey import markdown
+    from bim.ifc.survey import survey as surveyed
+    from scenes.commands.progress_bar import ProgressBar
+
     rows = []
     with ProgressBar() as progress:
         for row in surveyed(files):
@@ -213,6 +231,8 @@ def _chosen(building: Building, names: tuple[str, ...], path: Path) -> tuple[Spa
 
 def _rooms(building: Building) -> Table:
     """One line for each room, drawn figures beside those that the file states."""
+    from rich.table import Table
+
     table = Table(title=f"Rooms of {building.name}", title_justify="left")
     table.add_column("room")
     table.add_column("storey")
@@ -236,6 +256,8 @@ def _number(value: float | None) -> str:
 
 
 def _problems(building: Building) -> Table:
+    from rich.table import Table
+
     table = Table(title="Problems", title_justify="left")
     for head in ("where", "what", "consequence or repair"):
         table.add_column(head, overflow="fold")

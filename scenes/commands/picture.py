@@ -8,19 +8,13 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import check_file
+from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.view_picture import (
-    SUFFIXES,
-    PictureOptions,
-    room_picture,
-    write_picture,
-)
-
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+from scenes.picture_options import SUFFIXES, PictureOptions
 
 
 @click.command()
-@click.argument("building", type=FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
 @click.option("--weather", type=FILE, default=WEATHER, help="EPW file, hourly [the demo's].")
 @click.option(
     "--cfs", "system", type=FILE, default=VENETIAN_BLIND, help="BSDF XML file [the demo's]."
@@ -57,17 +51,22 @@ def command(building: Path | None, files: tuple[Path, ...], tone: bool, **chosen
         if file.suffix not in SUFFIXES:
             raise click.UsageError(f"--out {file}: expected one of {', '.join(SUFFIXES)}")
         check_file(file)
-    from mitsuba_cfs.glare.evaluation import evaluate
-    from scenes.commands.progress_bar import ProgressBar
+    from scenes.picture_files import read_files
 
     start = time.perf_counter()
-    with ProgressBar() as progress:
-        try:
-            found = room_picture(PictureOptions(building or OFFICE, **chosen), progress)
-        except ValueError as error:
-            if type(error) is not ValueError:
-                raise
-            raise click.UsageError(str(error)) from None
+    options = PictureOptions(building or OFFICE, **chosen)
+    try:
+        read = read_files(options)  # before anything heavy is loaded
+        from mitsuba_cfs.glare.evaluation import evaluate
+        from scenes.commands.progress_bar import ProgressBar
+        from scenes.view_picture import room_picture, write_picture
+
+        with ProgressBar() as progress:
+            found = room_picture(options, progress, read)
+    except ValueError as error:
+        if type(error) is not ValueError:
+            raise
+        raise click.UsageError(str(error)) from None
     for file in files:
         write_picture(found, file, print_like=tone)
     view, lit = found.view, found.luminance

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from scenes.commands.parameters import FILE, IFC_FILE
+
 if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
-
 
 @click.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
 @click.option("--study", "study_file", required=True, type=FILE, help="TOML file, docs/pv.md.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
@@ -29,19 +29,20 @@ def command(
     Modules are found by material, type, name or GUID; shade and reflections by everything in the
     model are traced, the sun as its exact disc.
     """
-    from mitsuba_cfs import variants
     from mitsuba_cfs.sky.weather import read_epw
-    from scenes.commands.progress_bar import ProgressBar
     from scenes.photovoltaics.study_file import read_pv_study
     from scenes.result_folder import ResultFolder
 
     study = read_pv_study(study_file)
     climate = read_epw(weather)
     folder = ResultFolder(out, "pv", inputs=(building, weather, study_file))
-    variants.activate()
+    # all that is small is read: what is heavy is loaded now
+    from mitsuba_cfs import variants
     from mitsuba_cfs.matrices.cache import MatrixCache
+    from scenes.commands.progress_bar import ProgressBar
     from scenes.photovoltaics.study import run_pv
 
+    variants.activate()
     cache = None if no_cache else MatrixCache.of_user()
     with ProgressBar() as progress:
         result = run_pv(

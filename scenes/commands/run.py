@@ -6,15 +6,15 @@ from pathlib import Path
 
 import click
 
+from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.job.options import METHODS, JobOptions
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 LOADS = ("heating", "cooling", "lighting")
 _DEFAULT = JobOptions(Path(), Path())
 
 
 @click.command()
-@click.argument("building", type=FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
 @click.option(
     "--cfs", "system", type=FILE,
@@ -26,8 +26,8 @@ _DEFAULT = JobOptions(Path(), Path())
     help="How light is computed: see docs/daylight.md.",
 )  # fmt: skip
 @click.option("--space", "spaces", multiple=True, help="Name or GUID; default: all with a window.")
-@click.option("--u", "u_value", type=float, help="U-value of the system [W/(m2 K)].")
-@click.option("--g", "g_value", type=float, help="g-value of the system at normal incidence.")
+@click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
+@click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -113,18 +113,21 @@ def command(
 def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     """Run the job with a progress bar, write its files and say what came out."""
     from mitsuba_cfs.matrices.cache import default_folder
+    from scenes.job.files import read_files
+    from scenes.result_folder import ResultFolder
+
+    inputs = (options.building, options.weather, options.system, options.operation)
+    folder = ResultFolder(out, command, inputs=inputs)
+    if options.cache:
+        default_folder()  # or one line that it cannot be one
+    files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.job.outputs import write_results
     from scenes.job.run import run_job
     from scenes.report import write_report
-    from scenes.result_folder import ResultFolder
 
-    files = (options.building, options.weather, options.system, options.operation)
-    folder = ResultFolder(out, command, inputs=files)
-    if options.cache:
-        default_folder()  # of the cache, or one line that it cannot be one
     with ProgressBar() as progress:
-        result = run_job(options, progress)
+        result = run_job(options, progress, files)
         progress("results", 0.0)
         write_results(result, folder, write_report)
         progress("results", 1.0)

@@ -5,23 +5,20 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
-import pandas as pd
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table
 from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
-from mitsuba_cfs.sky import sun as sun_positions
-from mitsuba_cfs.sky.cie import KINDS, cie_patches
-from mitsuba_cfs.sky.matrix import PARTS, SUN_PATCHES, sky_matrix, sun_matrix, sun_up
-from mitsuba_cfs.sky.measured import LABELS, read_measured
-from mitsuba_cfs.sky.patches import SUBDIVISIONS, ReinhartSky
-from mitsuba_cfs.sky.wea import read_wea, write_wea
-from mitsuba_cfs.sky.weather import Weather, read_epw
-from scenes.commands.progress_bar import ProgressBar
+from mitsuba_cfs.sky.cie import KINDS
+from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_MODELS, SUN_PATCHES
+from mitsuba_cfs.sky.patches import SUBDIVISIONS
 
+if TYPE_CHECKING:
+    from mitsuba_cfs.sky.weather import Weather
 EFFICACY = 179.0  # [lm/W] luminance over the radiance that Radiance's visible files hold
 
 OUTPUTS = {"0": "visible", "1": "solar"}
@@ -32,7 +29,7 @@ subdivision_option = click.option(
     show_default=True, help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
 )  # fmt: skip
 sun_option = click.option(
-    "--sun-model", type=click.Choice(sun_positions.SUN_MODELS), default="spa", show_default=True,
+    "--sun-model", type=click.Choice(SUN_MODELS), default="spa", show_default=True,
     help="Sun position: NREL's SPA, or Radiance's formula as gendaymtx has it.",
 )  # fmt: skip
 format_option = click.option(
@@ -101,6 +98,9 @@ def matrix(
     Patch 0 is the ground; the others are in the order of gendaymtx, whose options these are.
     """
     check_file(out, field="OUT", inputs=[weather])
+    from mitsuba_cfs.sky.matrix import sun_matrix
+    from scenes.commands.progress_bar import ProgressBar
+
     hours = read_weather(weather)
     band = OUTPUTS[output]
     if measured and (band == "solar" or hours.direct_normal_illuminance is None):
@@ -128,6 +128,8 @@ def matrix(
 
 def _coloured_sky(hours, subdivision, band, part, color, options, progress):
     """Values [P, H], or [P, H, 3] where sky and sun have different colours."""
+    from mitsuba_cfs.sky.matrix import sky_matrix
+
     if tuple(color) == (1.0, 1.0, 1.0) or part == "sun":
         return sky_matrix(hours, subdivision, band, part, **options, progress=progress)
     sky = sky_matrix(hours, subdivision, band, "sky", **options, progress=progress)
@@ -149,6 +151,10 @@ def positions(weather: Path, out: Path, sun_model: str) -> None:
     (x east, y north, z up), and the irradiances.
     """
     check_file(out, field="OUT", inputs=[weather])
+    import pandas as pd
+
+    from mitsuba_cfs.sky import sun as sun_positions
+
     hours = read_weather(weather)
     towards = sun_positions.sun_directions(hours, model=sun_model)
     table = pd.DataFrame(
@@ -173,6 +179,8 @@ def positions(weather: Path, out: Path, sun_model: str) -> None:
 def wea(weather: Path, out: Path) -> None:
     """Write the irradiances of WEATHER (EPW) as a Radiance WEA file OUT."""
     check_file(out, field="OUT", inputs=[weather])
+    from mitsuba_cfs.sky.wea import write_wea
+
     hours = read_weather(weather)
     write_wea(hours, out)
     click.echo(f"{out}: {hours.site}, {len(hours.times)} time steps of {hours.step_h:g} h")
@@ -191,7 +199,7 @@ def wea(weather: Path, out: Path) -> None:
 )  # fmt: skip
 @click.option(
     "--least-altitude", type=click.FloatRange(0, 20),
-    default=sun_positions.LEAST_ALTITUDE_DEG, show_default=True,
+    default=LEAST_ALTITUDE_DEG, show_default=True,
     help="No direct sun below this altitude [degrees].",
 )  # fmt: skip
 def measured(
@@ -204,6 +212,9 @@ def measured(
     direct normal is (global - diffuse)/sin(altitude).
     """
     check_file(out, field="OUT", inputs=[table])
+    from mitsuba_cfs.sky.measured import read_measured
+    from mitsuba_cfs.sky.wea import write_wea
+
     hours = read_measured(
         table,
         latitude_deg=latitude,
@@ -243,6 +254,10 @@ def cie(
     number = int(kind_of_sky) if kind_of_sky.isdecimal() else kind_of_sky
     if number not in (*KINDS, *range(1, 16)):
         raise click.BadParameter(f"expected {', '.join(KINDS)} or 1 to 15", param_hint="KIND")
+    from mitsuba_cfs.sky import sun as sun_positions
+    from mitsuba_cfs.sky.cie import cie_patches
+    from mitsuba_cfs.sky.patches import ReinhartSky
+
     sun = sun_positions.direction(np.radians(altitude), np.radians(azimuth))
     sky = ReinhartSky(int(subdivision))
     values = cie_patches(number, sky, horizontal, sun=sun, ground_reflectance=ground) / EFFICACY
@@ -252,11 +267,16 @@ def cie(
 
 def sun_steps(weather: Weather, sun_model: str) -> np.ndarray:
     """Indices of the time steps with any of the sun above the horizon."""
+    from mitsuba_cfs.sky.matrix import sun_up
+
     return np.flatnonzero(sun_up(weather, sun_model=sun_model))
 
 
 def read_weather(path: Path) -> Weather:
     """An EPW or a WEA file, by its first word."""
+    from mitsuba_cfs.sky.wea import read_wea
+    from mitsuba_cfs.sky.weather import read_epw
+
     try:
         with open(path, "rb") as file:
             start = file.read(6).lower()

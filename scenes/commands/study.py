@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+from scenes.commands.parameters import FILE
 
 
 @click.command()
@@ -42,15 +42,10 @@ def command(
     """
     from mitsuba_cfs.files import check_file
     from mitsuba_cfs.matrices.cache import default_folder
-    from scenes.commands.progress_bar import ProgressBar
-    from scenes.job.inputs import read_weather
-    from scenes.study.automatic import settled
-    from scenes.study.plan import plan_of
+    from scenes.study.files import check_files, one_building
+    from scenes.study.schedule import check_dask
     from scenes.study.store import Store
-    from scenes.study.study import run_study, write_study
     from scenes.study.study_file import read_study
-    from scenes.study.write_ifc import building_file, write_study_ifc
-    from scenes.study_report import write_study_report
 
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
@@ -59,11 +54,21 @@ def command(
     default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
+        one_building(room.building for room in parsed.room)
+    if scheduler is not None:
+        check_dask()
+    check_files(parsed)  # before anything heavy is loaded
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.job.inputs import read_weather
+    from scenes.study.automatic import settled
+    from scenes.study.plan import plan_of
+    from scenes.study.study import run_study, write_study
+    from scenes.study.write_ifc import write_study_ifc
+    from scenes.study_report import write_study_report
+
     plan = settled(parsed, plan_of(parsed))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
-    if write_ifc is not None:
-        building_file(plan)  # or one line that there is none
     for path in dict.fromkeys(case.weather.path for case in plan.cases):
         for note in read_weather(path).notes:
             click.echo(f"note: {note}")
@@ -81,13 +86,19 @@ def command(
     )
     if result.clock:
         click.echo(f"auto: {result.clock}")
+    failed, total = result.failed, len(result.results)
     if nothing:
-        raise click.ClickException("no case could be computed")
+        raise click.ClickException(f"{failed} of {total} cases failed: {result.first_error}")
     click.echo(f"report: {out / 'report.html'}")
     if write_ifc is not None:
         for problem in write_study_ifc(result, write_ifc):
             click.echo(f"note: {problem.where}: {problem.what}")
         click.echo(f"building with results: {write_ifc}")
+    if failed:
+        raise click.ClickException(
+            f"{failed} of {total} cases failed, the first: {result.first_error}; "
+            f"the others are kept, and the same command tries these again"
+        )
 
 
 def _tell(case, result, ready: int, total: int) -> None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from scenes.commands.parameters import FILE
+
 if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
-
-FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
 @click.command()
@@ -23,16 +23,19 @@ def command(study: Path, out: Path) -> None:
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
     files) and their control, gains, outdoor air and set points; docs/thermal.md lists every field.
     """
-    from scenes.commands.progress_bar import ProgressBar
-    from scenes.heat.study import run_study
+    from scenes.heat.files import read_files
     from scenes.heat.study_file import read_study
     from scenes.result_folder import ResultFolder
 
     parsed = read_study(study)
-    files = (study, parsed.weather, parsed.building, *(system.bsdf for system in parsed.system))
-    folder = ResultFolder(out, "thermal", inputs=files)
+    inputs = (study, parsed.weather, parsed.building, *(one.bsdf for one in parsed.system))
+    folder = ResultFolder(out, "thermal", inputs=inputs)
+    files = read_files(parsed)  # before anything heavy is loaded
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.heat.study import run_study
+
     with ProgressBar() as progress:
-        rooms, notes = run_study(parsed, progress)
+        rooms, notes = run_study(parsed, progress, files)
     _write(rooms, notes, parsed, folder)
     for room in rooms:
         summary = room.summary

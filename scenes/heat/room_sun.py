@@ -27,7 +27,7 @@ from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_ma
 from mitsuba_cfs.trace.estimate import Stopping
 from scenes.heat.study_file import TraceTable
 from scenes.job.inputs import System
-from scenes.job.thermal import ThermalSystem
+from scenes.job.thermal_system import ThermalSystem
 from thermal.climate import Solar
 
 FloatArray = NDArray[np.float64]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,9 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Construction, MaterialLayer, Space
+from bim.model import Building, Space
 from bim.read_ifc import read_ifc
-from bim.shoebox import WindowRectangle, shoebox
 from bim.to_thermal import (
     ThermalRoom,
     coupled_rooms,
@@ -26,14 +26,16 @@ from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from scenes.heat.box import box_building
+from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_solar
-from scenes.heat.study_file import BoxTable, StudyFile, SystemTable
+from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
-from scenes.job.inputs import System, chosen_spaces, read_system, read_weather
-from scenes.job.thermal import ThermalSystem, climate, thermal_system
+from scenes.job.inputs import System, chosen_spaces
+from scenes.job.thermal import climate
+from scenes.job.thermal_system import ThermalSystem
 from thermal.balance import ZoneResult, simulate_zones
-from thermal.blackbox import layer_absorptances, linear_u, with_realised_films
 from thermal.climate import Solar
 from thermal.control import (
     always,
@@ -44,7 +46,6 @@ from thermal.control import (
     switched,
 )
 from thermal.gains import dimmed_share, split_gains
-from thermal.glazing import Gap, gap_resistance
 from thermal.zone import WindowElement, Zone, work_hours
 
 FloatArray = NDArray[np.float64]
@@ -73,11 +74,15 @@ class ReadyRoom:
     radiant: RadiantRoom | None
 
 
-def run_study(study: StudyFile, progress: Progress) -> tuple[list[RoomYear], tuple[str, ...]]:
-    """The rooms of a study, and what had to be assumed."""
-    weather = read_weather(study.weather)
-    systems = [read_system(s.bsdf, u_value=s.u_value, g_value=s.g_value) for s in study.system]
-    thermals = [state_of(s, t) for s, t in zip(systems, study.system, strict=True)]
+def run_study(
+    study: StudyFile, progress: Progress, files: HeatFiles | None = None
+) -> tuple[list[RoomYear], tuple[str, ...]]:
+    """The rooms of a study, and what had to be assumed.
+
+    Args: files: what `read_files` has read of the study; read now without.
+    """
+    files = files or read_files(study)
+    weather, systems, thermals = files.weather, files.systems, files.thermals
     building, spaces = rooms_of(study)
     zones = [thermal_room(space, thermals[0].fenestration) for space in spaces]
     notes = dict.fromkeys(note for t in (weather, *systems, *thermals) for note in t.notes)
@@ -138,27 +143,6 @@ def _floor(zone: Zone) -> int:
     return int(np.argmax([-s.normal[2] * s.area for s in zone.surfaces]))
 
 
-def state_of(system: System, table: SystemTable) -> ThermalSystem:
-    """A shading state's thermal data with the closure that its table asks for."""
-    plain = thermal_system(system)
-    fenestration = plain.fenestration
-    if table.u_model == "linear":
-        fenestration = replace(fenestration, resistance=linear_u(fenestration.u_value))
-    if table.gap is not None:
-        gap = Gap(table.gap.width, tuple(table.gap.gas.items()), table.gap.emissivity)
-        resistance = gap_resistance(fenestration.u_value, gap, item=system.name)
-        fenestration = replace(fenestration, resistance=resistance)
-    inner, outer = table.realised_inner_resistance, table.realised_outer_resistance
-    if inner is None and outer is None:
-        return replace(plain, fenestration=fenestration)
-    closed = with_realised_films(fenestration, r_inner_realised=inner, r_outer_realised=outer)
-    absorptances = layer_absorptances(
-        plain.transmittance, plain.reflectance, plain.g_value, closed.u_value,
-        r_outer=closed.r_outer, r_inner=closed.r_inner, item=system.name,
-    )  # fmt: skip
-    return replace(plain, fenestration=closed, absorptances=absorptances)
-
-
 def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
     """The building of a study and the rooms asked for."""
     if study.box is not None:
@@ -181,32 +165,6 @@ def coupled_spaces(building: Building, names: tuple[str, ...], path: Path) -> li
         raise DataError(str(error.args[0]), file=path, field="spaces") from error
 
 
-def box_building(box: BoxTable) -> Building:
-    """The box of a study as a building."""
-    constructions = {
-        side: Construction(
-            f"{side} of the study",
-            tuple(MaterialLayer(**layer.model_dump()) for layer in layers),
-            "study file",
-        )
-        for side, layers in box.construction.items()
-    }
-    try:
-        return shoebox(
-            box.width,
-            box.depth,
-            box.height,
-            windows=[WindowRectangle(**w.model_dump()) for w in box.window],
-            facing_deg=box.facing_deg,
-            recess=box.recess,
-            reflectance=box.reflectance or None,
-            adjacency=box.adjacency or None,
-            constructions=constructions or None,
-        )
-    except ValueError as error:
-        raise DataError(str(error), field="box") from error
-
-
 def _skies(weather: Weather, study: StudyFile) -> AnnualSky:
     subdivision = study.trace.sky_subdivision
     return annual_sky(weather, subdivision, sun=False, solar=True)
@@ -217,8 +175,8 @@ def ready_room(
     building: Building,
     space: Space,
     room: ThermalRoom,
-    systems: list[System],
-    thermals: list[ThermalSystem],
+    systems: Sequence[System],
+    thermals: Sequence[ThermalSystem],
     weather: Weather,
     skies: AnnualSky,
     progress: Progress,
@@ -277,7 +235,7 @@ def _zone(
     study: StudyFile,
     room: ThermalRoom,
     space: Space,
-    thermals: list[ThermalSystem],
+    thermals: Sequence[ThermalSystem],
     hours: int,
     daylight: FloatArray | None,
 ) -> Zone:

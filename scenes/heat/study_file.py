@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from bim.ifc.corrections import corrections_beside
+from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
+from scenes.toml_file import read_table, validated
 from thermal.zone import IdealLoads
 
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
-Hours = Annotated[tuple[int, int], Field(description="clock times from and to")]
+
+
+def _in_order(hours: tuple[int, int]) -> tuple[int, int]:
+    """Two clock times of one day: the balance takes no span over midnight."""
+    start, end = hours
+    if not 0 <= start < end <= 24:
+        raise ValueError(f"expected two hours of one day, 0 <= from < to <= 24, got {list(hours)}")
+    return hours
+
+
+Hours = Annotated[
+    tuple[int, int], AfterValidator(_in_order), Field(description="clock times from and to")
+]
 
 
 class _Table(BaseModel):
@@ -196,23 +210,14 @@ def read_study(path: Path) -> StudyFile:
 
     Raises: `DataError` naming the file and the field.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"is not TOML: {error}", file=path) from error
-    try:
-        study = StudyFile.model_validate(table)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise DataError(
-            first["msg"].removeprefix("Value error, "), file=path, field=field or None
-        ) from error
+    study = validated(StudyFile, read_table(path), path)
     here = path.parent
     systems = tuple(s.model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system)
     found = {"weather": _there(here, study.weather, path), "system": systems}
     if study.building is not None:
         found["building"] = _there(here, study.building, path)
+        check_head(found["building"])
+        corrections_beside(found["building"])
     return study.model_copy(update=found)
 
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mitsuba_cfs.errors import CfsError
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import View
@@ -16,26 +13,11 @@ from mitsuba_cfs.methods.glare import pictures
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress
+from scenes.job.picture_hours import hour_index
 from scenes.results import GlareResults, LuminancePicture
 
 DEFAULT_DAYS = ("03-21", "06-21", "12-21")
 DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
-
-
-class PictureHourError(CfsError, ValueError):
-    """An hour asked for that the year does not have, or when the sun is down."""
-
-
-def wanted_hours(
-    wanted: tuple[str, ...], times: pd.DatetimeIndex, lit: NDArray[np.int64]
-) -> list[int]:
-    """Hours of the year [indices] that were asked for.
-
-    Args:
-        wanted: "MM-DD HH": the hour that begins then.
-        times: [H] middles of the hours; lit: [L] hours with the sun up.
-    """
-    return [_hour(text, times, set(lit.tolist())) for text in wanted]
 
 
 def default_hours(
@@ -48,25 +30,9 @@ def default_hours(
     """
     labels = [f"{day} {clock:02d}" for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
     lit_set = set(lit.tolist())
-    found = [hour for label in labels if (hour := _find(label, times)) in lit_set]
+    found = [hour for label in labels if (hour := hour_index(label, times)) in lit_set]
     brightest = int(lit[np.argmax(eye_illuminance)])
     return found + [brightest] * (brightest not in found)
-
-
-def _hour(text: str, times: pd.DatetimeIndex, lit: set[int]) -> int:
-    if not re.fullmatch(r"\d\d-\d\d \d\d", text):
-        raise PictureHourError(f"--picture {text!r}: expected month, day and hour as in '06-21 12'")
-    hour = _find(text, times)
-    if hour is None:
-        raise PictureHourError(f"--picture {text!r}: the weather has no such hour")
-    if hour not in lit:
-        raise PictureHourError(f"--picture {text!r}: the sun is below the horizon then")
-    return hour
-
-
-def _find(text: str, times: pd.DatetimeIndex) -> int | None:
-    found = np.flatnonzero(times.strftime("%m-%d %H") == text)
-    return int(found[0]) if len(found) else None
 
 
 def room_glare(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from bim.model import Space
 from mitsuba_cfs.directions import window_frame
@@ -25,6 +24,7 @@ from scenes.heat.study_file import (
     SystemTable,
 )
 from scenes.job.inputs import System, read_system
+from scenes.toml_file import read_table, validated
 from thermal.control import always, by_cut_off, by_glare, by_irradiance, by_schedule
 from thermal.gains import dimmed_share, split_gains
 from thermal.zone import Zone, work_hours
@@ -75,16 +75,7 @@ def read_operation(path: Path) -> Operation:
 
     Raises: `DataError` that names file and field.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-        tables = OperationFile.model_validate(table)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"is not TOML: {error}", file=path) from error
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = ".".join(str(part) for part in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        raise DataError(message, file=path, field=field or None) from error
+    tables = validated(OperationFile, read_table(path), path)
     warm, cool = tables.loads.heating_c, tables.loads.cooling_c
     if warm is not None and cool is not None and warm > cool:
         raise DataError("the set point heating_c lies above cooling_c", file=path, field="loads")

@@ -31,15 +31,16 @@ from mitsuba_cfs.phases import window_radiance
 from mitsuba_cfs.progress import Progress, part, silent, staged
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
-from scenes.heat.study import state_of
 from scenes.job.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.job.daylight import room_daylight, room_scene
-from scenes.job.glare import default_hours, room_glare, wanted_hours
+from scenes.job.glare import default_hours, room_glare
 from scenes.job.holes import hole_problems
 from scenes.job.inputs import System
 from scenes.job.operation import Operation, operated, shading_states
 from scenes.job.options import RoomOptions
-from scenes.job.thermal import ThermalSystem, room_thermal, thermal_system
+from scenes.job.picture_hours import wanted_hours
+from scenes.job.thermal import room_thermal
+from scenes.job.thermal_system import ThermalSystem, state_of, thermal_system
 from scenes.job.windows import States, room_windows
 from scenes.results import DaylightResult, GlareResults, OperationResult, SpaceResult, ThermalResult
 from thermal.balance import ZoneResult

@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 
-import numpy as np
-
 from bim.model import Building, Problem, Space
 from bim.read_ifc import read_ifc
 from bim.templates import template_rooms
@@ -19,16 +17,16 @@ from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.sky.sun import is_up, sun_directions
+from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.alike import as_room, same_light, same_systems
 from scenes.job.attached import attached_systems
-from scenes.job.glare import wanted_hours
-from scenes.job.inputs import System, chosen_spaces, read_system, read_weather, sha256
-from scenes.job.operation import Operation, check_states, read_operation
+from scenes.job.files import JobFiles, read_files
+from scenes.job.inputs import System, chosen_spaces, sha256
+from scenes.job.operation import Operation, check_states
 from scenes.job.options import JobOptions
 from scenes.job.room import compute_room, skies_for
-from scenes.job.thermal import thermal_system
+from scenes.job.thermal_system import thermal_system
 from scenes.job.windows import States, everywhere
 from scenes.results import RunResult, SpaceResult
 
@@ -46,18 +44,21 @@ class JobInputs:
     operation: Operation | None
 
 
-def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
+def run_job(
+    options: JobOptions, progress: Progress = silent, files: JobFiles | None = None
+) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
+
+    Args: files: what `read_files` has read of the options; read now without.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     start = time.monotonic()
-    inputs = read_inputs(options, progress)
+    inputs = read_inputs(options, progress, files)
     building, weather = inputs.building, inputs.weather
     used = used_systems(inputs)
     thermal_notes = [note for system in used for note in thermal_system(system).notes]
     sun = sun_directions(weather)
-    wanted_hours(options.picture_hours, weather.midpoints, np.flatnonzero(is_up(sun)))
     variant = variants.activate()
     progress("sky", 0.0)
     skies = skies_for(weather, options)
@@ -89,14 +90,12 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
     )
 
 
-def read_inputs(options: JobOptions, progress: Progress) -> JobInputs:
-    """The inputs, the quick ones first."""
-    system, operation = None, None
-    if options.operation is not None:
-        operation = read_operation(options.operation)
-    if options.system is not None:
-        system = read_system(options.system, u_value=options.u_value, g_value=options.g_value)
-    weather = read_weather(options.weather)
+def read_inputs(
+    options: JobOptions, progress: Progress, files: JobFiles | None = None
+) -> JobInputs:
+    """The inputs, the building last."""
+    files = files or read_files(options)
+    system, operation, weather = files.system, files.operation, files.weather
     progress("inputs", 0.1)
     building = read_ifc(options.building, progress=part(progress, 0.1, 1.0, "inputs"))
     spaces = chosen_spaces(building, options.spaces, options.building)

@@ -13,7 +13,7 @@ from bim.model import Building, Space
 from bim.to_thermal import ThermalRoom, thermal_room
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs import phases
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -24,62 +24,18 @@ from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_ma
 from mitsuba_cfs.trace.estimate import Stopping
 from scenes.job.inputs import System
 from scenes.job.options import RoomOptions
+from scenes.job.thermal_system import ThermalSystem, thermal_system
 from scenes.job.windows import RoomWindows
 from scenes.results import ThermalResult
 from thermal.balance import ZoneResult, simulate
-from thermal.blackbox import Fenestration, LayerAbsorptances, layer_absorptances
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.comfort import adaptive_comfort, hours_between, running_mean, summarise
 from thermal.control import switched
-from thermal.gvalue import thermal_data
 from thermal.zone import Gains, Zone, work_hours
 
 BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
 RADIANT_SHARE = 0.5  # of the heat of people and equipment
 STEP_S = 600.0  # of the heat balance
-
-
-@dataclass(frozen=True, slots=True)
-class ThermalSystem:
-    """A fenestration system as the heat balance needs it, and what had to be assumed."""
-
-    fenestration: Fenestration
-    absorptances: LayerAbsorptances  # [K]
-    transmittance: NDArray[np.float64]  # [K] solar, direction to hemisphere
-    reflectance: NDArray[np.float64]  # [K] from outside
-    g_value: NDArray[np.float64]  # [K]
-    back_reflectance: float  # diffuse, from the room
-    back_absorptance: float  # diffuse, from the room
-    notes: tuple[str, ...]
-
-
-def thermal_system(system: System) -> ThermalSystem:
-    """U, g and layer absorptances by direction of a system."""
-    solar = system.solar
-    tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
-    rho = solar.direct_hemispherical(solar.reflection_front)
-    rho = np.minimum(rho, 1.0 - tau)
-    data = thermal_data(tau, rho, u_value=system.u_value, g_normal=system.g_value, item=system.name)
-    g_value = data.g_value if system.g_by_patch is None else system.g_by_patch
-    back_rho, back_tau = (
-        _diffuse(solar, block) for block in (solar.reflection_back, solar.transmission_back)
-    )
-    return ThermalSystem(
-        Fenestration(system.name, data.u_value),
-        layer_absorptances(tau, rho, g_value, data.u_value, item=system.name),
-        tau,
-        rho,
-        g_value,
-        back_rho,
-        max(1.0 - back_rho - back_tau, 0.0),
-        data.assumptions,
-    )
-
-
-def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
-    """Hemispherical value for diffuse light."""
-    weight = solar.basis_in.projected_solid_angles()
-    return float(weight @ solar.direct_hemispherical(block) / weight.sum())
 
 
 def room_thermal(

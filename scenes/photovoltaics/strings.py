@@ -9,7 +9,8 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.photovoltaics.two_diode import Cell, cell_currents, diode_voltage
+from scenes.photovoltaics.diode import diode_voltage
+from scenes.photovoltaics.two_diode import Cell, cell_currents
 
 BYPASS_VOLTAGE = 0.5  # across a bypass diode that carries the current (Schottky) [V]
 EVEN = 12  # currents, evenly spread, at which a string's power is looked at first

@@ -118,10 +118,7 @@ def run_pv(
     if not modules:
         message = f"chooses no element with a shape in {model}"
         raise DataError(message, file=file, field=f"module.select = {study.module.select!r}")
-    try:
-        cell = fitted_cell(study.module.datasheet())
-    except ValueError as error:
-        raise DataError(str(error), file=file, field="module") from None
+    cell = fitted_cell(study.module.datasheet())
     subsystems, problems = _subsystems(study, standing, modules, file)
     irradiance = cell_irradiance(
         standing.elements, modules, weather, samples=samples, seed=seed, progress=progress,

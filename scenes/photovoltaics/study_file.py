@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from mitsuba_cfs.errors import DataError
-from scenes.photovoltaics.two_diode import Datasheet
+from scenes.photovoltaics.two_diode import Datasheet, fitted_cell
+from scenes.toml_file import read_table, validated
 
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
@@ -64,18 +64,9 @@ class PvStudy(_Table):
 def read_pv_study(path: str | Path) -> PvStudy:
     """The study of a TOML file; `DataError` names the entry that is wrong."""
     path = Path(path)
+    study = validated(PvStudy, read_table(path), path)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DataError(f"is not TOML: {error}", file=path) from None
-    try:
-        study = PvStudy.model_validate(table)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = ".".join(str(part) for part in first["loc"])
-        raise DataError(first["msg"], file=path, field=field) from None
-    try:
-        study.module.datasheet()
+        fitted_cell(study.module.datasheet())
     except ValueError as error:
         raise DataError(str(error), file=path, field="module") from None
     return study

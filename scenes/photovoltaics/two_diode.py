@@ -19,17 +19,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 BOLTZMANN = 8.617333262e-5  # k / q [V/K]
 STANDARD_TEMPERATURE = 298.15  # of the datasheet's standard test conditions [K]
 STANDARD_IRRADIANCE = 1000.0  # [W/m2]
 ICE = 273.15  # 0 degrees Celsius [K]
-NEWTON_STEPS = 60
-CONVERGED = 1e-10  # [V]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +74,8 @@ def fitted_cell(sheet: Datasheet) -> Cell:
 
     Raises: `ValueError` where no cell with positive parameters has these points.
     """
+    from scipy.optimize import brentq
+
     thermal = BOLTZMANN * STANDARD_TEMPERATURE
     open_circuit, voltage = sheet.open_circuit_voltage / sheet.cells, sheet.voltage / sheet.cells
 
@@ -132,34 +130,3 @@ def silicon_gap(kelvin: ArrayLike) -> NDArray[np.float64]:
     """Band gap of silicon [eV]: 1.17 - 4.73e-4 T^2 / (T + 636)."""
     kelvin = np.asarray(kelvin, dtype=float)
     return 1.17 - 4.73e-4 * kelvin**2 / (kelvin + 636.0)
-
-
-def cell_voltage(
-    cell: Cell, current: ArrayLike, irradiance: ArrayLike, temperature: ArrayLike
-) -> NDArray[np.float64]:
-    """Voltage of one cell that carries a current [A]; negative where it is shaded and driven."""
-    photo, first, second, thermal = cell_currents(cell, irradiance, temperature)
-    inner = diode_voltage(photo, first, second, thermal, cell.shunt, current)
-    return inner - np.asarray(current, dtype=float) * cell.series
-
-
-@numba.vectorize(["f8(f8,f8,f8,f8,f8,f8)"], nopython=True, cache=True)
-def diode_voltage(photo, first, second, thermal, shunt, current):
-    """V_d [V] at a current [A], from I_ph, I_01, I_02 [A], V_t [V] and R_p [Ohm].
-
-    The current falls with V_d and is concave in it, so that Newton's method from above the root
-    comes down to it without overshooting.
-    """
-    spare = max(photo - current, 0.0)
-    inner = thermal * np.log1p(spare / first)
-    if second > 0:
-        inner = min(inner, 2 * thermal * np.log1p(spare / second))
-    for _ in range(NEWTON_STEPS):
-        root = np.exp(inner / (2 * thermal))
-        one, two = first * root * root, second * root
-        value = photo - (one - first) - (two - second) - inner / shunt - current
-        step = value / (one / thermal + two / (2 * thermal) + 1 / shunt)
-        inner += step
-        if abs(step) < CONVERGED:
-            break
-    return inner

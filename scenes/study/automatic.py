@@ -9,7 +9,8 @@ import numpy as np
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.calibration.choice import Choice, Demand, choose
-from scenes.calibration.costs import Calibration, Work, calibration_file
+from scenes.calibration.costs import Calibration, Work
+from scenes.calibration.shipped import this_machines_costs
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.study.case import AUTO, Case, with_method
 from scenes.study.plan import Plan
@@ -20,21 +21,22 @@ from thermal.comfort import hours_between
 def settled(study: StudyFile, plan: Plan, calibration: Calibration | None = None) -> Plan:
     """The plan with a method for every case; those of rooms with mirrors have their own.
 
-    Args: calibration: this machine's by default.
+    Args: calibration: this machine's by default, measured or scaled.
 
-    Raises: `DataError` where there is none.
+    Raises: `DataError` for a calibration of this machine that cannot be read.
     """
     open_cases = [case for case in plan.cases if case.chosen == AUTO]
     if not open_cases:
         return plan
-    calibration = calibration or Calibration.read(calibration_file())
+    calibration = calibration or this_machines_costs()
     calibration = calibration.scaled(study.options.picture_size)
     chosen: dict[bool, Choice] = {}
     for specular in {case.specular for case in open_cases}:
         cases = [case for case in open_cases if case.specular == specular]
         budget = study.auto.time_budget * len(cases) / len(open_cases)
         demand = Demand(work_of(cases), budget, study.auto.dgp_error, _fine(cases), specular)
-        chosen[specular] = choose(demand, calibration)
+        choice = choose(demand, calibration)
+        chosen[specular] = replace(choice, why=f"{choice.why}; {calibration.origin}")
     cases = []
     for case in plan.cases:
         if case.chosen == AUTO:

@@ -19,7 +19,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.heat.study import box_building
+from scenes.heat.box import box_building
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.job.operation import read_operation
 from scenes.job.room import compute_room, skies_for

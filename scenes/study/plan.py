@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bim.model import Building, Space
 from bim.read_ifc import read_ifc
-from scenes.heat.study import box_building
+from scenes.heat.box import box_building
 from scenes.job.inputs import chosen_spaces
 from scenes.job.options import RoomOptions
 from scenes.study.case import AUTO, Case, Source, program_version

@@ -10,11 +10,13 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from importlib.util import find_spec
 from multiprocessing import get_context
 
-from mitsuba_cfs.errors import CfsError, DataError
+from mitsuba_cfs.errors import DataError
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
+from scenes.user_errors import one_line, user_message
 
 Compute = Callable[[Case], CaseResult]
 CONNECT_SECONDS = 10
@@ -50,13 +52,16 @@ def attempted(compute: Compute, case: Case) -> CaseResult:
         return compute(case)
     except Exception as error:
         log.debug("case %s failed", case.key, exc_info=True)
-        return CaseResult(case.key, error=one_line(error))
+        return CaseResult(case.key, error=said(error))
 
 
-def one_line(error: BaseException) -> str:
-    """A failure in one line: the message of an expected one, the type too of another."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, CfsError) and text else f"{type(error).__name__}: {text}"
+def said(error: BaseException) -> str:
+    """A failure in one line: the message of an expected one, what is known of another."""
+    message = user_message(error)
+    if message is None and isinstance(error, ValueError):  # a room that cannot be computed
+        message = one_line(str(error))
+    fault = f"fault of the program: {one_line(repr(error))}; cfs -vv tells where"
+    return message or fault
 
 
 def _waves(cases: Sequence[Case]) -> tuple[list[Case], dict[str, list[Case]]]:
@@ -109,19 +114,24 @@ def _collected(result: Callable[[], CaseResult], case: Case) -> CaseResult:
     try:
         return result()
     except (Exception, CancelledError) as error:
-        return CaseResult(case.key, error=one_line(error))
+        return CaseResult(case.key, error=said(error))
+
+
+def check_dask() -> None:
+    """Raise `DataError` where Dask is not installed; it is not loaded."""
+    if find_spec("distributed") is None:
+        message = "needs Dask: pip install 'mitsuba-cfs[distributed]'"
+        raise DataError(message, field="--scheduler")
 
 
 def _on_cluster(cases: Sequence[Case], compute: Compute, address: str) -> Iterator[CaseResult]:
-    try:
-        from distributed import Client, as_completed
-    except ImportError as error:
-        message = "needs Dask: pip install 'mitsuba-cfs[distributed]'"
-        raise DataError(message, field="--scheduler") from error
+    check_dask()
+    from distributed import Client, as_completed
+
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
-        message = f"no Dask scheduler answers there: {one_line(error)}"
+        message = f"no Dask scheduler answers there: {one_line(str(error))}"
         raise DataError(message, element=address, field="--scheduler") from error
     leaders, followers = _waves(cases)
     by_key = {_task(case): case for case in cases}

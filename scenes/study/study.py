@@ -37,6 +37,11 @@ class StudyResult:
         return sum(bool(result.error) for result in self.results)
 
     @property
+    def first_error(self) -> str:
+        """Why the first case that failed did; empty where none did."""
+        return next((result.error for result in self.results if result.error), "")
+
+    @property
     def clock(self) -> str:
         """Predicted and actual time of the cases whose method `auto` chose, in words."""
         pairs = zip(self.plan.cases, self.results, strict=True)

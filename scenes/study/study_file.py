@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
@@ -12,16 +11,16 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    ValidationError,
     create_model,
     model_validator,
 )
 
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.durations import seconds_of, share_of
-from scenes.heat.study_file import BoxTable
+from scenes.heat.study_file import BoxTable, Hours
 from scenes.job.operation import read_operation
 from scenes.job.options import RoomOptions
+from scenes.toml_file import read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
 Name = Annotated[str, Field(min_length=1)]
@@ -78,7 +77,7 @@ def _options_table() -> type[BaseModel]:
     columns: dict[str, Any] = {}
     for field in fields(RoomOptions):
         if field.name not in OF_THE_GRID:
-            kind = hints[field.name]
+            kind = Hours if field.name == "occupied" else hints[field.name]
             if kind in (int, float):
                 kind = Annotated[kind, Field(ge=0)]
             columns[field.name] = (kind, field.default)
@@ -139,24 +138,13 @@ def read_study(path: Path, *, automatic: bool = False, **auto: str) -> StudyFile
 
     Raises: `DataError` naming the file and the key.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"is not TOML: {error}", file=path) from error
+    table = read_table(path)
     _name_entries(table)
     if automatic:
         table["methods"] = ["auto"]
     if auto:
         table["auto"] = table.get("auto", {}) | auto
-    try:
-        study = StudyFile.model_validate(table)
-    except ValidationError as error:
-        first, *others = error.errors(include_url=False)
-        field = ".".join(str(part) for part in first["loc"])
-        more = f" (and {len(others)} more)" if others else ""
-        message = first["msg"].removeprefix("Value error, ") + more
-        raise DataError(message, file=path, field=field or None) from error
-    return _with_places(study, path)
+    return _with_places(validated(StudyFile, table, path), path)
 
 
 def _name_entries(table: dict) -> None:

@@ -7,26 +7,13 @@ from pathlib import Path
 
 from bim.ifc.results_write import SET_NAME, write_results
 from bim.model import Problem, Space
-from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import replacing
 from scenes.study.case import Case, Source
-from scenes.study.plan import Plan
+from scenes.study.files import one_building
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 
 OF_WINDOWS = ("u_value", "g_value", "visible_transmittance", "solar_transmittance")
-
-
-def building_file(plan: Plan) -> Path:
-    """The one building file of a study.
-
-    Raises: `DataError` where its rooms are boxes, or of several files.
-    """
-    files = {case.building.path for case in plan.cases if isinstance(case.building, Source)}
-    if len(files) != 1 or any(not isinstance(case.building, Source) for case in plan.cases):
-        message = f"needs a study of one building file; this one has {len(files)}, or boxes"
-        raise DataError(message, field="--write-ifc")
-    return files.pop()
 
 
 def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
@@ -34,7 +21,8 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
 
     A set is named after its case, "CFS results: system, climate, angle, method".
     """
-    source = building_file(study.plan)
+    buildings = (case.building for case in study.plan.cases)
+    source = one_building(one.path if isinstance(one, Source) else None for one in buildings)
     done = [
         (case, result)
         for case, result in zip(study.plan.cases, study.results, strict=True)

@@ -28,12 +28,17 @@ class NamedView:
 
 def chosen_views(space: Space, options: YearOptions) -> list[NamedView]:
     """Every view of the options; without any the room's middle towards its biggest window."""
-    if options.views:
-        found = [view for text in options.views for view in _given(text, options.size)]
-    else:
-        found = _grid(space, options)
+    found = given_views(options) if options.views else _grid(space, options)
     for each in found:
-        _check(each, space)
+        _check_eye(each, space)
+    return found
+
+
+def given_views(options: YearOptions) -> list[NamedView]:
+    """The views that the options state; they can be read and rated before a room is known."""
+    found = [view for text in options.views for view in _given(text, options.size)]
+    for each in found:
+        _check_kind(each)
     return found
 
 
@@ -82,7 +87,7 @@ def turned(direction: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     return np.array([c * x - s * y, s * x + c * y, z])
 
 
-def _check(each: NamedView, space: Space) -> None:
+def _check_kind(each: NamedView) -> None:
     """Refuse views whose glare would mean nothing."""
     view = each.view
     if view.kind not in ("angular", "hemispherical"):
@@ -95,7 +100,11 @@ def _check(each: NamedView, space: Space) -> None:
             "expected 180 x 180 (-vh 180 -vv 180)",
             field="--view",
         )
-    x, y, z = view.position
+
+
+def _check_eye(each: NamedView, space: Space) -> None:
+    """Refuse an eye outside the room."""
+    x, y, z = each.view.position
     section = horizontal_section(space.shell, z)
     if section.is_empty or not section.contains(shapely.Point(x, y)):
         raise DataError(

@@ -30,7 +30,8 @@ from mitsuba_cfs.progress import Progress, part, silent, staged
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
-from scenes.job.inputs import chosen_spaces, read_system, read_weather, sha256
+from scenes.job.inputs import chosen_spaces, sha256
+from scenes.year_of_glare.files import YearFiles, read_files
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
 
@@ -64,9 +65,15 @@ class Year:
     notes: tuple[str, ...] = ()  # of system and weather
 
 
-def read_year(options: YearOptions, progress: Progress = silent) -> Year:
-    """Read and check all inputs, the quick ones first; `DataError` where one cannot be used."""
-    system, weather = read_system(options.system), read_weather(options.weather)
+def read_year(
+    options: YearOptions, progress: Progress = silent, files: YearFiles | None = None
+) -> Year:
+    """Read and check all inputs, the building last; `DataError` where one cannot be used.
+
+    Args: files: what `read_files` has read of the options; read now without.
+    """
+    files = files or read_files(options)
+    system, weather = files.system, files.weather
     progress("inputs", 0.1)
     building = read_ifc(options.building, progress=part(progress, 0.1, 0.6, "inputs"))
     names = () if options.space is None else (options.space,)

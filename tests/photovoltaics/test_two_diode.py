@@ -8,13 +8,13 @@ import numpy as np
 import pvlib
 import pytest
 
+from scenes.photovoltaics.diode import cell_voltage
 from scenes.photovoltaics.strings import string_power, string_voltage
 from scenes.photovoltaics.two_diode import (
     BOLTZMANN,
     ICE,
     Datasheet,
     cell_currents,
-    cell_voltage,
     fitted_cell,
 )
 

@@ -33,7 +33,7 @@ def _run_job(_options, *_others, **_more):
     return replace(result, spaces=tuple(spaces))
 
 
-def _thermal(_study, _progress):
+def _thermal(_study, *_others):
     hours = pd.DataFrame({"air_c": np.linspace(15.0, 30.0, 8760)})
     summary = dict.fromkeys(
         ("operative_min_c", "operative_max_c", "heating_kwh", "cooling_kwh",
@@ -59,7 +59,7 @@ def _pv(_building, weather, _study, **_options):
     )  # fmt: skip
 
 
-def _read_year(options, _progress):
+def _read_year(options, *_others):
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.metrics.schedules import working_hours
     from mitsuba_cfs.sky.weather import read_epw
@@ -84,7 +84,7 @@ def _rate_views(year, kept, _progress):
     yield ViewYear(year.views[0], ratings, {year.weather.midpoints[worst]: picture}, 1.0)
 
 
-def _room_picture(_options, _progress):
+def _room_picture(_options, *_others):
     from mitsuba_cfs.images.view import fisheye
     from scenes.view_picture import RoomPicture
 
@@ -132,7 +132,7 @@ WORK = {
     "scenes.photovoltaics.picture.view_directions": lambda _result: [],
     "scenes.year_of_glare.year.read_year": _read_year,
     "scenes.year_of_glare.year.rate_views": _rate_views,
-    "scenes.commands.picture.room_picture": _room_picture,
+    "scenes.view_picture.room_picture": _room_picture,
     "scenes.calibration.measure.calibrated": _calibrated,
     "scenes.evidence.benchmarks.harness.benchmarks": _benchmarks,
     "scenes.bsdf_generation.generated_file": _generated_file,
@@ -148,7 +148,7 @@ def quick_work(give: Callable[[object, str, object], object] = setattr, among: s
     """
     needs = {
         "run": "scenes.job", "demo": "scenes.job", "thermal": "scenes.heat.study", "pv": "photovol",
-        "dgp": "year_of_glare", "picture": "commands.picture", "calibrate": "calibration",
+        "dgp": "year_of_glare", "picture": "view_picture", "calibrate": "calibration",
         "bench": "benchmarks", "bsdf": "bsdf_generation", "study": "scenes.study",
     }  # fmt: skip
     for name, function in WORK.items():

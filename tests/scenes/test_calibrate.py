@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.choice import ERRORS, Demand, choose
-from scenes.calibration.costs import HEAT, Calibration, Work
+from scenes.calibration.costs import HEAT, Calibration, Work, calibration_file
+from scenes.calibration.shipped import Speed, scaled_costs, shipped_costs
+from scenes.calibration.speed import measured_speed
 from scenes.cost.measure import Cost
 
 MINUTE, DAY = 60.0, 86400.0
@@ -91,7 +95,48 @@ def test_a_calibration_survives_its_file(tmp_path):
     assert half.seconds("point-in-time", "sDGP", one) == pytest.approx(0.1 * MINUTE)
 
 
-def test_no_calibration_is_one_clear_line(tmp_path):
+def test_the_costs_that_ship_are_scaled_to_the_machine():
+    """Twice as slow in tracing and thrice in rating: every cost follows one of the two."""
+    there, costs = shipped_costs()
+    assert set(costs.pairs()) == set(ERRORS)
+    here = Speed(2 * there.tracing, 3 * there.rating)
+    found = scaled_costs(here)
+    for old, new in zip(costs.costs, found.costs, strict=True):
+        step = 2 if old.method == "point-in-time" else 3
+        assert new.per_scene == pytest.approx(2 * old.per_scene)
+        assert new.per_system == pytest.approx(2 * old.per_system)
+        assert new.per_step == pytest.approx(step * old.per_step)
+    year = Work(1, 1, 3430, 4450)
+    times = {method: costs.seconds(method, "DGP", year) for method, _ in costs.pairs()}
+    assert 0 < times["three-phase"] < times["five-phase"] < times["point-in-time"]
+
+
+def test_without_a_calibration_the_shipped_costs_are_taken_and_said(tmp_path, monkeypatch):
+    from scenes.calibration import speed
+    from scenes.study.automatic import settled
+    from scenes.study.plan import plan_of
+    from scenes.study.study_file import read_study
+    from tests.scenes.study_files import study_file
+
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(speed, "measured_speed", lambda: Speed(0.2, 0.002))
+    study = read_study(study_file(tmp_path, 'methods = ["auto"]\n'))
+    plan = settled(study, plan_of(study))
+    assert "costs that ship with the program, scaled by a two-second test" in plan.cases[0].chosen
+    THEIR_MACHINE.write(calibration_file())
+    why = settled(study, plan_of(study)).cases[0].chosen
+    assert "measured on this machine by `cfs calibrate`" in why and "ship" not in why
+
+
+def test_the_machines_speed_is_measured_in_seconds(variant):
+    start = time.process_time()
+    found = measured_speed()
+    assert 0 < found.rating < found.tracing
+    # all threads, kernels that are compiled the first time among them; 4 s on two busy cores
+    assert time.process_time() - start < 30
+
+
+def test_a_calibration_that_cannot_be_read_is_one_clear_line(tmp_path):
     with pytest.raises(DataError, match="run `cfs calibrate`"):
         Calibration.read(tmp_path / "none.json")
     (tmp_path / "bad.json").write_text('{"machine": 1}')
@@ -102,7 +147,7 @@ def test_no_calibration_is_one_clear_line(tmp_path):
 @pytest.mark.slow
 def test_this_machine_is_measured_and_found_again(tmp_path, monkeypatch, capsys):
     from mitsuba_cfs.methods import METHODS
-    from scenes.calibration.costs import GLARE, calibration_file
+    from scenes.calibration.costs import GLARE
     from scenes.cli import run
 
     monkeypatch.setenv("CFS_CACHE", str(tmp_path))

@@ -84,7 +84,7 @@ def test_a_bad_study_file_names_its_field(failing, capsys) -> None:
     code = failing(lambda: _Options.model_validate({"views": "many"}))
     assert code == 1
     line = capsys.readouterr().err
-    assert line.startswith("error: _Options: views: ")
+    assert line.startswith("error: views: ")
     assert line.endswith("(and 1 more)\n")
     assert len(line.splitlines()) == 1
 

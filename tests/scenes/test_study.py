@@ -33,8 +33,8 @@ bsdf = "{VENETIAN_BLIND}"
 g_value = 0.3
 """
 WRONG = {
-    "no system": ("", BOX + CLIMATE, "system: Field required"),
-    "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: Extra inputs"),
+    "no system": ("", BOX + CLIMATE, "system: is missing"),
+    "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: no such key; there are title"),
     "unknown method": (
         'methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: Input should be",
     ),
@@ -201,6 +201,54 @@ def test_one_failed_case_leaves_the_others(tmp_path):
     assert list(table["status"]) == ["done", "failed", "done"]
     assert table["error"][1] == "this one fails" and np.isnan(table["angle"][1])
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 2  # a failure is tried again
+
+
+def _failing(case):
+    """A case of which one orientation cannot be computed."""
+    from thermal.errors import ThermalInputError
+
+    if case.orientation_deg == 13:
+        raise ThermalInputError("shade: g", "0.1 is below tau")
+    return noted(case)
+
+
+def test_failed_cases_end_with_exit_1_and_their_number(tmp_path, capsys, monkeypatch):
+    from scenes.study import study as module
+
+    monkeypatch.chdir(tmp_path)  # where `noted` leaves its log, under the room's name
+    monkeypatch.setattr("scenes.study_report.write_study_report", lambda _, path: path.touch())
+    options = dict(module.run_study.__kwdefaults__) | {"compute": _failing}
+    monkeypatch.setattr(module.run_study, "__kwdefaults__", options)
+    path = study_file(tmp_path, "orientations_deg = [0, 13, 20]\n")
+    assert run(["study", str(path), "--out", "out"]) == 1
+    said = capsys.readouterr()
+    last = said.err.splitlines()[-1]
+    assert last.startswith("error: 1 of 3 cases failed, the first: shade: g: 0.1 is below tau")
+    assert "Error" not in said.err + said.out  # no class is named
+    assert (tmp_path / "out" / "report.html").exists()
+    table = pd.read_csv(tmp_path / "out" / "results.csv")
+    assert list(table["status"]) == ["done", "failed", "done"]
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (DataError("is short", file="a.epw"), "a.epw: is short"),
+        (ValueError("no closed room"), "no closed room"),
+        (OSError(28, "No space left on device", "x.npz"), "x.npz: the disk is full"),
+        (MemoryError(), "out of memory"),
+    ],
+)
+def test_a_case_that_fails_says_why_without_a_class(error, words):
+    from scenes.study.schedule import said
+
+    assert said(error) == words
+
+
+def test_a_fault_of_the_program_is_called_so():
+    from scenes.study.schedule import said
+
+    assert said(KeyError("D")).startswith("fault of the program: KeyError('D')")
 
 
 def test_a_file_that_changed_since_the_plan_is_said(tmp_path):

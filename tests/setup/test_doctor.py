@@ -35,11 +35,26 @@ def test_self_test_passes_here() -> None:
         assert any(line.startswith(word) for line in done.stdout.splitlines()), word
 
 
-def test_missing_library_falls_back_to_scalar_with_a_warning() -> None:
+def test_missing_library_is_said_last_with_what_to_do() -> None:
     done = _doctor(**{llvm.VARIABLE: "/nowhere/libLLVM.so.19", "CUDA_VISIBLE_DEVICES": ""})
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 1
     assert "scalar_rgb" in done.stdout
-    assert "apt-get install libllvm19" in done.stdout
+    assert len(done.stderr.splitlines()) == 1
+    assert "only slow single images work" in done.stderr
+    assert "apt-get install libllvm19" in done.stderr
+
+
+def test_a_missing_package_is_said_last_with_what_to_do(monkeypatch, capsys) -> None:
+    from scenes.cli import run
+
+    installed = doctor._version
+    gone = lambda name: None if name == "shapely" else installed(name)  # noqa: E731
+    monkeypatch.setattr(doctor, "_version", gone)
+    monkeypatch.setattr(doctor, "self_test", lambda: "self-test: No module named 'shapely'")
+    assert run(["doctor"]) == 1
+    said = capsys.readouterr()
+    assert said.err == "error: not installed: shapely; pip install shapely\n"
+    assert any(line.split() == ["shapely", "MISSING"] for line in said.out.splitlines())
 
 
 def test_library_that_aborts_is_one_line() -> None:
@@ -60,7 +75,7 @@ def test_result_that_misses_the_closed_form_fails(monkeypatch, capsys) -> None:
     answer += '"agrees": false, "seconds": 0.1}'
     done = subprocess.CompletedProcess([], 0, stdout=answer + "\n", stderr="")
     monkeypatch.setattr(doctor.subprocess, "run", lambda *_, **__: done)
-    assert doctor.self_test() == "self-test: the traced rays miss the closed form"
+    assert doctor.self_test().startswith("self-test: the traced rays miss the closed form; ")
     assert "FAILED" in capsys.readouterr().out
 
 

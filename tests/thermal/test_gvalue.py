@@ -94,7 +94,7 @@ def test_g_per_direction_keeps_the_given_g_and_says_what_it_assumed():
 
 
 def test_g_below_transmittance_is_refused():
-    with pytest.raises(ThermalInputError, match=r"g: 0\.3 is below tau 0\.470"):
+    with pytest.raises(ThermalInputError, match=r"g: 0\.3 is below the solar transmittance 0\.470"):
         thermal_data([0.47], [0.2], u_value=1.2, g_normal=0.3)
     with pytest.raises(ThermalInputError, match="U"):
         thermal_data([0.47], [0.2], u_value=12.0)

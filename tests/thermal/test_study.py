@@ -153,4 +153,4 @@ def test_fault_of_a_system_names_it(tmp_path, variant, capsys):
     path = study_file(tmp_path, "g_value = 0.05\n" + TRACE)
     assert main(["thermal", str(path), "--out", str(tmp_path / "out")]) != 0
     error = capsys.readouterr().err
-    assert "venetian blind" in error and "0.05 is below tau" in error
+    assert "venetian blind" in error and "0.05 is below the solar transmittance 0.154" in error

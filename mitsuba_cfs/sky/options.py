@@ -1,0 +1,11 @@
+"""What the user may choose about sun and sky, and the defaults; apart from what computes them, so
+that a command's options are known before anything is loaded.
+"""
+
+from __future__ import annotations
+
+SUN_MODELS = ("spa", "radiance")
+LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam
+PARTS = ("all", "sky", "sun")
+SUN_PATCHES = 4  # gendaymtx spreads the sun over this many patches
+LABELS = {"start": 0.0, "middle": 0.5, "end": 1.0}  # where in its interval a time stands

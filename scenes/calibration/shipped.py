@@ -1,0 +1,92 @@
+"""The costs that ship with the program, for a machine on which `cfs calibrate` was never run.
+
+They were measured on one machine, with the two-second test of `speed` before and after; that test
+brings them to another one:
+
+    tracing     V, D, direct sun, every step of point-in-time       times tracing here / there
+    steps       of the phase methods and heat: algebra and rating   times rating here / there
+
+python -m scenes.calibration.shipped [--size 300]        measures and writes them anew
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from scenes.calibration.costs import Calibration, calibration_file
+from scenes.cost.measure import Cost
+
+FILE = Path(__file__).with_name("shipped.json")
+PATHS = "point-in-time"
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """Elapsed seconds of the two tests of a machine's speed, the least of several."""
+
+    tracing: float  # [s] V and D of an eye, on all cores or the GPU
+    rating: float  # [s] of one picture's glare
+
+
+def this_machines_costs() -> Calibration:
+    """What `cfs calibrate` has kept; the shipped costs, scaled by a two-second test, without it.
+
+    Raises: `DataError` for a kept file that cannot be read.
+    """
+    file = calibration_file()
+    return Calibration.read(file) if file.is_file() else scaled_costs()
+
+
+def scaled_costs(here: Speed | None = None) -> Calibration:
+    """The shipped costs for a machine of that speed; this one's, tested now, by default."""
+    if here is None:
+        from scenes.calibration.speed import measured_speed
+
+        here = measured_speed()
+    there, costs = shipped_costs()
+    tracing, rating = here.tracing / there.tracing, here.rating / there.rating
+    origin = (
+        f"costs that ship with the program, scaled by a two-second test of this machine (tracing "
+        f"{tracing:.2g}, rating {rating:.2g} times as long); `cfs calibrate` measures it"
+    )
+    scaled = tuple(_scaled(cost, tracing, rating) for cost in costs.costs)
+    return replace(costs, costs=scaled, origin=origin)
+
+
+def _scaled(cost: Cost, tracing: float, rating: float) -> Cost:
+    step = tracing if cost.method == PATHS else rating
+    return replace(
+        cost,
+        per_scene=tracing * cost.per_scene,
+        per_system=tracing * cost.per_system,
+        per_step=step * cost.per_step,
+    )
+
+
+def shipped_costs() -> tuple[Speed, Calibration]:
+    """The costs as they were measured, and the speed of the machine that they are of."""
+    table = json.loads(FILE.read_text(encoding="utf-8"))
+    return Speed(**table.pop("speed")), Calibration.of(table)
+
+
+def main() -> None:
+    """Measure this machine, its speed before and after, and write the file that ships."""
+    from scenes.calibration.measure import calibrated
+    from scenes.calibration.speed import measured_speed
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size", type=int, default=300, help="pixels of a side")
+    size = parser.parse_args().size
+    before = measured_speed()
+    found = calibrated(size)
+    after = measured_speed()
+    speed = {name: min(getattr(before, name), getattr(after, name)) for name in asdict(before)}
+    table = {"speed": speed} | asdict(found)
+    FILE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""The box-shaped room of a study file as a building."""
+
+from __future__ import annotations
+
+from bim.model import Building, Construction, MaterialLayer
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.errors import DataError
+from scenes.heat.study_file import BoxTable
+
+
+def box_building(box: BoxTable) -> Building:
+    """The box of a study as a building."""
+    constructions = {
+        side: Construction(
+            f"{side} of the study",
+            tuple(MaterialLayer(**layer.model_dump()) for layer in layers),
+            "study file",
+        )
+        for side, layers in box.construction.items()
+    }
+    try:
+        return shoebox(
+            box.width,
+            box.depth,
+            box.height,
+            windows=[WindowRectangle(**w.model_dump()) for w in box.window],
+            facing_deg=box.facing_deg,
+            recess=box.recess,
+            reflectance=box.reflectance or None,
+            adjacency=box.adjacency or None,
+            constructions=constructions or None,
+        )
+    except ValueError as error:
+        raise DataError(str(error), field="box") from error

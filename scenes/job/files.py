@@ -1,0 +1,77 @@
+"""The small files and the choices of a run, read and checked before its building is.
+
+No tracer and no IFC reader is loaded for that: a mistake is named within a second or two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bim.ifc.corrections import corrections_beside
+from bim.ifc.head import check_head
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.weather import Weather
+from scenes.job.inputs import System, read_system, read_weather
+from scenes.job.operation import Operation, check_states, read_operation
+from scenes.job.options import JobOptions
+from scenes.job.picture_hours import check_hours, wanted_hours
+from scenes.job.thermal_system import checked_system
+
+
+@dataclass(frozen=True, slots=True)
+class JobFiles:
+    """What the files of a run hold, all but the building."""
+
+    weather: Weather
+    system: System | None
+    operation: Operation | None
+
+
+def read_files(options: JobOptions) -> JobFiles:
+    """The weather, the system and the operation of a run, the quick ones first.
+
+    Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
+    """
+    check_head(options.building)
+    corrections_beside(options.building)
+    check_names(options.spaces)
+    check_hours(options.picture_hours)
+    weather = read_weather(options.weather)
+    check_hours(options.picture_hours, weather.midpoints)
+    operation = None if options.operation is None else read_operation(options.operation)
+    system = None
+    if options.system is not None:
+        system = read_system(options.system, u_value=options.u_value, g_value=options.g_value)
+        checked_system(system, options.system)
+    if operation is not None:
+        _check_operation(operation, system)
+    _check_sun(options, weather)
+    return JobFiles(weather, system, operation)
+
+
+def check_names(names: tuple[str, ...], field: str = "--space") -> None:
+    """Raise `DataError` for the name of a room that cannot be one."""
+    for name in names:
+        if not name.strip():
+            raise DataError("expected the name or GUID of a room, got nothing", field=field)
+
+
+def _check_sun(options: JobOptions, weather: Weather) -> None:
+    """Whether the sun is up in the hours asked for; where it is takes a second to load."""
+    if options.picture_hours:
+        from mitsuba_cfs.sky.sun import is_up, sun_directions
+
+        lit = np.flatnonzero(is_up(sun_directions(weather)))
+        wanted_hours(options.picture_hours, weather.midpoints, lit)
+
+
+def _check_operation(operation: Operation, system: System | None) -> None:
+    """What does not need the windows: its systems' data, and its control's states."""
+    for one, path in zip(operation.systems, operation.files, strict=True):
+        checked_system(one, path, operation.table_of(one))
+    if operation.systems:
+        check_states(operation, len(operation.systems))
+    elif system is not None:
+        check_states(operation, 1)

@@ -1,0 +1,101 @@
+"""What the heat balance needs of a fenestration system: U, g and absorptances by direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.errors import DataError
+from scenes.heat.study_file import SystemTable
+from scenes.job.inputs import System
+from thermal.blackbox import (
+    Fenestration,
+    LayerAbsorptances,
+    layer_absorptances,
+    linear_u,
+    with_realised_films,
+)
+from thermal.errors import ThermalInputError
+from thermal.glazing import Gap, gap_resistance
+from thermal.gvalue import thermal_data
+
+
+@dataclass(frozen=True, slots=True)
+class ThermalSystem:
+    """A fenestration system as the heat balance needs it, and what had to be assumed."""
+
+    fenestration: Fenestration
+    absorptances: LayerAbsorptances  # [K]
+    transmittance: NDArray[np.float64]  # [K] solar, direction to hemisphere
+    reflectance: NDArray[np.float64]  # [K] from outside
+    g_value: NDArray[np.float64]  # [K]
+    back_reflectance: float  # diffuse, from the room
+    back_absorptance: float  # diffuse, from the room
+    notes: tuple[str, ...]
+
+
+def thermal_system(system: System) -> ThermalSystem:
+    """U, g and layer absorptances by direction of a system."""
+    solar = system.solar
+    tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
+    rho = solar.direct_hemispherical(solar.reflection_front)
+    rho = np.minimum(rho, 1.0 - tau)
+    data = thermal_data(tau, rho, u_value=system.u_value, g_normal=system.g_value, item=system.name)
+    g_value = data.g_value if system.g_by_patch is None else system.g_by_patch
+    back_rho, back_tau = (
+        _diffuse(solar, block) for block in (solar.reflection_back, solar.transmission_back)
+    )
+    return ThermalSystem(
+        Fenestration(system.name, data.u_value),
+        layer_absorptances(tau, rho, g_value, data.u_value, item=system.name),
+        tau,
+        rho,
+        g_value,
+        back_rho,
+        max(1.0 - back_rho - back_tau, 0.0),
+        data.assumptions,
+    )
+
+
+def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
+    """Hemispherical value for diffuse light."""
+    weight = solar.basis_in.projected_solid_angles()
+    return float(weight @ solar.direct_hemispherical(block) / weight.sum())
+
+
+def state_of(system: System, table: SystemTable) -> ThermalSystem:
+    """A shading state's thermal data with the closure that its table asks for."""
+    plain = thermal_system(system)
+    fenestration = plain.fenestration
+    if table.u_model == "linear":
+        fenestration = replace(fenestration, resistance=linear_u(fenestration.u_value))
+    if table.gap is not None:
+        gap = Gap(table.gap.width, tuple(table.gap.gas.items()), table.gap.emissivity)
+        resistance = gap_resistance(fenestration.u_value, gap, item=system.name)
+        fenestration = replace(fenestration, resistance=resistance)
+    inner, outer = table.realised_inner_resistance, table.realised_outer_resistance
+    if inner is None and outer is None:
+        return replace(plain, fenestration=fenestration)
+    closed = with_realised_films(fenestration, r_inner_realised=inner, r_outer_realised=outer)
+    absorptances = layer_absorptances(
+        plain.transmittance, plain.reflectance, plain.g_value, closed.u_value,
+        r_outer=closed.r_outer, r_inner=closed.r_inner, item=system.name,
+    )  # fmt: skip
+    return replace(plain, fenestration=closed, absorptances=absorptances)
+
+
+def checked_system(system: System, path: Path, table: SystemTable | None = None) -> ThermalSystem:
+    """The thermal data of a system, with the closure of its table where there is one.
+
+    Args: path: the file that U and g are wrong in, for the message.
+
+    Raises: `DataError` where U, g and the BSDF do not go together.
+    """
+    try:
+        return thermal_system(system) if table is None else state_of(system, table)
+    except ThermalInputError as error:
+        raise DataError(error.message, file=path, element=error.item) from error

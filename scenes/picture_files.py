@@ -1,0 +1,72 @@
+"""The small files and choices of a picture, read and checked before its building is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from bim.ifc.corrections import corrections_beside
+from bim.ifc.head import check_head
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.view import View, fitted, parse_view
+from mitsuba_cfs.sky.weather import Weather
+from scenes.job.files import check_names
+from scenes.job.inputs import System, read_system, read_weather
+from scenes.picture_options import PictureOptions
+
+
+@dataclass(frozen=True, slots=True)
+class PictureFiles:
+    """What the files of a picture hold, all but the building."""
+
+    weather: Weather
+    hour: int  # of the year
+    view: View | None  # None: the room's middle, to its biggest window
+    system: System
+
+
+def read_files(options: PictureOptions) -> PictureFiles:
+    """The hour, the view and the system of a picture, the quick ones first.
+
+    Raises: `DataError` for a file that cannot be used, `ValueError` for a wrong hour.
+    """
+    check_head(options.building)
+    corrections_beside(options.building)
+    check_names(() if options.space is None else (options.space,))
+    view = None if options.view is None else given_view(options.view, options.size)
+    weather = read_weather(options.weather)
+    hour = hour_of(weather, options.at)
+    return PictureFiles(weather, hour, view, read_system(options.system))
+
+
+def hour_of(weather: Weather, at: str) -> int:
+    """The hour of the year that holds a month, day and time of day."""
+    try:
+        asked = pd.to_datetime(f"2000-{at}", format="%Y-%m-%d %H:%M")
+    except ValueError:
+        raise ValueError(f"--at {at}: expected month-day hour:minute, as 06-21 12:00") from None
+    middles = weather.midpoints
+    same_day = (middles.month == asked.month) & (middles.day == asked.day)
+    found = np.flatnonzero(same_day & (middles.hour == asked.hour))
+    if not len(found):
+        raise ValueError(f"--at {at}: the weather of {weather.site} has no such hour")
+    return int(found[0])
+
+
+def given_view(text: str, size: int) -> View:
+    """The view of a text, or of the first line of a file that holds one; with square pixels."""
+    file = None
+    if not text.strip().startswith("-v"):
+        file = Path(text)
+        try:
+            lines = file.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise DataError(f"cannot be read: {error}", file=file, field="--view") from None
+        text = next((line for line in lines if "-v" in line), "")
+    try:
+        return fitted(parse_view(text), size)
+    except ValueError as error:
+        raise DataError(str(error), file=file, field="--view") from None

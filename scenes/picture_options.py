@@ -1,0 +1,24 @@
+"""What the user may choose about a picture; every default is stated here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+SUFFIXES = (".hdr", ".exr", ".png")
+
+
+@dataclass(frozen=True, slots=True)
+class PictureOptions:
+    """Inputs and choices."""
+
+    building: Path
+    weather: Path
+    system: Path
+    at: str  # month, day and clock time, `06-21 12:00`
+    space: str | None = None  # name or GUID; None: the first room that has a window
+    view: str | None = None  # Radiance view options, or a file of them
+    eye_height: float = 1.2  # [m] above the floor, where no view is given
+    size: int = 800  # [px] of the longer side
+    samples: int = 16  # paths of a pixel
+    seed: int = 0

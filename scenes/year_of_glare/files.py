@@ -1,0 +1,33 @@
+"""The small files and choices of a year of glare, read and checked before its building is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bim.ifc.corrections import corrections_beside
+from bim.ifc.head import check_head
+from mitsuba_cfs.sky.weather import Weather
+from scenes.job.files import check_names
+from scenes.job.inputs import System, read_system, read_weather
+from scenes.year_of_glare.options import YearOptions
+from scenes.year_of_glare.views import given_views
+
+
+@dataclass(frozen=True, slots=True)
+class YearFiles:
+    """What the files of a year of glare hold, all but the building."""
+
+    weather: Weather
+    system: System
+
+
+def read_files(options: YearOptions) -> YearFiles:
+    """The weather and the system of a year; its views are checked too.
+
+    Raises: `DataError` for what cannot be used.
+    """
+    check_head(options.building)
+    corrections_beside(options.building)
+    check_names(() if options.space is None else (options.space,))
+    given_views(options)
+    return YearFiles(read_weather(options.weather), read_system(options.system))
