@@ -16,13 +16,14 @@ from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.hdr import write_hdr
-from mitsuba_cfs.images.view import View, fisheye, fitted, parse_view, pixel_directions
+from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.inputs import chosen_spaces, read_system, read_weather
 from scenes.methods.paths import path_scene
 from scenes.methods.place import Place, Quality, fenestration, skies_of
 from scenes.pictures import write_falsecolour, write_tone_mapped
+from scenes.room_views import check_eye, given_views
 
 SUFFIXES = (".hdr", ".exr", ".png")
 
@@ -36,6 +37,7 @@ class PictureOptions:
     system: Path
     at: str  # month, day and clock time, `06-21 12:00`
     space: str | None = None  # name or GUID; None: the first room that has a window
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     view: str | None = None  # Radiance view options, or a file of them
     eye_height: float = 1.2  # [m] above the floor, where no view is given
     size: int = 800  # [px] of the longer side
@@ -57,7 +59,8 @@ def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPi
     """The picture, path-traced; `DataError` where an input cannot be used."""
     system, weather = read_system(options.system), read_weather(options.weather)
     hour = hour_of(weather, options.at)
-    building = read_ifc(options.building, progress=part(progress, 0.0, 0.4, "inputs"))
+    steps = part(progress, 0.0, 0.4, "inputs")
+    building = read_ifc(options.building, join=options.join, progress=steps)
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     view = room_view(space, options)
@@ -72,7 +75,7 @@ def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPi
     lit = scene.behind(fenestration(system.visible, system.fine))
     skies = skies_of(weather, [hour], subdivision=quality.subdivision)
     luminance = lit.picture(skies, 0, progress=part(progress, 0.4, 1.0, "picture"))
-    return RoomPicture(luminance, view, space.name or space.guid, weather.midpoints[hour])
+    return RoomPicture(luminance, view, space.label, weather.midpoints[hour])
 
 
 def hour_of(weather: Weather, at: str) -> int:
@@ -93,18 +96,12 @@ def room_view(space: Space, options: PictureOptions) -> View:
     """The view asked for with square pixels; by default the room's middle to its biggest window."""
     if options.view is None:
         return fisheye(*view_point(space, options.eye_height), options.size)
-    text, file = options.view, None
-    if not text.strip().startswith("-v"):
-        file = Path(text)
-        try:
-            lines = file.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise DataError(f"cannot be read: {error}", file=file, field="--view") from None
-        text = next((line for line in lines if "-v" in line), "")
-    try:
-        return fitted(parse_view(text), options.size)
-    except ValueError as error:
-        raise DataError(str(error), file=file, field="--view") from None
+    given = given_views(options.view)[0]
+    check_eye(given, space)
+    if given.view.kind == "parallel":  # one eye's rays in one direction: one colour all over
+        message = "a parallel view (-vtl) is not traced; expected -vtv, -vtc, -vth, -vta or -vts"
+        raise DataError(message, field="--view")
+    return fitted(given.view, options.size)
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:

@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import ifcopenshell
@@ -95,10 +96,25 @@ def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[i
     return found
 
 
-def corrections_beside(model_path: str | Path) -> Corrections:
-    """The corrections of `<model>.corrections.toml` beside the model; none without that file."""
-    path = Path(model_path).with_suffix(".corrections.toml")
-    return read_corrections(path) if path.is_file() else Corrections()
+def corrections_file(model_path: str | Path) -> Path:
+    """Where the corrections of a model are kept: `<model>.corrections.toml` beside it."""
+    return Path(model_path).with_suffix(".corrections.toml")
+
+
+def corrections_beside(model_path: str | Path, join: Sequence[str] = ()) -> Corrections:
+    """The corrections in the file beside the model, if there is one, and rooms to join besides.
+
+    Args: join: texts of room names with a plus between them, as "Hall + Living".
+    Raises: `DataError` for a wrong entry, or a text that names one room only.
+    """
+    path = corrections_file(model_path)
+    corrections = read_corrections(path) if path.is_file() else Corrections()
+    groups = [tuple(name.strip() for name in text.split("+") if name.strip()) for text in join]
+    for text, group in zip(join, groups, strict=True):
+        if len(group) < 2:
+            message = f"expected rooms with a plus between them, as 'Hall + Living', got {text!r}"
+            raise DataError(message, field="--join")
+    return replace(corrections, join=(*corrections.join, *groups))
 
 
 def read_corrections(path: str | Path) -> Corrections:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from scenes.commands.room_options import join_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.view_picture import (
     SUFFIXES,
@@ -28,9 +29,10 @@ FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
     "--at", required=True, metavar="'MM-DD HH:MM'", help="The hour of the weather that holds it."
 )
 @click.option("--space", help="Name or GUID of the room; default: the first with a window.")
+@join_option
 @click.option(
     "--view", metavar="'-vta ...'|FILE.vf",
-    help="View in Radiance's syntax, any kind; default: the room's middle, to its window.",
+    help="View in Radiance's syntax, not parallel; default: the room's middle, to its window.",
 )  # fmt: skip
 @click.option("--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True)
 @click.option(

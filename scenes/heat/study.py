@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -31,10 +30,15 @@ from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_sola
 from scenes.heat.study_file import BoxTable, StudyFile, SystemTable
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.daylight import Skies
-from scenes.job.inputs import System, chosen_spaces, read_system, read_weather
+from scenes.job.inputs import (
+    System,
+    chosen_spaces,
+    named_spaces,
+    read_system,
+    read_weather,
+)
 from scenes.job.thermal import ThermalSystem, climate, thermal_system
 from thermal.balance import ZoneResult, simulate_zones
-from thermal.blackbox import layer_absorptances, linear_u, with_realised_films
 from thermal.climate import Solar
 from thermal.control import (
     always,
@@ -45,7 +49,6 @@ from thermal.control import (
     switched,
 )
 from thermal.gains import dimmed_share, split_gains
-from thermal.glazing import Gap, gap_resistance
 from thermal.zone import WindowElement, Zone, work_hours
 
 FloatArray = NDArray[np.float64]
@@ -140,24 +143,8 @@ def _floor(zone: Zone) -> int:
 
 
 def state_of(system: System, table: SystemTable) -> ThermalSystem:
-    """A shading state's thermal data with the closure that its table asks for."""
-    plain = thermal_system(system)
-    fenestration = plain.fenestration
-    if table.u_model == "linear":
-        fenestration = replace(fenestration, resistance=linear_u(fenestration.u_value))
-    if table.gap is not None:
-        gap = Gap(table.gap.width, tuple(table.gap.gas.items()), table.gap.emissivity)
-        resistance = gap_resistance(fenestration.u_value, gap, item=system.name)
-        fenestration = replace(fenestration, resistance=resistance)
-    inner, outer = table.realised_inner_resistance, table.realised_outer_resistance
-    if inner is None and outer is None:
-        return replace(plain, fenestration=fenestration)
-    closed = with_realised_films(fenestration, r_inner_realised=inner, r_outer_realised=outer)
-    absorptances = layer_absorptances(
-        plain.transmittance, plain.reflectance, plain.g_value, closed.u_value,
-        r_outer=closed.r_outer, r_inner=closed.r_inner, item=system.name,
-    )  # fmt: skip
-    return replace(plain, fenestration=closed, absorptances=absorptances)
+    """A shading state's thermal data with the closure that its table asks for, else its own."""
+    return thermal_system(replace(system, closure=table.closure() or system.closure))
 
 
 def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
@@ -165,21 +152,11 @@ def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
     if study.box is not None:
         building = box_building(study.box)
         return building, list(building.spaces)
-    building = read_ifc(study.building)
+    building = read_ifc(study.building, join=study.join)
     if study.couple:
-        spaces = coupled_spaces(building, study.spaces, study.building)
+        spaces = named_spaces(building, study.spaces, study.building)
         return building, shared_constructions(spaces)
     return building, chosen_spaces(building, study.spaces, study.building)
-
-
-def coupled_spaces(building: Building, names: tuple[str, ...], path: Path) -> list[Space]:
-    """The rooms of those names or GUIDs, or all: rooms without windows take part too."""
-    if not names:
-        return list(building.spaces)
-    try:
-        return list({s.guid: s for s in map(building.space, names)}.values())
-    except (KeyError, ValueError) as error:
-        raise DataError(str(error.args[0]), file=path, field="spaces") from error
 
 
 def box_building(box: BoxTable) -> Building:

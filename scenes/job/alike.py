@@ -65,7 +65,7 @@ def as_room(result: SpaceResult, space: Space) -> SpaceResult:
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
         glare=replace(glare, view=replace(glare.view, position=place)),
         seconds={},
-        like=result.space.name or result.space.guid,
+        like=result.space.label,
     )
 
 

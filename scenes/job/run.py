@@ -95,7 +95,8 @@ def read_inputs(options: JobOptions, progress: Progress) -> JobInputs:
         system = read_system(options.system, u_value=options.u_value, g_value=options.g_value)
     weather = read_weather(options.weather)
     progress("inputs", 0.1)
-    building = read_ifc(options.building, progress=part(progress, 0.1, 1.0, "inputs"))
+    steps = part(progress, 0.1, 1.0, "inputs")
+    building = read_ifc(options.building, join=options.join, progress=steps)
     spaces = chosen_spaces(building, options.spaces, options.building)
     systems: dict[str, States] = {}
     if operation is not None and operation.systems:
@@ -128,7 +129,7 @@ def _rooms(
     cache = MatrixCache.of_user() if options.cache else None
     for group in template_rooms(inputs.spaces):
         for space in group:
-            steps = _labelled(progress, f"{space.name or space.guid}: ")
+            steps = _labelled(progress, f"{space.label}: ")
             try:
                 twin = next(
                     (
@@ -143,9 +144,9 @@ def _rooms(
                 )
                 if twin is not None:
                     found[space.guid] = as_room(found[twin.guid], space)
-                    name = space.name or space.guid
+                    name = space.label
                     notes.append(
-                        f"Room {name} is like {twin.name or twin.guid} in shape, orientation, "
+                        f"Room {name} is like {twin.label} in shape, orientation, "
                         "materials, windows and in what shades it: its results are those."
                     )
                     continue
@@ -157,7 +158,7 @@ def _rooms(
                 if isinstance(error, DataError):
                     raise
                 if len(inputs.spaces) == 1:
-                    where = f"space {space.name or space.guid}"
+                    where = f"space {space.label}"
                     raise DataError(str(error), file=options.building, element=where) from error
                 problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
     return [found[s.guid] for s in inputs.spaces if s.guid in found], problems, notes

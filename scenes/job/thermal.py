@@ -59,14 +59,22 @@ def thermal_system(system: System) -> ThermalSystem:
     tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
     rho = solar.direct_hemispherical(solar.reflection_front)
     rho = np.minimum(rho, 1.0 - tau)
-    data = thermal_data(tau, rho, u_value=system.u_value, g_normal=system.g_value, item=system.name)
+    data = thermal_data(
+        tau, rho, u_value=system.u_value, g_normal=system.g_value,
+        shading_position=system.shading_position or "none", item=system.name,
+    )  # fmt: skip
     g_value = data.g_value if system.g_by_patch is None else system.g_by_patch
     back_rho, back_tau = (
         _diffuse(solar, block) for block in (solar.reflection_back, solar.transmission_back)
     )
+    fenestration, films = Fenestration(system.name, data.u_value), {}
+    if system.closure is not None:
+        fenestration = system.closure.close(fenestration)
+        if system.closure.changes_films:
+            films = {"r_outer": fenestration.r_outer, "r_inner": fenestration.r_inner}
     return ThermalSystem(
-        Fenestration(system.name, data.u_value),
-        layer_absorptances(tau, rho, g_value, data.u_value, item=system.name),
+        fenestration,
+        layer_absorptances(tau, rho, g_value, data.u_value, item=system.name, **films),
         tau,
         rho,
         g_value,

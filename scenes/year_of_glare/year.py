@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.corrections import corrections_file
 from bim.read_ifc import read_ifc
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
@@ -63,7 +64,8 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
     """Read and check all inputs, the quick ones first; `DataError` where one cannot be used."""
     system, weather = read_system(options.system), read_weather(options.weather)
     progress("inputs", 0.1)
-    building = read_ifc(options.building, progress=part(progress, 0.1, 0.6, "inputs"))
+    steps = part(progress, 0.1, 0.6, "inputs")
+    building = read_ifc(options.building, join=options.join, progress=steps)
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     views = chosen_views(space, options)
@@ -81,12 +83,15 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
         nothing,
         nothing,
     )
-    chosen = [options.method, options.metric, options.samples, options.seed]
-    files = [sha256(p) for p in (options.building, options.weather, options.system)]
+    chosen = [options.method, options.metric, options.samples, options.seed, options.join]
+    # corrections change rooms and surroundings, as --join does, under the same GUID
+    corrections = corrections_file(options.building)
+    files = [options.building, options.weather, options.system, corrections]
+    files = [sha256(path) for path in files if path.is_file()]
     digest = hashlib.sha256(json.dumps([*chosen, *files, space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))
     return Year(
-        options, space.name or space.guid, views, place,
+        options, space.label, views, place,
         fenestration(system.visible, system.fine), weather, lit, skies, used, digest,
     )  # fmt: skip
 
