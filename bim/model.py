@@ -185,6 +185,7 @@ class Element:
     layer: str = ""
     storey: str = ""
     material: str = ""
+    is_kept: bool = False  # the corrections say so, whatever stands behind it
 
     def reflectance(self, band: str) -> float:
         """Diffuse reflectance in the band "visible" or "solar"."""

@@ -107,7 +107,10 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
         what = "no window belongs to a room"
         problems.append(Problem(source.path.name, what, "no daylight"))
     elements = outdoor_elements(
-        source.model, source.elements, reflectance=source.corrections.surroundings
+        source.model,
+        source.elements,
+        reflectance=source.corrections.surroundings,
+        kept=source.corrections.kept(source.model),
     )
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)

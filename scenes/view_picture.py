@@ -19,7 +19,9 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.weather import Weather
+from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import chosen_spaces, read_system, read_weather
+from scenes.job.windows import everywhere
 from scenes.methods.paths import path_scene
 from scenes.methods.place import Place, Quality, fenestration, skies_of
 from scenes.pictures import write_falsecolour, write_tone_mapped
@@ -64,6 +66,7 @@ def room_picture(options: PictureOptions, progress: Progress = silent) -> RoomPi
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     view = room_view(space, options)
+    building = traced_building(building, everywhere(space, system))
     variants.activate()
     nothing = np.empty((0, 3))
     place = Place(

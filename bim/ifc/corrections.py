@@ -3,6 +3,7 @@
 `model.corrections.toml` beside `model.ifc` is used without being asked for:
 
     leave_out = ['IfcBuildingElementProxy', 'IfcSlab, type="Canopy"']   # selectors of ifcopenshell
+    keep = ['IfcShadingDevice, Name=/Louvre.*/']   # traced, though a BSDF with a shade is behind it
     only = ['IfcWall', 'IfcSlab', 'IfcWindow', 'IfcSpace']              # nothing else is read
     join = [["Hall", "Living"]] # rooms open to each other that are to be one
     surroundings = 0.2          # diffuse reflectance of everything outdoors
@@ -32,7 +33,7 @@ from bim.ifc.elements import cad_layers_of
 from mitsuba_cfs.errors import DataError
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
-KEYS = {"leave_out", "only", "join", "surroundings", "reflectance"}
+KEYS = {"leave_out", "only", "keep", "join", "surroundings", "reflectance"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,7 @@ class Corrections:
     surroundings: float | None = None
     join: tuple[tuple[str, ...], ...] = ()  # names or GUIDs of rooms to make one
     file: str = ""
+    keep: tuple[str, ...] = ()  # shading devices that are traced before any BSDF
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -67,6 +69,10 @@ class Corrections:
             openings = {one.id() for one in model.by_type("IfcOpeningElement")}
             gone |= {one.id() for one in model.by_type("IfcProduct")} - kept - openings
         return gone
+
+    def kept(self, model: ifcopenshell.file) -> set[int]:
+        """STEP ids of the products that `keep` chooses."""
+        return set().union(*(chosen(model, query, self.file) for query in self.keep))
 
     def painted(self, model: ifcopenshell.file) -> dict[int, tuple[float, float]]:
         """Visible and solar reflectance by STEP id; later entries win."""
@@ -137,7 +143,7 @@ def read_corrections(path: str | Path) -> Corrections:
     join = tuple(_texts({"join": group}, "join", path) for group in groups)
     return Corrections(
         _texts(table, "leave_out", path), _texts(table, "only", path), paints, surroundings, join,
-        str(path),
+        str(path), _texts(table, "keep", path),
     )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_sola
 from scenes.heat.study_file import BoxTable, StudyFile, SystemTable
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.daylight import Skies
+from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import (
     System,
     chosen_spaces,
@@ -38,6 +39,7 @@ from scenes.job.inputs import (
     read_weather,
 )
 from scenes.job.thermal import ThermalSystem, climate, thermal_system
+from scenes.job.windows import everywhere
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Solar
 from thermal.control import (
@@ -83,6 +85,8 @@ def run_study(study: StudyFile, progress: Progress) -> tuple[list[RoomYear], tup
     systems = [read_system(s.bsdf, u_value=s.u_value, g_value=s.g_value) for s in study.system]
     thermals = [state_of(s, t) for s, t in zip(systems, study.system, strict=True)]
     building, spaces = rooms_of(study)
+    shades = {guid: s for space in spaces for guid, s in everywhere(space, *systems).items()}
+    building = traced_building(building, shades)
     zones = [thermal_room(space, thermals[0].fenestration) for space in spaces]
     notes = dict.fromkeys(note for t in (*systems, *thermals) for note in t.notes)
     if study.couple:

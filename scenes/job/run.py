@@ -22,6 +22,7 @@ from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.alike import as_room, same_light, same_systems
 from scenes.job.attached import attached_systems
+from scenes.job.drawn_shades import traced_building
 from scenes.job.glare import wanted_hours
 from scenes.job.inputs import System, chosen_spaces, read_system, read_weather, sha256
 from scenes.job.operation import Operation, check_states, read_operation
@@ -111,6 +112,7 @@ def read_inputs(options: JobOptions, progress: Progress) -> JobInputs:
     if operation is not None:
         check_states(operation, max(len(states) for states in systems.values()))
     progress("inputs", 1.0)
+    building = traced_building(building, systems)
     return JobInputs(building, spaces, weather, systems, operation)
 
 

@@ -24,7 +24,9 @@ from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.matrix import sun_up
 from mitsuba_cfs.sky.weather import Weather
+from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import chosen_spaces, read_system, read_weather, sha256
+from scenes.job.windows import everywhere
 from scenes.methods.phases import PhaseSystem, phase_scene
 from scenes.methods.place import Fenestration, Place, Quality, Skies, fenestration, skies_of
 from scenes.year_of_glare.options import YearOptions
@@ -69,6 +71,7 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     views = chosen_views(space, options)
+    building = traced_building(building, everywhere(space, system))
     variants.activate()
     quality = Quality()
     lit = np.flatnonzero(sun_up(weather))
