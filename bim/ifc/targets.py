@@ -20,8 +20,15 @@ from mitsuba_cfs.errors import DataError
 GLAZED = ("IfcWindow", "IfcDoor", "IfcPlate", "IfcCurtainWall")
 Entity = ifcopenshell.entity_instance
 # facade: from and to, clockwise from north [deg]
-QUARTERS = {"N": (315, 45), "E": (45, 135), "S": (135, 225), "W": (225, 315)}
-EIGHTHS = {"NE": (22.5, 67.5), "SE": (112.5, 157.5), "SW": (202.5, 247.5), "NW": (292.5, 337.5)}
+FINEST = 0.001  # azimuths are compared to this [deg]; a quarter ends that much before the next
+QUARTERS = {
+    name: (middle - 45, middle + 45 - FINEST)
+    for name, middle in {"N": 360, "E": 90, "S": 180, "W": 270}.items()
+}
+EIGHTHS = {
+    name: (middle - 22.5, middle + 22.5)
+    for name, middle in {"NE": 45, "SE": 135, "SW": 225, "NW": 315}.items()
+}
 SECTOR = re.compile(r"^(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)$")
 
 
@@ -154,7 +161,8 @@ def _faces(window: Window, sector: tuple[float, float] | None) -> bool:
     is_roof = orientation_name(window) == "roof"
     if sector is None or is_roof:
         return sector is None and is_roof
-    # to a thousandth of a degree, so that a facade due south is not a hair beside it
     azimuth = np.degrees(np.arctan2(window.normal[0], window.normal[1]))
-    azimuth, (low, high) = round(float(azimuth), 3) % 360, sector
-    return low <= azimuth < high if low <= high else azimuth >= low or azimuth < high
+    azimuth = round(float(azimuth) / FINEST) * FINEST  # due south is not a hair beside it
+    low, high = sector
+    span = 360 if high - low >= 360 else (high - low) % 360
+    return (azimuth - low + FINEST / 2) % 360 <= span + FINEST

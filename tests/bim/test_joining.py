@@ -112,5 +112,5 @@ def test_a_picture_of_joined_rooms(tmp_path, capsys):
     call = ["picture", str(path), "--at", "06-21 12:00", "--out", str(tmp_path / "a.hdr")]
     year = ["dgp", str(path), "--out", str(tmp_path / "out")]
     for command in (call, year):
-        assert cli.run([*command, "--join", "North + South", "--space", "South + North"]) == 1
-        assert "space South + North: has no window" in capsys.readouterr().err
+        assert cli.run([*command, "--join", "North + South", "--space", "North + South"]) == 1
+        assert "space North + South: has no window" in capsys.readouterr().err
