@@ -160,7 +160,7 @@ def _space(building: Building, name: str, path: Path) -> Space:
             message = f"space {name!r} was left out: {_quoted(lost)}"
         else:
             message = str(error.args[0])
-        raise DataError(message, file=path, field="--space") from error
+        raise DataError(message, file=path, field="space") from error
 
 
 def _lost(building: Building, kind: str) -> list[Problem]:
