@@ -69,7 +69,10 @@ def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
     "--facade", "facades", multiple=True, metavar="N|E|S|W|FROM-TO",
     help="Windows that face there: also NE ..., roof, or azimuths such as 150-210.",
 )  # fmt: skip
-@click.option("--all", "every_window", is_flag=True, help="Every window.")
+@click.option(
+    "--all", "every_window", is_flag=True,
+    help="Every IfcWindow; glazed doors and panels only by GUID, room, storey or facade.",
+)  # fmt: skip
 @click.option(
     "--bsdf", type=FILE,
     help="BSDF XML file: Klems or tensor tree; U, g and more of the .toml beside it come along.",
