@@ -75,7 +75,8 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
         source = filling.opening
     direction = main_direction(source)
     if direction is None:
-        return None, [Problem(filling.guid, f"{filling.name}: has no extent", "left out")]
+        what = f"{filling.name}: has no extent"
+        return None, [Problem(filling.guid, what, "left out", "window")]
     facing = np.abs(_unit(area_vectors(source)) @ direction) > FLAT
     areas = np.linalg.norm(area_vectors(source), axis=1)
     depth = source.mean(axis=1) @ direction
@@ -86,7 +87,8 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
         problems += more
     opening = shadow(filling.triangles if filling.opening is None else filling.opening, plane)
     if opening.area < SMALLEST_PANE:
-        return None, [Problem(filling.guid, f"{filling.name}: opening has no area", "left out")]
+        what = f"{filling.name}: opening has no area"
+        return None, [Problem(filling.guid, what, "left out", "window")]
     if filling.opening is None and filling.ifc_class.startswith("IfcWindow"):
         problems.append(
             Problem(filling.guid, f"{filling.name}: is hosted by no opening", "its outline is used")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.errors import DataError
+from thermal.closure import Closure
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +33,20 @@ class ShadingState:
 
     name: str = ""  # "" for the only or the usual state
     bands: dict[str, Bsdf] = field(default_factory=dict)  # "Visible", "Solar" -> BSDF
-    g_value: AngularGValue | None = None
+    g_value: AngularGValue | None = None  # before g_by_patch, and that before g_normal
     u_value: float | None = None  # [W/(m2 K)]
+    g_normal: float | None = None  # at normal incidence
+    g_by_patch: NDArray[np.float64] | None = None  # [K] by incident patch of Klems full
+    closure: Closure | None = None  # of the thermal model
+    shading_position: str | None = None  # "none", "external", "internal", "integrated"
+    file: Path | None = None  # of the BSDF, where the model names it only
+
+    @property
+    def holds_data(self) -> bool:
+        """Whether there is anything besides the name."""
+        single = (self.g_value, self.u_value, self.g_normal, self.g_by_patch, self.closure)
+        held = any(value is not None for value in (*single, self.shading_position))
+        return bool(self.bands) or held
 
 
 def read_g_table(path: str | Path) -> AngularGValue:

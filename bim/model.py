@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.names import found_by_name, label_of
+
 FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "reveal")
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
@@ -23,6 +25,7 @@ class Problem:
     where: str  # GUID or name of the element, or the file
     what: str
     consequence: str  # for the simulation, with the repair if there was one
+    lost: str = ""  # "room" or "window" where one is left out for it
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +148,11 @@ class Space:
     area_to_middles: float | None = None  # floor to the middle of the walls, if that is stated [m2]
 
     @property
+    def label(self) -> str:
+        """Number and name of the room as people use them; its GUID where it has neither."""
+        return label_of(self.name, self.long_name, self.guid)
+
+    @property
     def area_as_stated(self) -> float:
         """Floor area measured as the file measures its own: between or to the middle of walls."""
         return self.floor_area if self.area_to_middles is None else self.area_to_middles
@@ -177,6 +185,7 @@ class Element:
     layer: str = ""
     storey: str = ""
     material: str = ""
+    is_kept: bool = False  # the corrections say so, whatever stands behind it
 
     def reflectance(self, band: str) -> float:
         """Diffuse reflectance in the band "visible" or "solar"."""
@@ -201,16 +210,8 @@ class Building:
         return tuple(window for space in self.spaces for window in space.windows)
 
     def space(self, name_or_guid: str) -> Space:
-        """The space of that GUID or name; `KeyError` if there is none, `ValueError` if several."""
-        exact = [space for space in self.spaces if space.guid == name_or_guid]
-        found = exact or [s for s in self.spaces if name_or_guid in (s.name, s.long_name)]
-        if not found:
-            names = ", ".join(space.name for space in self.spaces)
-            raise KeyError(f"no space {name_or_guid!r}; there are: {names}")
-        if len(found) > 1:
-            guids = ", ".join(space.guid for space in found)
-            raise ValueError(f"{len(found)} spaces are named {name_or_guid!r}: {guids}")
-        return found[0]
+        """The space of that GUID, number, name or both; see `bim.names.found_by_name`."""
+        return found_by_name(self.spaces, name_or_guid, "space")
 
 
 def set_normal_and_area(surface: Face | Window) -> None:

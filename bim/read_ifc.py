@@ -38,6 +38,7 @@ def read_ifc(
     path: str | Path,
     *,
     corrections: Corrections | None = None,
+    join: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Building:
     """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
@@ -45,12 +46,13 @@ def read_ifc(
     Args:
         corrections: what to leave out and repaint; by default those of the file
             `<model>.corrections.toml` beside the model, if there is one.
+        join: rooms to make one besides, as "Hall + Living", where `corrections` are not given.
         progress: called with the stage's name and the fraction of it that is done.
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
         the building's `problems`.
     """
     tell = progress or (lambda stage, fraction: None)
-    corrections = corrections_beside(path) if corrections is None else corrections
+    corrections = corrections_beside(path, join) if corrections is None else corrections
     source = read_source(path, corrections, tell)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
@@ -70,7 +72,7 @@ def read_ifc(
             space, more = _space(record, own, records, around, index, elements, reflectances)
         except (shapely.errors.ShapelyError, ValueError, RuntimeError) as error:
             what = f"room {record.solid.name}: its boundary cannot be built"
-            problems.append(Problem(record.solid.guid, what, f"left out: {error}"))
+            problems.append(Problem(record.solid.guid, what, f"left out: {error}", "room"))
             continue
         spaces.append(space)
         problems += more
@@ -105,7 +107,10 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
         what = "no window belongs to a room"
         problems.append(Problem(source.path.name, what, "no daylight"))
     elements = outdoor_elements(
-        source.model, source.elements, reflectance=source.corrections.surroundings
+        source.model,
+        source.elements,
+        reflectance=source.corrections.surroundings,
+        kept=source.corrections.kept(source.model),
     )
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
@@ -131,11 +136,11 @@ def _attachments(
             continue
         if not found:
             what = f"{filling.ifc_class} {filling.name}: no room behind it"
-            problems.append(Problem(filling.guid, what, "gives no daylight to any room"))
+            problems.append(Problem(filling.guid, what, "gives no daylight to any room", "window"))
         inner = sorted({names[a.room] for a in found if a.neighbour is not None})
         if inner:
             what = f"{filling.ifc_class} {filling.name}: glass between {' and '.join(inner)}"
-            problems.append(Problem(filling.guid, what, "taken as opaque"))
+            problems.append(Problem(filling.guid, what, "taken as opaque", "window"))
         rooms = sorted({names[a.room] for a in found if a.neighbour is None})
         if len(rooms) > 1:
             what = f"{filling.name}: lies before the rooms {', '.join(rooms)}"
@@ -212,13 +217,13 @@ def _soundness(space: Space) -> list[Problem]:
     problems = []
     leaks = open_edges(space.shell)
     if leaks:
-        what = f"room {space.name}: {leaks} open edges are left"
+        what = f"room {space.label}: {leaks} open edges are left"
         problems.append(Problem(space.guid, what, "light may leak there"))
     enclosed = enclosed_volume(space.shell)
     if space.area_to_middles is not None:
         what = (
-            f"room {space.name}: states {space.stated_area:.2f} m2 floor area, which is that to the"
-            f" middle of its walls ({space.area_to_middles:.2f} m2 drawn)"
+            f"room {space.label}: states {space.stated_area:.2f} m2 floor area, which is that to"
+            f" the middle of its walls ({space.area_to_middles:.2f} m2 drawn)"
         )
         done = f"the {space.floor_area:.2f} m2 between the walls are used"
         problems.append(Problem(space.guid, what, done))
@@ -227,9 +232,11 @@ def _soundness(space: Space) -> list[Problem]:
         ("volume", space.stated_volume, space.room_volume, "m3"),
     ):
         if stated is not None and not _agree(drawn, stated):
-            text = f"room {space.name}: states {stated:.2f} {unit} {what}, drawn {drawn:.2f} {unit}"
+            text = (
+                f"room {space.label}: states {stated:.2f} {unit} {what}, drawn {drawn:.2f} {unit}"
+            )
             problems.append(Problem(space.guid, text, "the drawn one is used"))
     if abs(enclosed - space.volume) > 1e-3 * space.volume + SMALLEST_AREA:
-        what = f"room {space.name}: faces enclose {enclosed:.3f} m3 of {space.volume:.3f} m3"
+        what = f"room {space.label}: faces enclose {enclosed:.3f} m3 of {space.volume:.3f} m3"
         problems.append(Problem(space.guid, what, "its boundary is not sound"))
     return problems

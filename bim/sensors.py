@@ -76,7 +76,7 @@ def sensor_grid(
     z = space.floor_level + height
     section = horizontal_section(space.shell, z)
     if section.is_empty:
-        raise ValueError(f"space {space.name}: no room at {height} m above the floor")
+        raise ValueError(f"space {space.label}: no room at {height} m above the floor")
     work_plane = section.buffer(-margin, join_style="mitre")
     while work_plane.area < SMALLEST_AREA and margin > 0.01:
         margin *= 0.5
@@ -126,7 +126,7 @@ def view_point(
     z = space.floor_level + eye_height
     section = horizontal_section(space.shell, z)
     if section.is_empty:
-        raise ValueError(f"space {space.name}: no room at {eye_height} m above the floor")
+        raise ValueError(f"space {space.label}: no room at {eye_height} m above the floor")
     middle = section.centroid
     if not section.buffer(-0.05).contains(middle):
         middle = shapely.point_on_surface(section.buffer(-0.05) or section)

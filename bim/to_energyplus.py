@@ -41,7 +41,7 @@ def write_epjson(
     """
     model = _frame(building)
     for number, space in enumerate(building.spaces if spaces is None else spaces):
-        _zone(model, f"Z{number} {_name(space.name)}", space, u_value, g_value, air_changes)
+        _zone(model, f"Z{number} {_name(space.label)}", space, u_value, g_value, air_changes)
     write_text(path, json.dumps(model, indent=1))
 
 

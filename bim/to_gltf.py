@@ -35,7 +35,7 @@ def write_gltf(building: Building, path: str | Path, *, outdoors: bool = True) -
             if kind == "glass":
                 parts = [window.triangles for window in space.windows]
             if parts:
-                _add(scene, f"{space.name} {kind}", np.concatenate(parts)[:, ::-1], kind)
+                _add(scene, f"{space.label} {kind}", np.concatenate(parts)[:, ::-1], kind)
     if outdoors and building.elements:
         triangles = np.concatenate([element.triangles for element in building.elements])
         _add(scene, "outdoors", triangles, "outdoors")

@@ -66,7 +66,7 @@ def thermal_room(
         neighbours.append(faces[0].neighbour)
     outdoor = [i for i, surface in enumerate(surfaces) if surface.outside == "outdoor"]
     zone = Zone(
-        space.name or space.guid,
+        space.label,
         space.volume,
         tuple(surfaces),
         tuple(_windows(space, fenestration, ground_level)),

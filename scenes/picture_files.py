@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,11 +10,11 @@ import pandas as pd
 from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.images.view import View, fitted, parse_view
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.files import check_names
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.picture_options import PictureOptions
+from scenes.room_views import NamedView, given_views
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +23,7 @@ class PictureFiles:
 
     weather: Weather
     hour: int  # of the year
-    view: View | None  # None: the room's middle, to its biggest window
+    view: NamedView | None  # None: the room's middle, to its biggest window
     system: System
 
 
@@ -36,7 +35,7 @@ def read_files(options: PictureOptions) -> PictureFiles:
     check_head(options.building)
     corrections_beside(options.building)
     check_names(() if options.space is None else (options.space,))
-    view = None if options.view is None else given_view(options.view, options.size)
+    view = None if options.view is None else given_view(options.view)
     weather = read_weather(options.weather)
     hour = hour_of(weather, options.at)
     return PictureFiles(weather, hour, view, read_system(options.system))
@@ -56,17 +55,13 @@ def hour_of(weather: Weather, at: str) -> int:
     return int(found[0])
 
 
-def given_view(text: str, size: int) -> View:
-    """The view of a text, or of the first line of a file that holds one; with square pixels."""
-    file = None
-    if not text.strip().startswith("-v"):
-        file = Path(text)
-        try:
-            lines = file.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise DataError(f"cannot be read: {error}", file=file, field="--view") from None
-        text = next((line for line in lines if "-v" in line), "")
-    try:
-        return fitted(parse_view(text), size)
-    except ValueError as error:
-        raise DataError(str(error), file=file, field="--view") from None
+def given_view(text: str) -> NamedView:
+    """The view of a text, or of the first line of a file that holds one.
+
+    Raises: `DataError` for one that cannot be traced.
+    """
+    given = given_views(text)[0]
+    if given.view.kind == "parallel":  # one eye's rays in one direction: one colour all over
+        message = "a parallel view (-vtl) is not traced; expected -vtv, -vtc, -vth, -vta or -vts"
+        raise DataError(message, field="--view")
+    return given

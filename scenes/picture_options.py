@@ -17,6 +17,7 @@ class PictureOptions:
     system: Path
     at: str  # month, day and clock time, `06-21 12:00`
     space: str | None = None  # name or GUID; None: the first room that has a window
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     view: str | None = None  # Radiance view options, or a file of them
     eye_height: float = 1.2  # [m] above the floor, where no view is given
     size: int = 800  # [px] of the longer side

@@ -14,17 +14,20 @@ from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.images.hdr import write_hdr
-from mitsuba_cfs.images.view import View, fisheye, pixel_directions
+from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import annual_sky
+from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import chosen_spaces
+from scenes.job.windows import everywhere
 from scenes.picture_files import PictureFiles, read_files
 from scenes.picture_options import SUFFIXES, PictureOptions
 from scenes.pictures import write_falsecolour, write_tone_mapped
+from scenes.room_views import check_eye
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +50,15 @@ def room_picture(
     """
     files = files or read_files(options)
     system, weather, hour = files.system, files.weather, files.hour
-    building = read_ifc(options.building, progress=part(progress, 0.0, 0.4, "inputs"))
+    steps = part(progress, 0.0, 0.4, "inputs")
+    building = read_ifc(options.building, join=options.join, progress=steps)
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
-    view = files.view
-    if view is None:
-        view = fisheye(*view_point(space, options.eye_height), options.size)
+    view = fisheye(*view_point(space, options.eye_height), options.size)
+    if files.view is not None:
+        check_eye(files.view, space)
+        view = fitted(files.view.view, options.size)
+    building = traced_building(building, everywhere(space, system))
     variants.activate()
     scene = DaylightScene(
         interior_surfaces(space, "visible"),
@@ -67,7 +73,7 @@ def room_picture(
     )
     luminance = light.picture(0, progress=part(progress, 0.4, 1.0, "picture"))
     return RoomPicture(
-        luminance, view, space.name or space.guid, weather.midpoints[hour],
+        luminance, view, space.label, weather.midpoints[hour],
         (*system.notes, *weather.notes),
     )  # fmt: skip
 

@@ -13,70 +13,30 @@ from bim.fenestration import ShadingState
 from bim.ifc.fenestration_write import attach_state
 from bim.ifc.project import open_ifc
 from bim.ifc.property_sets import owner_of, save
-from mitsuba_cfs.errors import DataError
-
-GLAZED = ("IfcWindow", "IfcDoor", "IfcPlate", "IfcCurtainWall")
+from bim.ifc.targets import Targets, target_elements
 
 
 def attach(
     path: str | Path,
     out: str | Path,
     state: ShadingState,
+    targets: Targets,
     *,
-    windows: Sequence[str] = (),
-    types: Sequence[str] = (),
-    every_window: bool = False,
     bsdf_reference: str | Path | None = None,
 ) -> int:
     """Write `out`: the model with the state attached; the number of windows and types that got it.
 
     Args:
-        windows: GUIDs of windows, doors or glazed panels.
-        types: names of window types (IfcWindowType, IfcWindowStyle) or of windows' ObjectType.
-        every_window: all IfcWindow.
         bsdf_reference: name this BSDF file by an IfcDocumentReference instead of copying numbers.
     """
     model = open_ifc(path)
-    targets = chosen(model, path, windows, types, every_window)
-    if state.bands or state.g_value is not None or state.u_value is not None:
-        attach_state(model, targets, state)
+    elements = target_elements(model, path, targets)
+    if state.holds_data:
+        attach_state(model, elements, state)
     if bsdf_reference is not None:
-        refer(model, targets, os.path.relpath(bsdf_reference, Path(out).resolve().parent))
+        refer(model, elements, os.path.relpath(bsdf_reference, Path(out).resolve().parent))
     save(model, out)
-    return len(targets)
-
-
-def chosen(
-    model: ifcopenshell.file,
-    path: str | Path,
-    windows: Sequence[str],
-    types: Sequence[str],
-    every_window: bool,
-) -> list[ifcopenshell.entity_instance]:
-    """Windows and window types that are meant; `DataError` where one is not there."""
-    targets: dict[int, ifcopenshell.entity_instance] = {}
-    if every_window:
-        targets |= {one.id(): one for one in model.by_type("IfcWindow")}
-        if not targets:
-            raise DataError("holds no IfcWindow", file=path)
-    for guid in windows:
-        try:
-            one = model.by_guid(guid)
-        except RuntimeError:
-            raise DataError(f"no element {guid!r}", file=path) from None
-        if not one.is_a().startswith(GLAZED):
-            raise DataError(f"is {one.is_a()}, no window", file=path, element=guid)
-        targets[one.id()] = one
-    for name in types:
-        found = [one for one in model.by_type("IfcTypeProduct") if one.Name == name]
-        found = [one for one in found if one.is_a().startswith(GLAZED)]
-        found = found or [one for one in model.by_type("IfcWindow") if one.ObjectType == name]
-        if not found:
-            raise DataError(f"no window type {name!r}", file=path)
-        targets |= {one.id(): one for one in found}
-    if not targets:
-        raise DataError("no window chosen: give a GUID, a type or all", file=path)
-    return list(targets.values())
+    return len(elements)
 
 
 def refer(

@@ -3,6 +3,7 @@
 `model.corrections.toml` beside `model.ifc` is used without being asked for:
 
     leave_out = ['IfcBuildingElementProxy', 'IfcSlab, type="Canopy"']   # selectors of ifcopenshell
+    keep = ['IfcShadingDevice, Name=/Louvre.*/']   # traced, though a BSDF with a shade is behind it
     only = ['IfcWall', 'IfcSlab', 'IfcWindow', 'IfcSpace']              # nothing else is read
     join = [["Hall", "Living"]] # rooms open to each other that are to be one
     surroundings = 0.2          # diffuse reflectance of everything outdoors
@@ -21,7 +22,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     import ifcopenshell
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
-KEYS = {"leave_out", "only", "join", "surroundings", "reflectance"}
+KEYS = {"leave_out", "only", "keep", "join", "surroundings", "reflectance"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,7 @@ class Corrections:
     surroundings: float | None = None
     join: tuple[tuple[str, ...], ...] = ()  # names or GUIDs of rooms to make one
     file: str = ""
+    keep: tuple[str, ...] = ()  # shading devices that are traced before any BSDF
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -66,6 +69,10 @@ class Corrections:
             openings = {one.id() for one in model.by_type("IfcOpeningElement")}
             gone |= {one.id() for one in model.by_type("IfcProduct")} - kept - openings
         return gone
+
+    def kept(self, model: ifcopenshell.file) -> set[int]:
+        """STEP ids of the products that `keep` chooses."""
+        return set().union(*(chosen(model, query, self.file) for query in self.keep))
 
     def painted(self, model: ifcopenshell.file) -> dict[int, tuple[float, float]]:
         """Visible and solar reflectance by STEP id; later entries win."""
@@ -96,10 +103,25 @@ def chosen(model: ifcopenshell.file, query: str, file: str | Path = "") -> set[i
     return found
 
 
-def corrections_beside(model_path: str | Path) -> Corrections:
-    """The corrections of `<model>.corrections.toml` beside the model; none without that file."""
-    path = Path(model_path).with_suffix(".corrections.toml")
-    return read_corrections(path) if path.is_file() else Corrections()
+def corrections_file(model_path: str | Path) -> Path:
+    """Where the corrections of a model are kept: `<model>.corrections.toml` beside it."""
+    return Path(model_path).with_suffix(".corrections.toml")
+
+
+def corrections_beside(model_path: str | Path, join: Sequence[str] = ()) -> Corrections:
+    """The corrections in the file beside the model, if there is one, and rooms to join besides.
+
+    Args: join: texts of room names with a plus between them, as "Hall + Living".
+    Raises: `DataError` for a wrong entry, or a text that names one room only.
+    """
+    path = corrections_file(model_path)
+    corrections = read_corrections(path) if path.is_file() else Corrections()
+    groups = [tuple(name.strip() for name in text.split("+") if name.strip()) for text in join]
+    for text, group in zip(join, groups, strict=True):
+        if len(group) < 2:
+            message = f"expected rooms with a plus between them, as 'Hall + Living', got {text!r}"
+            raise DataError(message, field="--join")
+    return replace(corrections, join=(*corrections.join, *groups))
 
 
 def read_corrections(path: str | Path) -> Corrections:
@@ -122,7 +144,7 @@ def read_corrections(path: str | Path) -> Corrections:
     join = tuple(_texts({"join": group}, "join", path) for group in groups)
     return Corrections(
         _texts(table, "leave_out", path), _texts(table, "only", path), paints, surroundings, join,
-        str(path),
+        str(path), _texts(table, "keep", path),
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import ifcopenshell
@@ -70,11 +70,17 @@ def _record(
 
 
 def outdoor_elements(
-    model: ifcopenshell.file, shapes: Sequence[Shape], *, reflectance: float | None = None
+    model: ifcopenshell.file,
+    shapes: Sequence[Shape],
+    *,
+    reflectance: float | None = None,
+    kept: Collection[int] = (),
 ) -> list[Element]:
     """Every building element and terrain, one `Element` for each of its surface styles.
 
-    Args: reflectance: of everything, in place of what the file says.
+    Args:
+        reflectance: of everything, in place of what the file says.
+        kept: STEP ids of shading devices that are traced before any BSDF.
     """
     result = []
     for shape in shapes:
@@ -83,7 +89,7 @@ def outdoor_elements(
         base = Element(
             shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles, default,
             default, next(iter(cad_layers_of(entity)), ""), storey_of(entity),
-            _material_name(entity),
+            _material_name(entity), shape.step_id in kept,
         )  # fmt: skip
         for index in np.unique(shape.look):
             visible = solar = default

@@ -15,13 +15,27 @@ import ifcopenshell.util.element
 import numpy as np
 
 from bim.fenestration import AngularGValue, ShadingState
-from bim.ifc.fenestration_write import BLOCKS, SET_NAME, TREE
+from bim.ifc.fenestration_write import (
+    BLOCKS,
+    CLOSURE,
+    G_BY_PATCH,
+    G_NORMAL,
+    GAP,
+    POSITION,
+    REALISED,
+    SET_NAME,
+    TREE,
+    U_MODEL,
+)
 from bim.ifc.project import open_ifc
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from thermal.closure import Closure
+from thermal.glazing import Gap
+from thermal.gvalue import TYPICAL_SYSTEMS
 
 Entity = ifcopenshell.entity_instance
 
@@ -55,7 +69,7 @@ def read_states(
                 for path in _referenced(source, Path(folder)):
                     known = states.get("", ShadingState())
                     if not known.bands:
-                        states[""] = replace(known, bands=read_bsdf_xml(path).bands)
+                        states[""] = replace(known, bands=read_bsdf_xml(path).bands, file=path)
             if states:
                 found[element.GlobalId] = tuple(states.values())
     return found
@@ -93,20 +107,19 @@ def _referenced(source: Entity | None, folder: Path) -> Iterable[Path]:
 def _state(pset: Entity, file: str | Path, guid: str) -> ShadingState:
     name = pset.Name[len(SET_NAME) :].lstrip(": ")
     bands: dict[str, Bsdf] = {}
-    g_value, u_value = None, None
+    thermal: dict[str, object] = {}
     try:
         for prop in pset.HasProperties:
             if prop.is_a("IfcComplexProperty") and prop.Name.startswith("BSDF "):
                 bands[prop.Name[5:]] = _bsdf(prop)
-            elif prop.is_a("IfcComplexProperty") and prop.Name == "G-value":
-                g_value = _g_values(prop)
-            elif prop.Name == "U-value":
-                u_value = float(prop.NominalValue.wrappedValue)
+            elif prop.Name in THERMAL:
+                field, read = THERMAL[prop.Name]
+                thermal[field] = read(prop)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise DataError(
             f"cannot be understood: {error}", file=file or None, element=guid, field=pset.Name
         ) from None
-    return ShadingState(name, bands, g_value, u_value)
+    return ShadingState(name, bands, **thermal)
 
 
 def _children(prop: Entity) -> dict[str, Entity]:
@@ -152,3 +165,36 @@ def _g_values(prop: Entity) -> AngularGValue:
     polar, azimuth = _numbers(parts["Polar angles"]), _numbers(parts["Azimuthal angles"])
     values = _numbers(parts["G-values"]).reshape(len(polar), len(azimuth))
     return AngularGValue(polar, azimuth, values)
+
+
+def _single(prop: Entity) -> float:
+    return float(prop.NominalValue.wrappedValue)
+
+
+def _position(prop: Entity) -> str:
+    position = prop.NominalValue.wrappedValue
+    if position not in TYPICAL_SYSTEMS:
+        raise ValueError(f"{POSITION} {position!r} is not of {', '.join(TYPICAL_SYSTEMS)}")
+    return position
+
+
+def _closure(prop: Entity) -> Closure:
+    parts = _children(prop)
+    gap = None
+    if GAP in parts:
+        of_gap = _children(parts[GAP])
+        gas = tuple((share.Name, _single(share)) for share in of_gap["Gas"].HasProperties)
+        faces = tuple(float(value) for value in _numbers(of_gap["Emissivities"]))
+        gap = Gap(_single(of_gap["Width"]), gas, faces)
+    realised = {field: _single(parts[name]) for field, name in REALISED.items() if name in parts}
+    return Closure(parts[U_MODEL].NominalValue.wrappedValue, gap, **realised)
+
+
+THERMAL = {  # name of the property: field of the state, and what reads it
+    "G-value": ("g_value", _g_values),
+    "U-value": ("u_value", _single),
+    G_NORMAL: ("g_normal", _single),
+    G_BY_PATCH: ("g_by_patch", _numbers),
+    CLOSURE: ("closure", _closure),
+    POSITION: ("shading_position", _position),
+}

@@ -19,6 +19,7 @@ from bim.fenestration import AngularGValue, ShadingState
 from bim.ifc.property_sets import Entity, give_set
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+from thermal.closure import Closure
 
 SET_NAME = "BlackBox Model"
 BLOCKS = {
@@ -28,6 +29,13 @@ BLOCKS = {
     "reflection_back": "Reflectance back values",
 }
 WAVELENGTHS = {"Visible": (380.0, 780.0), "Solar": (300.0, 2500.0)}  # of the bands [nm]
+G_NORMAL, G_BY_PATCH = "G-value at normal incidence", "G-value by Klems patch"
+CLOSURE, POSITION = "Closure", "Shading position"
+U_MODEL, GAP = "U-value with temperature", "Gap"
+REALISED = {
+    "realised_inner_resistance": "Realised inner resistance",
+    "realised_outer_resistance": "Realised outer resistance",
+}
 KLEMS, TREE = "BSDF matrix", "BSDF tensor tree"
 
 
@@ -39,8 +47,17 @@ def attach_state(model: ifcopenshell.file, targets: Sequence[Entity], state: Sha
         properties.append(writer.g_values(state.g_value))
     if state.u_value is not None:
         properties.append(writer.single("U-value", "IfcThermalTransmittanceMeasure", state.u_value))
+    if state.g_normal is not None:
+        properties.append(writer.single(G_NORMAL, "IfcNormalisedRatioMeasure", state.g_normal))
+    if state.g_by_patch is not None:
+        ratio = "IfcNormalisedRatioMeasure"
+        properties.append(writer.numbers(G_BY_PATCH, state.g_by_patch, ratio))
+    if state.closure is not None:
+        properties.append(writer.closure(state.closure))
+    if state.shading_position is not None:
+        properties.append(writer.text(POSITION, state.shading_position))
     if not properties:
-        raise ValueError("a shading state needs a BSDF, g-values or a U-value")
+        raise ValueError("a shading state without a BSDF, g, U, closure or position of its shade")
     what = "Optical and thermal properties of a fenestration system by direction"
     give_set(model, targets, set_name(state.name), what, properties)
 
@@ -56,6 +73,7 @@ class _Writer:
     def __init__(self, model: ifcopenshell.file) -> None:
         self._model = model
         self._radian = self.create("IfcSIUnit", None, "PLANEANGLEUNIT", None, "RADIAN")
+        self._metre = self.create("IfcSIUnit", None, "LENGTHUNIT", None, "METRE")
         self._nanometre = self.create("IfcSIUnit", None, "LENGTHUNIT", "NANO", "METRE")
 
     def create(self, name: str, *values) -> Entity:
@@ -64,9 +82,15 @@ class _Writer:
             return self._model.create_entity(name, UnitType=kind, Prefix=prefix, Name=unit)
         return self._model.create_entity(name, *values)
 
-    def single(self, name: str, measure: str, value: float) -> Entity:
+    def single(self, name: str, measure: str, value: float, unit: Entity | None = None) -> Entity:
         number = self._model.create_entity(measure, float(value))
-        return self._model.create_entity("IfcPropertySingleValue", Name=name, NominalValue=number)
+        return self._model.create_entity(
+            "IfcPropertySingleValue", Name=name, NominalValue=number, Unit=unit
+        )
+
+    def text(self, name: str, value: str) -> Entity:
+        label = self._model.create_entity("IfcLabel", value)
+        return self._model.create_entity("IfcPropertySingleValue", Name=name, NominalValue=label)
 
     def complex(self, name: str, usage: str, properties: Sequence[Entity]) -> Entity:
         return self._model.create_entity(
@@ -132,6 +156,22 @@ class _Writer:
             self.complex(f"{side} polar angle ranges", basis.name or "Klems", polar),
             self.complex(f"{side} azimuthal angle ranges", basis.name or "Klems", azimuth),
         ]
+
+    def closure(self, closure: Closure) -> Entity:
+        """What the resistance between the two virtual layers follows, and the realised films."""
+        parts = [self.text(U_MODEL, closure.u_model)]
+        for field, name in REALISED.items():
+            value = getattr(closure, field)
+            if value is not None:
+                parts.append(self.single(name, "IfcThermalResistanceMeasure", value))
+        if closure.gap is not None:
+            ratio = "IfcNormalisedRatioMeasure"
+            gas = [self.single(name, ratio, share) for name, share in closure.gap.gas]
+            width = self.single("Width", "IfcPositiveLengthMeasure", closure.gap.width, self._metre)
+            faces = self.numbers("Emissivities", closure.gap.emissivity, ratio)
+            gap = [width, self.complex("Gas", "volume fractions", gas), faces]
+            parts.append(self.complex(GAP, "gas gap of a double glazing", gap))
+        return self.complex(CLOSURE, "thermal model of two layers", parts)
 
     def g_values(self, table: AngularGValue) -> Entity:
         """Angular g-values, polar angle by polar angle."""

@@ -41,7 +41,7 @@ def read_fillings(
         body = None if opening is None else shapes.get(opening.id())
         if shape is None and body is None:
             what = f"{element.is_a()} {element.Name or ''}: has no geometry and no opening"
-            problems.append(Problem(element.GlobalId, what, "left out"))
+            problems.append(Problem(element.GlobalId, what, "left out", "window"))
             continue
         if shape is None:
             what = f"{element.is_a()} {element.Name or ''}: has no geometry"

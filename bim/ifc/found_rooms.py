@@ -40,9 +40,9 @@ Body = NDArray[np.float64]
 def found_rooms(source: Source) -> tuple[list[SpaceRecord], list[Problem]]:
     """Rooms between the building elements, and what had to be closed to find them."""
     bodies = _uncut_bodies(source)
-    where = source.path.name
+    where, lacks = source.path.name, _lack_of_spaces(source)
     if not bodies:
-        return [], [Problem(where, "has no spaces and no walls", "no room is found")]
+        return [], [Problem(where, f"{lacks} and no walls", "no room is found", "room")]
     upright = [body for name, body in bodies if name.startswith(("IfcWall", "IfcCurtain"))]
     meshes = [body for _, body in bodies]
     low, high = _box([body for _, body in bodies])
@@ -58,13 +58,19 @@ def found_rooms(source: Source) -> tuple[list[SpaceRecord], list[Problem]]:
     found = ((rooms_enclosed_by(parts, gap), repair) for parts, gap, repair in attempts)
     rooms, repair = next(((rooms, repair) for rooms, repair in found if rooms), ([], ""))
     if not rooms:
-        what = "has no spaces, and its walls enclose nothing"
-        return [], [Problem(where, what, f"no room is found; gaps up to {WIDER} m were closed")]
+        what = f"{lacks}, and its walls enclose nothing"
+        done = f"no room is found; gaps up to {WIDER} m were closed"
+        return [], [Problem(where, what, done, "room")]
     levels = _storeys(source)
     records = [_record(source, number, room, levels) for number, room in enumerate(rooms, 1)]
-    what = f"has no spaces: {len(rooms)} room(s) found between its walls and slabs"
+    what = f"{lacks}: {len(rooms)} room(s) found between its walls and slabs"
     done = repair or "rooms joined by openings without doors are one"
     return records, [Problem(where, what, done)]
+
+
+def _lack_of_spaces(source: Source) -> str:
+    drawn = len(source.model.by_type("IfcSpace"))
+    return f"none of its {drawn} space(s) is a room" if drawn else "has no spaces"
 
 
 def _uncut_bodies(source: Source) -> list[tuple[str, Body]]:

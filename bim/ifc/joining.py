@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import manifold3d
 
 from bim.apertures import Filling, aperture_of
+from bim.ifc.corrections import corrections_file
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.model import Problem
+from bim.names import found_by_name
 from bim.rooms import OVERLAP, Attachment, attachments_of, room_solid
 from bim.solids import prism, union
+from mitsuba_cfs.errors import DataError
 
 THROUGH = 0.02  # an opening that stops this near a room's face goes through the wall [m]
 
@@ -72,21 +75,54 @@ def joined_rooms(
     ways = passages(source, records)
     records, problems = list(records), []
     for names in source.corrections.join:
-        parts = [r for r in records if r.name in names or r.solid.guid in names]
+        parts = list({r.guid: r for r in (_named(records, n, source) for n in names)}.values())
         one = _joined(parts, ways) if len(parts) > 1 else None
         if one is None:
-            what = f"rooms {', '.join(names)}: nothing opens between them, or they do not exist"
+            what = f"rooms {', '.join(names)}: nothing opens between them"
             problems.append(Problem(source.corrections.file or "join", what, "not joined"))
             continue
         records = [r for r in records if r not in parts] + [one]
         problems.append(Problem(one.solid.guid, f"rooms {', '.join(names)}", "joined as asked for"))
-    named = {record.solid.guid: record.solid.name for record in records}
+    named = {record.guid: record for record in records}
     for way in ways:
         if all(guid in named for guid in way.rooms):
-            pair = " and ".join(sorted(named[guid] for guid in way.rooms))
-            what = f"rooms {pair} are open to each other"
-            problems.append(Problem(way.opening, what, "closed by a wall face unless joined"))
+            pair = sorted((named[guid] for guid in way.rooms), key=lambda room: room.label)
+            what = f"rooms {' and '.join(room.label for room in pair)} are open to each other"
+            problems.append(Problem(way.opening, what, _how_to_join(pair, records, source)))
     return records, problems
+
+
+def _named(records: Sequence[SpaceRecord], name: str, source: Source) -> SpaceRecord:
+    """The room of that name; `DataError` lists the nearest where there is none or several."""
+    try:
+        return found_by_name(records, name, "room")
+    except (KeyError, ValueError) as error:
+        file = source.corrections.file or source.path
+        raise DataError(str(error.args[0]), file=file, field="join") from None
+
+
+def _how_to_join(
+    pair: Sequence[SpaceRecord], records: Sequence[SpaceRecord], source: Source
+) -> str:
+    """What becomes of the passage between two rooms, and what makes one room of them."""
+    # the shortest that means one room and holds no plus, at which --join divides
+    names = []
+    for room in pair:
+        own = [room.name, room.label]
+        good = (n for n in own if "+" not in n and _is_unique(records, n))
+        names.append(next(good, room.guid))
+    listed = ", ".join(f'"{name}"' for name in names)
+    return (
+        f"closed by a wall face; one room with --join '{' + '.join(names)}', "
+        f"or join = [[{listed}]] in {corrections_file(source.path).name}"
+    )
+
+
+def _is_unique(records: Sequence[SpaceRecord], name: str) -> bool:
+    try:
+        return found_by_name(records, name, "room") is not None
+    except (KeyError, ValueError):
+        return False
 
 
 def _joined(parts: list[SpaceRecord], ways: list[Passage]) -> SpaceRecord | None:

@@ -14,6 +14,7 @@ from bim.ifc.project import psets_of, storey_of
 from bim.ifc.quantities import checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
 from bim.model import Problem
+from bim.names import label_of
 from bim.planes import Facet, plane_through
 from bim.rays import RayMesh
 from bim.rooms import RoomSolid, room_solid
@@ -39,6 +40,16 @@ class SpaceRecord:
     stated_area: float | None
     stated_volume: float | None
 
+    @property
+    def guid(self) -> str:
+        """GUID of the space."""
+        return self.solid.guid
+
+    @property
+    def label(self) -> str:
+        """Number and name of the space as people use them."""
+        return label_of(self.name, self.long_name, self.guid)
+
 
 def read_spaces(
     model: ifcopenshell.file,
@@ -51,7 +62,7 @@ def read_spaces(
     problems: list[Problem] = []
     seen: set[str] = set()
     for space in model.by_type("IfcSpace"):
-        label = " ".join(part for part in (space.Name, space.LongName) if part) or space.GlobalId
+        label = label_of(space.Name or "", space.LongName or "", space.GlobalId)
         guid = space.GlobalId
         if guid in seen:
             guid = f"{guid}-{space.id()}"
@@ -60,20 +71,22 @@ def read_spaces(
         seen.add(guid)
         psets = psets_of(space)
         if is_outdoors(space, psets):
-            problems.append(Problem(guid, f"space {label}: is marked as external", "left out"))
+            problems.append(
+                Problem(guid, f"space {label}: is marked as external", "left out", "room")
+            )
             continue
         shape = shapes.get(space.id())
         if shape is None:
-            problems.append(Problem(guid, f"space {label}: has no geometry", "left out"))
+            problems.append(Problem(guid, f"space {label}: has no geometry", "left out", "room"))
             continue
         solid, repair = closed_space(shape.triangles)
         if solid is None:
             what = f"space {label}: its geometry encloses no volume"
-            problems.append(Problem(guid, what, "left out"))
+            problems.append(Problem(guid, what, "left out", "room"))
             continue
         if solid.volume() < SMALLEST_SPACE:
             what = f"space {label}: holds {solid.volume():.3f} m3 only"
-            problems.append(Problem(guid, what, "no room: left out"))
+            problems.append(Problem(guid, what, "no room: left out", "room"))
             continue
         if repair:
             problems.append(Problem(guid, f"space {label}: its shell was not sound", repair))
@@ -84,7 +97,7 @@ def read_spaces(
         records.append(
             SpaceRecord(
                 room_solid(guid, label, solid),
-                space.Name or label,
+                space.Name or space.LongName or space.GlobalId,
                 space.LongName or "",
                 storey_of(space),
                 solid.volume(),
@@ -149,7 +162,8 @@ def enclosed_spaces(
         roofless = _open_share(upper, np.array([0.0, 0.0, 1.0]), np.inf, building) > UNCOVERED
         if roofless and _open_share(sides, None, SIDE_REACH, building) > WALLLESS:
             what = f"space {record.solid.name}: no roof covers it and no walls enclose it"
-            problems.append(Problem(record.solid.guid, what, "taken as outdoors, left out"))
+            done = "taken as outdoors, left out"
+            problems.append(Problem(record.solid.guid, what, done, "room"))
         else:
             kept.append(record)
     return kept, problems

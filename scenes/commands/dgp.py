@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.room_options import join_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
 
@@ -21,6 +22,7 @@ _DEFAULT = YearOptions(Path(), Path(), Path())
 )
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
 @click.option("--space", help="Name or GUID of the room; default: the first with a window.")
+@join_option
 @click.option(
     "--view", "views", multiple=True, metavar="'-vta ...'|FILE.vf",
     help="View in Radiance's syntax, or a file of them; default: the room's middle, to its window.",

@@ -13,6 +13,7 @@ import click
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.room_options import join_option
 from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 SUFFIXES = {"--radiance": (".rad", ".pts", ".vf"), "--mitsuba": (".xml", ".ply")}
 
 
+UNCUT = 100_000  # columns of a table that nobody sees
+
+
 @click.group()
 def command() -> None:
     """What an IFC file holds, and what is wrong with it."""
@@ -31,7 +35,8 @@ def command() -> None:
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--csv", "table", type=click.Path(path_type=Path), help="Also write the problems.")
-def check(building: Path, table: Path | None) -> None:
+@join_option
+def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
     if table is not None:
         check_file(table, field="--csv", inputs=[building])
@@ -41,8 +46,9 @@ def check(building: Path, table: Path | None) -> None:
     from scenes.commands.progress_bar import ProgressBar
 
     with ProgressBar() as progress:
-        read = read_ifc(building, progress=progress)
-    console = Console(width=None if Console().is_terminal else 200)
+        read = read_ifc(building, join=join, progress=progress)
+    # a file or a program that reads on gets every line whole, however long
+    console = Console(width=None if Console().is_terminal else UNCUT)
     console.print(_rooms(read))
     console.print(_problems(read))
     console.print(
@@ -62,9 +68,24 @@ def check(building: Path, table: Path | None) -> None:
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--window", "windows", multiple=True, metavar="GUID", help="A window or door.")
 @click.option("--type", "types", multiple=True, metavar="NAME", help="Windows of a type.")
-@click.option("--all", "every_window", is_flag=True, help="Every window.")
-@click.option("--bsdf", type=FILE, help="BSDF XML file: Klems or tensor tree.")
-@click.option("--g", "g_table", type=FILE, help="CSV: polar_deg, g and maybe azimuth_deg.")
+@click.option("--room", "rooms", multiple=True, metavar="NAME", help="Windows of a room.")
+@click.option("--storey", "storeys", multiple=True, metavar="NAME", help="Windows of a storey.")
+@click.option(
+    "--facade", "facades", multiple=True, metavar="N|E|S|W|FROM-TO",
+    help="Windows that face there: also NE ..., roof, or azimuths such as 150-210.",
+)  # fmt: skip
+@click.option(
+    "--all", "every_window", is_flag=True,
+    help="Every IfcWindow; glazed doors and panels only by GUID, room, storey or facade.",
+)  # fmt: skip
+@click.option(
+    "--bsdf", type=FILE,
+    help="BSDF XML file: Klems or tensor tree; U, g and more of the .toml beside it come along.",
+)  # fmt: skip
+@click.option(
+    "--g", "g_value", metavar="NUMBER|FILE.csv",
+    help="g at normal incidence, or a CSV: polar_deg, g and maybe azimuth_deg.",
+)  # fmt: skip
 @click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
 @click.option("--state", default="", help="Name of the shading state; default: the usual one.")
 @click.option("--reference", is_flag=True, help="Name the BSDF file instead of copying it.")
@@ -74,43 +95,41 @@ def check(building: Path, table: Path | None) -> None:
 )  # fmt: skip
 def attach(
     building: Path,
-    windows: tuple[str, ...],
-    types: tuple[str, ...],
-    every_window: bool,
     bsdf: Path | None,
-    g_table: Path | None,
+    g_value: str | None,
     u_value: float | None,
     state: str,
     reference: bool,
     out: Path,
+    **chosen,
 ) -> None:
-    """Write BSDF, angular g-values and U into an IFC file's windows."""
-    if bsdf is None and g_table is None and u_value is None:
+    """Write BSDF, U, g, thermal closure and the place of the shade into an IFC file's windows.
+
+    --room, --storey, --facade and --type narrow each other; one of them given twice widens.
+    """
+    if bsdf is None and g_value is None and u_value is None:
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
-    check_file(out, inputs=[bsdf, g_table])  # the building may be written back
-    from bim.fenestration import ShadingState, read_g_table
-    from mitsuba_cfs.bsdf.xml import read_bsdf_xml
-
-    file = None if bsdf is None else read_bsdf_xml(bsdf)
-    copied = file is not None and not reference
-    one = ShadingState(
-        state,
-        file.bands if copied else {},
-        None if g_table is None else read_g_table(g_table),
-        u_value,
-    )
+    # g may be a number, which no file is; the building may be written back
+    check_file(out, inputs=[bsdf, None if g_value is None else Path(g_value)])
     from bim.ifc.attach import attach as attach_to_ifc
+    from bim.ifc.targets import Targets
+    from scenes.job.state_to_attach import state_to_attach
 
+    one, notes = state_to_attach(
+        bsdf, name=state, u_value=u_value, g_value=g_value, copy_bsdf=not reference
+    )
     count = attach_to_ifc(
-        building, out, one, windows=windows, types=types, every_window=every_window,
-        bsdf_reference=bsdf if reference else None,
-    )  # fmt: skip
+        building, out, one, Targets(**chosen), bsdf_reference=bsdf if reference else None
+    )
+    for note in notes:
+        click.echo(f"note: {note}")
     click.echo(f"{out}: {count} windows or window types")
 
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--space", "names", multiple=True, help="Name or GUID; default: all.")
+@join_option
 @click.option(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
     help="Folder; one folder inside for each room with a window.",
@@ -124,6 +143,7 @@ def attach(
 def export(
     building: Path,
     names: tuple[str, ...],
+    join: tuple[str, ...],
     radiance: Path | None,
     mitsuba: Path | None,
     epjson: Path | None,
@@ -149,11 +169,12 @@ def export(
     from bim.to_mitsuba import write_mitsuba
     from bim.to_radiance import write_radiance
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.job.inputs import named_spaces
 
     writers = {"--radiance": write_radiance, "--mitsuba": write_mitsuba}
     with ProgressBar() as progress:
-        read = read_ifc(building, progress=progress)
-    spaces = _chosen(read, names, building)
+        read = read_ifc(building, join=join, progress=progress)
+    spaces = named_spaces(read, names, building)
     for parent, folder in folders.items():
         written: list[str] = []
         kinds = {suffix for option in formats[parent] for suffix in SUFFIXES[option]}
@@ -171,7 +192,7 @@ def export(
         write_epjson(read, epjson, spaces=spaces)
         click.echo(epjson)
     if gltf is not None:
-        write_gltf(replace(read, spaces=spaces), gltf)
+        write_gltf(replace(read, spaces=tuple(spaces)), gltf)
         click.echo(gltf)
 
 
@@ -179,19 +200,17 @@ def _export_rooms(
     building: Building, spaces: Sequence[Space], place: Path, writers: Sequence[Callable]
 ) -> list[str]:
     """Write a folder for each room with a window; their names."""
-    from bim.to_radiance import identifier
+    from bim.names import folder_names
 
     written = []
-    for space in spaces:
-        name = identifier(space.name)
-        name = f"{name}_{identifier(space.guid)}" if (place / name).exists() else name
+    for space, name in zip(spaces, folder_names(spaces), strict=True):
         try:
             for write in writers if space.windows else ():
                 write(space, building, place / name)
         except ValueError as error:  # a void too low for a work plane or an eye
             if isinstance(error, DataError):
                 raise
-            click.echo(f"{space.name}: left out: {error}", err=True)
+            click.echo(f"{space.label}: left out: {error}", err=True)
             shutil.rmtree(place / name, ignore_errors=True)
             continue
         written += [name] if space.windows else []
@@ -219,36 +238,22 @@ def survey(files: tuple[Path, ...], out: Path | None) -> None:
     click.echo(markdown(rows))
 
 
-def _chosen(building: Building, names: tuple[str, ...], path: Path) -> tuple[Space, ...]:
-    """The rooms of those names; all without any."""
-    if not names:
-        return building.spaces
-    try:
-        return tuple(building.space(name) for name in names)
-    except (KeyError, ValueError) as error:
-        raise DataError(str(error.args[0]), file=path) from None
-
-
 def _rooms(building: Building) -> Table:
     """One line for each room, drawn figures beside those that the file states."""
     from rich.table import Table
 
     table = Table(title=f"Rooms of {building.name}", title_justify="left")
-    table.add_column("room")
-    table.add_column("storey")
+    table.add_column("room", overflow="fold")
+    table.add_column("storey", overflow="fold")
     for head in ("floor m2", "stated", "volume m3", "stated", "faces", "windows", "glass m2"):
         table.add_column(head, justify="right")
     for space in building.spaces:
         table.add_row(
-            _label(space), space.storey, f"{space.floor_area:.2f}", _number(space.stated_area),
+            space.label, space.storey, f"{space.floor_area:.2f}", _number(space.stated_area),
             f"{space.room_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),
             str(len(space.windows)), f"{sum(w.area for w in space.windows):.2f}",
         )  # fmt: skip
     return table
-
-
-def _label(space: Space) -> str:
-    return space.name if space.long_name in ("", space.name) else f"{space.name} {space.long_name}"
 
 
 def _number(value: float | None) -> str:

@@ -9,6 +9,7 @@ import click
 
 from mitsuba_cfs.files import check_file
 from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.room_options import join_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.picture_options import SUFFIXES, PictureOptions
 
@@ -23,9 +24,10 @@ from scenes.picture_options import SUFFIXES, PictureOptions
     "--at", required=True, metavar="'MM-DD HH:MM'", help="The hour of the weather that holds it."
 )
 @click.option("--space", help="Name or GUID of the room; default: the first with a window.")
+@join_option
 @click.option(
     "--view", metavar="'-vta ...'|FILE.vf",
-    help="View in Radiance's syntax, any kind; default: the room's middle, to its window.",
+    help="View in Radiance's syntax, not parallel; default: the room's middle, to its window.",
 )  # fmt: skip
 @click.option("--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True)
 @click.option(

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.room_options import join_option
 from scenes.job.options import METHODS, JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
@@ -28,6 +29,7 @@ _DEFAULT = JobOptions(Path(), Path())
 @click.option("--space", "spaces", multiple=True, help="Name or GUID; default: all with a window.")
 @click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
+@join_option
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -63,6 +65,7 @@ def command(
     out: Path,
     method: str,
     spaces: tuple[str, ...],
+    join: tuple[str, ...],
     u_value: float | None,
     g_value: float | None,
     picture_hours: tuple[str, ...],
@@ -91,6 +94,7 @@ def command(
             method=method,
             annual_glare=annual_glare,
             spaces=spaces,
+            join=join,
             u_value=u_value,
             g_value=g_value,
             picture_hours=picture_hours,
@@ -150,7 +154,7 @@ def summary_line(room) -> str:
         kwh = {name: room.operation.summary[f"{name}_kwh"] for name in LOADS}
         loads = "".join(f", {name} {value:.0f} kWh" for name, value in kwh.items() if value > 0)
     return (
-        f"{room.space.name or room.space.guid}: "
+        f"{room.space.label}: "
         f"sDA {daylight['sda300_50']:.0f} %, "
         f"{direct}mean DA {daylight['da300']:.0f} %, "
         f"worst DGP {worst:.2f}, "

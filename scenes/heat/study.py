@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -21,7 +20,6 @@ from bim.to_thermal import (
 )
 from mitsuba_cfs import variants
 from mitsuba_cfs.directions import window_frame
-from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
@@ -32,9 +30,11 @@ from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_solar
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
-from scenes.job.inputs import System, chosen_spaces
+from scenes.job.drawn_shades import traced_building
+from scenes.job.inputs import System, chosen_spaces, named_spaces
 from scenes.job.thermal import climate
 from scenes.job.thermal_system import ThermalSystem
+from scenes.job.windows import everywhere
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Solar
 from thermal.control import (
@@ -84,6 +84,8 @@ def run_study(
     files = files or read_files(study)
     weather, systems, thermals = files.weather, files.systems, files.thermals
     building, spaces = rooms_of(study)
+    shades = {guid: s for space in spaces for guid, s in everywhere(space, *systems).items()}
+    building = traced_building(building, shades)
     zones = [thermal_room(space, thermals[0].fenestration) for space in spaces]
     notes = dict.fromkeys(note for t in (weather, *systems, *thermals) for note in t.notes)
     if study.couple:
@@ -148,21 +150,11 @@ def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
     if study.box is not None:
         building = box_building(study.box)
         return building, list(building.spaces)
-    building = read_ifc(study.building)
+    building = read_ifc(study.building, join=study.join)
     if study.couple:
-        spaces = coupled_spaces(building, study.spaces, study.building)
+        spaces = named_spaces(building, study.spaces, study.building)
         return building, shared_constructions(spaces)
     return building, chosen_spaces(building, study.spaces, study.building)
-
-
-def coupled_spaces(building: Building, names: tuple[str, ...], path: Path) -> list[Space]:
-    """The rooms of those names or GUIDs, or all: rooms without windows take part too."""
-    if not names:
-        return list(building.spaces)
-    try:
-        return list({s.guid: s for s in map(building.space, names)}.values())
-    except (KeyError, ValueError) as error:
-        raise DataError(str(error.args[0]), file=path, field="spaces") from error
 
 
 def _skies(weather: Weather, study: StudyFile) -> AnnualSky:

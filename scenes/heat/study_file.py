@@ -11,6 +11,8 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from scenes.toml_file import read_table, validated
+from thermal.closure import Closure
+from thermal.glazing import Gap
 from thermal.zone import IdealLoads
 
 Positive = Annotated[float, Field(gt=0)]
@@ -77,22 +79,38 @@ class GapTable(_Table):
     emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
 
 
-class SystemTable(_Table):
-    """One shading state: a BSDF file and what else was measured."""
+class ClosureTable(_Table):
+    """How a system's thermal model is closed: in a study, and beside a BSDF file."""
 
-    bsdf: Path
-    u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None
-    g_value: Share | None = None
     u_model: Literal["constant", "linear", "gap"] = "constant"  # with the temperatures
     gap: GapTable | None = None
     realised_inner_resistance: Positive | None = None  # [m2 K/W], see thermal.blackbox
     realised_outer_resistance: Positive | None = None
 
     @model_validator(mode="after")
-    def _has_its_gap(self) -> SystemTable:
+    def _has_its_gap(self) -> ClosureTable:
         if (self.u_model == "gap") != (self.gap is not None):
             raise ValueError('u_model "gap" and a [system.gap] table belong together')
         return self
+
+    def closure(self) -> Closure | None:
+        """What the table states; None where it states nothing."""
+        if not self.model_fields_set & set(ClosureTable.model_fields):
+            return None
+        gap = self.gap
+        if gap is not None:
+            gap = Gap(gap.width, tuple(gap.gas.items()), gap.emissivity)
+        return Closure(
+            self.u_model, gap, self.realised_inner_resistance, self.realised_outer_resistance
+        )
+
+
+class SystemTable(ClosureTable):
+    """One shading state: a BSDF file and what else was measured."""
+
+    bsdf: Path
+    u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None
+    g_value: Share | None = None
 
 
 class ControlTable(_Table):
@@ -176,6 +194,7 @@ class StudyFile(_Table):
     weather: Path
     building: Path | None = None
     spaces: tuple[str, ...] = ()
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     couple: bool = False  # heat flows through the walls between the rooms
     box: BoxTable | None = None
     system: Annotated[tuple[SystemTable, ...], Field(min_length=1)]

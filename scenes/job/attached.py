@@ -15,6 +15,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
 from scenes.job.inputs import System, system_of
+from scenes.job.thermal_file import ThermalFile
 from scenes.job.windows import States
 
 
@@ -50,7 +51,9 @@ def attached_systems(path: Path, windows: Iterable[Window]) -> dict[str, States]
 
 def _content(state: ShadingState) -> list:
     bands = [[name, bsdf] for name, bsdf in sorted(state.bands.items())]
-    return [state.name, bands, state.g_value, state.u_value]
+    thermal = [state.g_value, state.u_value, state.g_normal, state.g_by_patch]
+    beside = None if state.file is None else str(state.file)
+    return [state.name, bands, *thermal, state.closure, state.shading_position, beside]
 
 
 def _system(state: ShadingState, window: Window, path: Path) -> System:
@@ -58,8 +61,26 @@ def _system(state: ShadingState, window: Window, path: Path) -> System:
     if not state.bands:
         label = f"state {state.name!r} has no BSDF" if state.name else "has no BSDF"
         raise DataError(label, file=path, element=f"window {window.name or window.guid}")
-    g = None if state.g_value is None else g_by_patch(state.g_value)
-    return system_of(state.bands, name, path=path, u_value=state.u_value, g_by_patch=g)
+    return system_of(state.bands, name, path=path, **_thermal(state))
+
+
+def _thermal(state: ShadingState) -> dict:
+    """U, g, closure and place of the shade: of the model, else of the file beside the BSDF's."""
+    beside = ThermalFile()
+    if state.file is not None:
+        beside = ThermalFile.read(state.file.with_suffix(".toml"))
+    g_normal, by_patch = state.g_normal, state.g_by_patch
+    if state.g_value is not None:
+        by_patch = g_by_patch(state.g_value)
+    elif g_normal is None and by_patch is None:
+        g_normal, by_patch = beside.g_value, beside.g_value_by_patch
+    return {
+        "u_value": beside.u_value if state.u_value is None else state.u_value,
+        "g_value": g_normal,
+        "g_by_patch": by_patch,
+        "closure": state.closure or beside.closure,
+        "shading_position": state.shading_position or beside.shading_position,
+    }
 
 
 def g_by_patch(table: AngularGValue) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Building, Space
+from bim.model import Building, Problem, Space
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.resample import klems_of
@@ -19,6 +19,10 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather, read_epw
+from scenes.job.thermal_file import ThermalFile
+from thermal.closure import Closure
+
+QUOTED = 3  # problems of the model that one message quotes
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +35,8 @@ class System:
     u_value: float | None = None  # [W/(m2 K)]
     g_value: float | None = None  # at normal incidence
     g_by_patch: NDArray[np.float64] | None = None  # [K] by incident patch, before g_value
+    closure: Closure | None = None  # of the thermal model
+    shading_position: str | None = None  # a key of thermal.gvalue.TYPICAL_SYSTEMS
     notes: tuple[str, ...] = ()
     tree: TensorTreeBsdf | None = None  # visible, where the data are a tree: for sun and pictures
 
@@ -40,51 +46,12 @@ class System:
         return self.visible if self.tree is None else self.tree
 
 
-@dataclass(frozen=True, slots=True)
-class ThermalFile:
-    """U and g of a system, from the file beside its BSDF."""
-
-    u_value: float | None = None
-    g_value: float | None = None
-    g_value_by_patch: NDArray[np.float64] | None = None  # [K]
-
-    @classmethod
-    def read(cls, path: Path) -> ThermalFile:
-        """The values of the file; nothing where there is none."""
-        if not path.is_file():
-            return cls()
-        try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise DataError(f"is not TOML: {error}", file=path) from error
-
-        def number(field: str) -> float | None:
-            value = table.get(field)
-            if value is not None and (
-                isinstance(value, bool) or not isinstance(value, int | float)
-            ):
-                raise DataError(f"expected a number, got {value!r}", file=path, field=field)
-            return None if value is None else float(value)
-
-        patches, field = table.get("g_value_by_patch"), "g_value_by_patch"
-        if patches is not None:
-            try:
-                patches = np.array(patches, dtype=float)
-            except (TypeError, ValueError) as error:
-                raise DataError("expected a list of numbers", file=path, field=field) from error
-            if patches.shape != (KLEMS_FULL.size,):
-                message = f"expected {KLEMS_FULL.size} numbers, got {patches.size}"
-                raise DataError(message, file=path, field=field)
-        return cls(number("u_value"), number("g_value"), patches)
-
-
 def read_system(
     path: Path, *, u_value: float | None = None, g_value: float | None = None
 ) -> System:
     """The system of a BSDF XML file, with U and g given, or of the `.toml` file beside it.
 
-    The `.toml` file has the name of the XML file and may hold `u_value` [W/(m2 K)], `g_value` (at
-    normal incidence) and `g_value_by_patch` (for each incident patch of the Klems full basis).
+    The `.toml` file has the name of the XML file; see `ThermalFile`.
     """
     file = read_bsdf_xml(path)
     beside = ThermalFile.read(path.with_suffix(".toml"))
@@ -95,6 +62,8 @@ def read_system(
         u_value=beside.u_value if u_value is None else u_value,
         g_value=beside.g_value if g_value is None else g_value,
         g_by_patch=beside.g_value_by_patch if g_value is None else None,
+        closure=beside.closure,
+        shading_position=beside.shading_position,
         notes=file.notes,
     )
 
@@ -105,11 +74,11 @@ def system_of(
     *,
     path: Path,
     notes: Sequence[str] = (),
-    **thermal: float | NDArray[np.float64] | None,
+    **thermal: float | str | NDArray[np.float64] | Closure | None,
 ) -> System:
     """The system of BSDF data by band, Klems full or tensor trees.
 
-    Args: path: the file that the data come from; thermal: `u_value`, `g_value`, `g_by_patch`.
+    Args: path: the file that the data come from; thermal: fields of `System`.
     """
     notes = list(notes)
     if "Visible" not in bands and "Solar" not in bands:
@@ -150,27 +119,70 @@ def read_weather(path: Path) -> Weather:
     return weather
 
 
-def chosen_spaces(building: Building, names: tuple[str, ...], path: Path) -> list[Space]:
-    """The spaces of those names or GUIDs, or every space with a window."""
-    if not building.spaces:
-        raise DataError("has no rooms (IfcSpace)", file=path)
+def chosen_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
+    """The spaces of those names or GUIDs, or every space with a window.
+
+    Raises: `DataError` that quotes what the model's problems say about a room that is not there.
+    """
+    chosen = named_spaces(building, names, path)
     if names:
-        chosen = [_space(building, name, path) for name in names]
         for space in chosen:
             if not space.windows:
-                raise DataError("has no window", file=path, element=f"space {space.name}")
-        return list({space.guid: space for space in chosen}.values())
-    chosen = [space for space in building.spaces if space.windows]
+                about = [p for p in _lost(building, "window") if _says(p.what, space.name)]
+                why = f": {_quoted(about)}" if about else ""
+                raise DataError(f"has no window{why}", file=path, element=f"space {space.label}")
+        return chosen
+    chosen = [space for space in chosen if space.windows]
     if not chosen:
-        raise DataError("no space has a window to the outside", file=path, element="IfcWindow")
+        why = _because(building, "window") or _because(building, "room")
+        what = f"no space has a window to the outside{why}"
+        raise DataError(what, file=path, element="IfcWindow")
     return chosen
+
+
+def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
+    """The spaces of those names or GUIDs, each once, or all spaces; with windows or without."""
+    if not building.spaces:
+        raise DataError(f"has no rooms (IfcSpace){_because(building, 'room')}", file=path)
+    if not names:
+        return list(building.spaces)
+    return list(
+        {space.guid: space for space in (_space(building, n, path) for n in names)}.values()
+    )
 
 
 def _space(building: Building, name: str, path: Path) -> Space:
     try:
         return building.space(name)
     except (KeyError, ValueError) as error:
-        raise DataError(str(error.args[0]), file=path, field="--space") from error
+        lost = [p for p in _lost(building, "room") if p.where == name or _says(p.what, name)]
+        if isinstance(error, KeyError) and lost:
+            message = f"space {name!r} was left out: {_quoted(lost)}"
+        else:
+            message = str(error.args[0])
+        raise DataError(message, file=path, field="space") from error
+
+
+def _lost(building: Building, kind: str) -> list[Problem]:
+    """The problems for which a "room" or "window" is not there."""
+    return [problem for problem in building.problems if problem.lost == kind]
+
+
+def _says(text: str, name: str) -> bool:
+    """Whether a text holds a name as whole words."""
+    return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text, re.IGNORECASE) is not None
+
+
+def _because(building: Building, kind: str) -> str:
+    lost = _lost(building, kind)
+    return f": {_quoted(lost)}" if lost else ""
+
+
+def _quoted(problems: Sequence[Problem]) -> str:
+    """The first problems in one line, and how many more there are."""
+    shown = "; ".join(f"{p.what} ({p.consequence})" for p in problems[:QUOTED])
+    more = len(problems) - QUOTED
+    return f"{shown}; and {more} more, see cfs ifc check" if more > 0 else shown
 
 
 def sha256(path: Path) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import pandas as pd
 
+from bim.names import folder_names
 from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from scenes.job.daylight import illuminance_table
@@ -24,7 +24,8 @@ def write_results(result: RunResult, folder: ResultFolder, write_report=None) ->
     """
     with folder.replaced() as temporary:
         several = len(result.spaces) > 1
-        for room, name in zip(result.spaces, room_names(result), strict=True):
+        names = folder_names([room.space for room in result.spaces])
+        for room, name in zip(result.spaces, names, strict=True):
             place = temporary / name if several else temporary
             place.mkdir(exist_ok=True)
             _write_room(result, room, place)
@@ -33,16 +34,6 @@ def write_results(result: RunResult, folder: ResultFolder, write_report=None) ->
             write_report(result, temporary / "report.html")
         text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
-
-
-def room_names(result: RunResult) -> list[str]:
-    """A folder name for each room: its name, or its GUID where names are shared or empty."""
-    names = [re.sub(r"[^\w.-]+", "_", room.space.name).strip("._") for room in result.spaces]
-    folded = [name.casefold() for name in names]
-    return [
-        name if name and folded.count(name.casefold()) == 1 else f"{name}_{room.space.guid}"
-        for name, room in zip(names, result.spaces, strict=True)
-    ]
 
 
 def _write_room(result: RunResult, room: SpaceResult, place: Path) -> None:

@@ -21,6 +21,7 @@ from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.alike import as_room, same_light, same_systems
 from scenes.job.attached import attached_systems
+from scenes.job.drawn_shades import traced_building
 from scenes.job.files import JobFiles, read_files
 from scenes.job.inputs import System, chosen_spaces, sha256
 from scenes.job.operation import Operation, check_states
@@ -97,7 +98,8 @@ def read_inputs(
     files = files or read_files(options)
     system, operation, weather = files.system, files.operation, files.weather
     progress("inputs", 0.1)
-    building = read_ifc(options.building, progress=part(progress, 0.1, 1.0, "inputs"))
+    steps = part(progress, 0.1, 1.0, "inputs")
+    building = read_ifc(options.building, join=options.join, progress=steps)
     spaces = chosen_spaces(building, options.spaces, options.building)
     systems: dict[str, States] = {}
     if operation is not None and operation.systems:
@@ -112,6 +114,7 @@ def read_inputs(
     if operation is not None:
         check_states(operation, max(len(states) for states in systems.values()))
     progress("inputs", 1.0)
+    building = traced_building(building, systems)
     return JobInputs(building, spaces, weather, systems, operation)
 
 
@@ -130,7 +133,7 @@ def _rooms(
     cache = MatrixCache.of_user() if options.cache else None
     for group in template_rooms(inputs.spaces):
         for space in group:
-            steps = _labelled(progress, f"{space.name or space.guid}: ")
+            steps = _labelled(progress, f"{space.label}: ")
             try:
                 twin = next(
                     (
@@ -145,9 +148,9 @@ def _rooms(
                 )
                 if twin is not None:
                     found[space.guid] = as_room(found[twin.guid], space)
-                    name = space.name or space.guid
+                    name = space.label
                     notes.append(
-                        f"Room {name} is like {twin.name or twin.guid} in shape, orientation, "
+                        f"Room {name} is like {twin.label} in shape, orientation, "
                         "materials, windows and in what shades it: its results are those."
                     )
                     continue
@@ -159,7 +162,7 @@ def _rooms(
                 if isinstance(error, DataError):
                     raise
                 if len(inputs.spaces) == 1:
-                    where = f"space {space.name or space.guid}"
+                    where = f"space {space.label}"
                     raise DataError(str(error), file=options.building, element=where) from error
                 problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
     return [found[s.guid] for s in inputs.spaces if s.guid in found], problems, notes

@@ -16,11 +16,8 @@ from thermal.blackbox import (
     Fenestration,
     LayerAbsorptances,
     layer_absorptances,
-    linear_u,
-    with_realised_films,
 )
 from thermal.errors import ThermalInputError
-from thermal.glazing import Gap, gap_resistance
 from thermal.gvalue import thermal_data
 
 
@@ -44,14 +41,22 @@ def thermal_system(system: System) -> ThermalSystem:
     tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
     rho = solar.direct_hemispherical(solar.reflection_front)
     rho = np.minimum(rho, 1.0 - tau)
-    data = thermal_data(tau, rho, u_value=system.u_value, g_normal=system.g_value, item=system.name)
+    data = thermal_data(
+        tau, rho, u_value=system.u_value, g_normal=system.g_value,
+        shading_position=system.shading_position or "none", item=system.name,
+    )  # fmt: skip
     g_value = data.g_value if system.g_by_patch is None else system.g_by_patch
     back_rho, back_tau = (
         _diffuse(solar, block) for block in (solar.reflection_back, solar.transmission_back)
     )
+    fenestration, films = Fenestration(system.name, data.u_value), {}
+    if system.closure is not None:
+        fenestration = system.closure.close(fenestration)
+        if system.closure.changes_films:
+            films = {"r_outer": fenestration.r_outer, "r_inner": fenestration.r_inner}
     return ThermalSystem(
-        Fenestration(system.name, data.u_value),
-        layer_absorptances(tau, rho, g_value, data.u_value, item=system.name),
+        fenestration,
+        layer_absorptances(tau, rho, g_value, data.u_value, item=system.name, **films),
         tau,
         rho,
         g_value,
@@ -68,24 +73,8 @@ def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
 
 
 def state_of(system: System, table: SystemTable) -> ThermalSystem:
-    """A shading state's thermal data with the closure that its table asks for."""
-    plain = thermal_system(system)
-    fenestration = plain.fenestration
-    if table.u_model == "linear":
-        fenestration = replace(fenestration, resistance=linear_u(fenestration.u_value))
-    if table.gap is not None:
-        gap = Gap(table.gap.width, tuple(table.gap.gas.items()), table.gap.emissivity)
-        resistance = gap_resistance(fenestration.u_value, gap, item=system.name)
-        fenestration = replace(fenestration, resistance=resistance)
-    inner, outer = table.realised_inner_resistance, table.realised_outer_resistance
-    if inner is None and outer is None:
-        return replace(plain, fenestration=fenestration)
-    closed = with_realised_films(fenestration, r_inner_realised=inner, r_outer_realised=outer)
-    absorptances = layer_absorptances(
-        plain.transmittance, plain.reflectance, plain.g_value, closed.u_value,
-        r_outer=closed.r_outer, r_inner=closed.r_inner, item=system.name,
-    )  # fmt: skip
-    return replace(plain, fenestration=closed, absorptances=absorptances)
+    """A shading state's thermal data with the closure that its table asks for, else its own."""
+    return thermal_system(replace(system, closure=table.closure() or system.closure))
 
 
 def checked_system(system: System, path: Path, table: SystemTable | None = None) -> ThermalSystem:

@@ -73,7 +73,7 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
         )
     found.append(("Glare", _glare(result)))
     found.append(("Heat", _heat(result)))
-    twins = [room.space.name or room.space.guid for room in rooms if room.like]
+    twins = [room.space.label for room in rooms if room.like]
     if twins:
         found.append(
             (

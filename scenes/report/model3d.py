@@ -90,15 +90,8 @@ def model3d(result: RunResult) -> Model3D:
         cells.append(np.concatenate([flat, z], axis=-1))
         owners += [index] * len(flat)
     sensors = {"room": owners, "corners": packed(np.concatenate(cells))}
-    names = tuple(room_name(space) for space in spaces)
+    names = tuple(space.label for space in spaces)
     return Model3D(tuple(centre), unit, tuple(batches), sensors, layers(result), names, left_out)
-
-
-def room_name(space: Space) -> str:
-    """Number and name of a room, each once."""
-    if not space.long_name or space.long_name == space.name:
-        return space.name
-    return f"{space.name} {space.long_name}"
 
 
 def room_batches(space: Space):

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from mitsuba_cfs.files import write_text
 from scenes.report import tables
 from scenes.report.method import method_words
-from scenes.report.model3d import model3d, room_name
+from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words
 from scenes.report.numbers import rounded
 from scenes.report.room import room_page
@@ -155,7 +155,7 @@ def timings_table(result: RunResult) -> tables.Table:
         tables.Column("Time", "s"),
     )
     rows = [
-        (room_name(room.space), stage.replace("_", " "), f"{seconds:.1f}")
+        (room.space.label, stage.replace("_", " "), f"{seconds:.1f}")
         for room in result.spaces
         for stage, seconds in room.seconds.items()
     ]

@@ -19,7 +19,6 @@ from scenes.report import (
 )
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards
-from scenes.report.model3d import room_name
 from scenes.report.numbers import rounded, share
 from scenes.results import RunResult, SpaceResult
 
@@ -57,7 +56,7 @@ def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
     monthly = tables.monthly_gains(room.thermal.gains)
     return RoomPage(
         anchor=f"room-{number}",
-        name=room_name(room.space),
+        name=room.space.label,
         facts=facts(room.space, room.like),
         cards=cards(result, room),
         plans=daylight_figures.plans(room),

@@ -135,7 +135,7 @@ def sensors_table(room: SpaceResult) -> Table:
         )
         for i, row in enumerate(frame.to_numpy())
     ]
-    return Table(f"Sensors of {room.space.name}", tuple(columns), tuple(rows))
+    return Table(f"Sensors of {room.space.label}", tuple(columns), tuple(rows))
 
 
 def problems_table(result: RunResult) -> Table:

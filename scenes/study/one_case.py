@@ -20,6 +20,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.box import box_building
+from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.job.operation import read_operation
 from scenes.job.room import compute_room, skies_for
@@ -54,6 +55,7 @@ def _computed(case: Case) -> CaseResult:
     variants.activate()
     building, space = _room(case)
     system = _system(case)
+    building = traced_building(building, everywhere(space, system))
     weather = _weather(case.weather, case.orientation_deg)
     skies = _skies(case.weather, case.orientation_deg, case.options)
     cache = MatrixCache.of_user()

@@ -51,7 +51,7 @@ def plan_of(study: StudyFile) -> Plan:
             about = {
                 "room": room.name,
                 "space": space.guid,
-                "space_name": room.name if room.box else space.name or space.guid,
+                "space_name": room.name if room.box else space.label,
                 "building": source,
                 "specular": room.specular,
                 "operation": operation,

@@ -10,7 +10,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.job.files import check_names
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.year_of_glare.options import YearOptions
-from scenes.year_of_glare.views import given_views
+from scenes.year_of_glare.views import rated_views
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,5 +29,5 @@ def read_files(options: YearOptions) -> YearFiles:
     check_head(options.building)
     corrections_beside(options.building)
     check_names(() if options.space is None else (options.space,))
-    given_views(options)
+    rated_views(options)
     return YearFiles(read_weather(options.weather), read_system(options.system))

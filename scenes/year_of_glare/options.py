@@ -17,6 +17,7 @@ class YearOptions:
     weather: Path
     system: Path
     space: str | None = None  # name or GUID; None: the first room that has a window
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     views: tuple[str, ...] = ()  # Radiance view options, or files of them
     grid: float | None = None  # [m] spacing of eyes all over the room, in place of one
     directions: int = 1  # at every eye, the first towards the biggest window

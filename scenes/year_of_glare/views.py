@@ -2,66 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from bim.model import Space
-from bim.sensors import horizontal_section, sensor_grid, view_point
+from bim.sensors import sensor_grid, view_point
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.images.view import View, fisheye, parse_view
+from mitsuba_cfs.images.view import View, fisheye
+from scenes.room_views import NamedView, check_eye, given_views
 from scenes.year_of_glare.options import YearOptions
 
 MARGIN = 0.5  # [m] of the grid of eyes from the walls
 
 
-@dataclass(frozen=True, slots=True)
-class NamedView:
-    """A view and what it is called in files and tables."""
-
-    name: str
-    view: View
-
-
 def chosen_views(space: Space, options: YearOptions) -> list[NamedView]:
     """Every view of the options; without any the room's middle towards its biggest window."""
-    found = given_views(options) if options.views else _grid(space, options)
+    found = rated_views(options) if options.views else _grid(space, options)
     for each in found:
-        _check_eye(each, space)
+        check_eye(each, space)
     return found
 
 
-def given_views(options: YearOptions) -> list[NamedView]:
+def rated_views(options: YearOptions) -> list[NamedView]:
     """The views that the options state; they can be read and rated before a room is known."""
-    found = [view for text in options.views for view in _given(text, options.size)]
+    found = [view for text in options.views for view in given_views(text, options.size)]
     for each in found:
         _check_kind(each)
-    return found
-
-
-def _given(text: str, size: int) -> list[NamedView]:
-    """Views of a Radiance view file, a line each, or of the text itself."""
-    if text.strip().startswith("-v"):
-        lines, file, stem = [text], None, "view"
-    else:
-        file = Path(text)
-        try:
-            lines = file.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise DataError(f"cannot be read: {error}", file=file, field="--view") from None
-        stem = file.stem
-    found = []
-    for number, line in enumerate(line for line in lines if "-v" in line):
-        try:
-            view = parse_view(line, size, size)
-        except ValueError as error:
-            raise DataError(str(error), file=file, field="--view") from None
-        found.append(NamedView(f"{stem}_{number + 1}", view))
-    if not found:
-        raise DataError("holds no view (a line with -vta -vp ... -vd ...)", file=file)
     return found
 
 
@@ -98,17 +66,6 @@ def _check_kind(each: NamedView) -> None:
         raise DataError(
             f"{each.name} shows {view.horizontal_deg:g} x {view.vertical_deg:g} degrees: "
             "expected 180 x 180 (-vh 180 -vv 180)",
-            field="--view",
-        )
-
-
-def _check_eye(each: NamedView, space: Space) -> None:
-    """Refuse an eye outside the room."""
-    x, y, z = each.view.position
-    section = horizontal_section(space.shell, z)
-    if section.is_empty or not section.contains(shapely.Point(x, y)):
-        raise DataError(
-            f"{each.name}: its eye ({x:g}, {y:g}, {z:g}) is not in the room {space.name}",
             field="--view",
         )
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.corrections import corrections_file
 from bim.read_ifc import read_ifc
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
@@ -30,7 +31,9 @@ from mitsuba_cfs.progress import Progress, part, silent, staged
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
+from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import chosen_spaces, sha256
+from scenes.job.windows import everywhere
 from scenes.year_of_glare.files import YearFiles, read_files
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
@@ -75,10 +78,12 @@ def read_year(
     files = files or read_files(options)
     system, weather = files.system, files.weather
     progress("inputs", 0.1)
-    building = read_ifc(options.building, progress=part(progress, 0.1, 0.6, "inputs"))
+    steps = part(progress, 0.1, 0.6, "inputs")
+    building = read_ifc(options.building, join=options.join, progress=steps)
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     views = chosen_views(space, options)
+    building = traced_building(building, everywhere(space, system))
     variants.activate()
     sampling = sampling_of(options)
     sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
@@ -89,12 +94,16 @@ def read_year(
         window_groups(space),
         view=views[0].view,
     )
-    chosen = [code_version(__name__), options.method, options.metric, options.samples, options.seed]
-    files = [sha256(p) for p in (options.building, options.weather, options.system)]
-    digest = hashlib.sha256(json.dumps([*chosen, *files, space.guid]).encode()).hexdigest()
+    chosen = [options.method, options.metric, options.samples, options.seed, options.join]
+    # corrections change rooms and surroundings, as --join does, under the same GUID
+    corrections = corrections_file(options.building)
+    inputs = [options.building, options.weather, options.system, corrections]
+    hashes = [sha256(path) for path in inputs if path.is_file()]
+    chosen = [code_version(__name__), *chosen, *hashes]
+    digest = hashlib.sha256(json.dumps([*chosen, space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))
     return Year(
-        options, space.name or space.guid, views, scene,
+        options, space.label, views, scene,
         BsdfOptics(system.visible, system.fine), weather, sky, used, digest,
         (*system.notes, *weather.notes),
     )  # fmt: skip

@@ -85,7 +85,8 @@ def test_gltf_holds_rooms_glass_and_surroundings(tmp_path):
     write_gltf(building, tmp_path / "room.glb")
     scene = trimesh.load(tmp_path / "room.glb")
     names = set(scene.geometry)
-    assert {"R1 floor", "R1 wall", "R1 glass", "R1 window frame", "outdoors"} <= names
-    assert scene.geometry["R1 glass"].area == pytest.approx(building.windows[0].area, rel=1e-5)
+    assert {f"R1 Room {kind}" for kind in ("floor", "wall", "glass", "window frame")} <= names
+    assert "outdoors" in names
+    assert scene.geometry["R1 Room glass"].area == pytest.approx(building.windows[0].area, rel=1e-5)
     low, high = scene.bounds
     assert high[1] - low[1] == pytest.approx(3.4, abs=1e-5)  # y is up in glTF

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from bim.fenestration import AngularGValue, ShadingState, read_g_table
 from bim.ifc.attach import attach
 from bim.ifc.fenestration_read import read_states
+from bim.ifc.targets import Targets
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
@@ -64,8 +65,8 @@ def test_klems_tree_g_and_u_come_back_bit_for_bit(path, tmp_path):
     g = AngularGValue(np.radians([0, 31, 87]), np.radians([0, 90]), np.arange(6).reshape(3, 2) / 7)
     bare = ShadingState("", {"Visible": klems(1), "Solar": klems(2)}, g, 1.1)
     blind = ShadingState("blind 45", {"Visible": tree()}, None, 0.1 + 0.2)
-    assert attach(path, out, bare, every_window=True) == 1
-    attach(out, again, blind, every_window=True)
+    assert attach(path, out, bare, Targets(every_window=True)) == 1
+    attach(out, again, blind, Targets(every_window=True))
     first, second = states_of(again)
     assert (first.name, first.u_value, second.name, second.u_value) == (
         "",
@@ -91,8 +92,8 @@ def test_klems_tree_g_and_u_come_back_bit_for_bit(path, tmp_path):
 
 def test_state_of_the_same_name_is_replaced(path, tmp_path):
     out = tmp_path / "out.ifc"
-    attach(path, out, ShadingState(u_value=1.1), every_window=True)
-    attach(out, out, ShadingState(u_value=0.8), every_window=True)
+    attach(path, out, ShadingState(u_value=1.1), Targets(every_window=True))
+    attach(out, out, ShadingState(u_value=0.8), Targets(every_window=True))
     (state,) = states_of(out)
     assert state.u_value == 0.8
 
@@ -103,7 +104,7 @@ def test_type_passes_its_data_to_its_windows(path, tmp_path):
     (window,) = model.by_type("IfcWindow")
     window.ObjectType = "fixed 3 x 1.5"
     model.write(str(path))
-    assert attach(path, out, ShadingState(u_value=1.3), types=["fixed 3 x 1.5"]) == 1
+    assert attach(path, out, ShadingState(u_value=1.3), Targets(types=["fixed 3 x 1.5"])) == 1
     assert states_of(out)[0].u_value == 1.3
 
 
@@ -114,7 +115,7 @@ def test_bsdf_by_reference(path, tmp_path):
     # not a random matrix: the reader checks the conservation of energy
     tame = KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, *(np.full((4, 41, 41), 0.05)))
     write_bsdf_xml(BsdfFile({"Visible": tame}, "system"), file)
-    attach(path, out, ShadingState(), every_window=True, bsdf_reference=file)
+    attach(path, out, ShadingState(), Targets(every_window=True), bsdf_reference=file)
     back = states_of(out)[0].bands["Visible"]
     np.testing.assert_allclose(back.transmission_front, 0.05, rtol=1e-6)  # 7 digits in the XML
 
@@ -135,12 +136,12 @@ def test_command_line(path, tmp_path):
 def test_wrong_targets_and_tables_are_named(path, tmp_path):
     out, state = tmp_path / "out.ifc", ShadingState(u_value=1.0)
     with pytest.raises(DataError, match="no element"):
-        attach(path, out, state, windows=["nonsense"])
+        attach(path, out, state, Targets(windows=["nonsense"]))
     wall = ifcopenshell.open(str(path)).by_type("IfcWall")[0].GlobalId
     with pytest.raises(DataError, match="no window"):
-        attach(path, out, state, windows=[wall])
+        attach(path, out, state, Targets(windows=[wall]))
     with pytest.raises(DataError, match="no window type"):
-        attach(path, out, state, types=["nonsense"])
+        attach(path, out, state, Targets(types=["nonsense"]))
     assert not out.exists()
     table = tmp_path / "g.csv"
     for text, message in (
@@ -156,7 +157,7 @@ def test_wrong_targets_and_tables_are_named(path, tmp_path):
 
 def test_damaged_set_is_named(path, tmp_path):
     out = tmp_path / "out.ifc"
-    attach(path, out, ShadingState(bands={"Visible": klems(1)}), every_window=True)
+    attach(path, out, ShadingState(bands={"Visible": klems(1)}), Targets(every_window=True))
     model = ifcopenshell.open(str(out))
     values = next(
         one
@@ -193,7 +194,7 @@ def test_real_bsdf_files_come_back_bit_for_bit(real_data, tmp_path, schema, name
     path, out = tmp_path / "in.ifc", tmp_path / "out.ifc"
     box_room(schema).write(str(path))
     bands = read_bsdf_xml(real_data / "bsdf" / name).bands
-    attach(path, out, ShadingState("", bands), every_window=True)
+    attach(path, out, ShadingState("", bands), Targets(every_window=True))
     (state,) = states_of(out)
     assert state.bands.keys() == bands.keys()
     for band, bsdf in bands.items():

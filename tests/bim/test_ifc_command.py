@@ -50,7 +50,8 @@ def test_export_writes_what_is_asked_for(path, tmp_path):
         catch_exceptions=False,
     )
     assert result.exit_code == 0
-    assert (rad / "R1" / "windows_S.rad").is_file() and (mitsuba / "R1" / "scene.xml").is_file()
+    assert (rad / "R1_Room" / "windows_S.rad").is_file()
+    assert (mitsuba / "R1_Room" / "scene.xml").is_file()
     assert zone.is_file() and view.is_file()
 
 

@@ -8,6 +8,8 @@ import pytest
 from bim.ifc.corrections import Corrections
 from bim.read_ifc import read_ifc
 from bim.shell import open_edges
+from mitsuba_cfs.errors import DataError
+from scenes import cli
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WALLS, WIDTH, empty_project
 
 THICK = 0.2  # of the partition [m]
@@ -41,7 +43,10 @@ def reported(building, text: str) -> bool:
 def test_open_rooms_are_reported_and_kept_apart(tmp_path):
     building = read_ifc(two_rooms(tmp_path))
     assert len(building.spaces) == 2
-    assert reported(building, "North and South are open to each other")
+    (problem,) = [p for p in building.problems if "open to each other" in p.what]
+    assert problem.what == "rooms North and South are open to each other"
+    assert "--join 'North + South'" in problem.consequence
+    assert 'join = [["North", "South"]] in two.corrections.toml' in problem.consequence
 
 
 def test_niche_is_no_passage(tmp_path):
@@ -65,3 +70,47 @@ def test_rooms_without_a_passage_are_not_joined(tmp_path):
     path = two_rooms(tmp_path, cut=False)
     building = read_ifc(path, corrections=Corrections(join=(("South", "North"),)))
     assert len(building.spaces) == 2 and reported(building, "nothing opens between them")
+
+
+def test_rooms_are_joined_by_argument_as_by_the_file(tmp_path):
+    path = two_rooms(tmp_path)
+    (space,) = read_ifc(path, join=["south+NORTH"]).spaces
+    path.with_name("two.corrections.toml").write_text('join = [["South", "North"]]')
+    (other,) = read_ifc(path).spaces
+    assert space.name == other.name and space.volume == other.volume
+
+
+@pytest.mark.parametrize(
+    ("join", "message"),
+    [("South", "with a plus between them"), ("South + Nord", "no room 'Nord'; there are: North,")],
+)
+def test_a_join_that_names_no_rooms_is_an_error(tmp_path, join, message):
+    with pytest.raises(DataError, match=message):
+        read_ifc(two_rooms(tmp_path), join=[join])
+
+
+def test_what_check_says_is_what_the_commands_take(tmp_path, capsys):
+    path = two_rooms(tmp_path)
+    assert cli.run(["ifc", "check", str(path)]) == 0
+    said = capsys.readouterr().out
+    text = said.partition("--join '")[2].partition("'")[0]
+    assert cli.run(["ifc", "check", str(path), "--join", text]) == 0
+    assert "1 rooms" in capsys.readouterr().out
+    out = str(tmp_path / "a.glb")
+    assert cli.run(["ifc", "export", str(path), "--join", text, "--space", text,
+                    "--gltf", out]) == 0  # fmt: skip
+    for command in (["run", str(path), "--weather", __file__, "--out", out],
+                    ["dgp", str(path), "--out", out],
+                    ["picture", str(path), "--at", "06-21 12:00", "--out", out]):  # fmt: skip
+        assert cli.run([*command, "--join", "South", "--help"]) == 0
+        assert "--join" in capsys.readouterr().out
+
+
+def test_a_picture_of_joined_rooms(tmp_path, capsys):
+    """The reading commands hand the option on: the joined room is there under its name."""
+    path = two_rooms(tmp_path)
+    call = ["picture", str(path), "--at", "06-21 12:00", "--out", str(tmp_path / "a.hdr")]
+    year = ["dgp", str(path), "--out", str(tmp_path / "out")]
+    for command in (call, year):
+        assert cli.run([*command, "--join", "North + South", "--space", "North + South"]) == 1
+        assert "space North + South: has no window" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from bim.fenestration import AngularGValue
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.progress import silent
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
@@ -19,6 +21,7 @@ from scenes.job.attached import g_by_patch
 from scenes.job.inputs import read_system
 from scenes.job.options import JobOptions
 from scenes.job.run import read_inputs, used_systems
+from scenes.job.thermal import thermal_system
 
 QUICK = [
     "--quick", "--picture-size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
@@ -155,3 +158,86 @@ def test_the_module_runs_as_a_program() -> None:
         check=False, cwd=Path(str(files("scenes"))).parent,
     )  # fmt: skip
     assert done.returncode == 0 and done.stdout.startswith("cfs ")
+
+
+FULL = """
+shading_position = "external"
+u_model = "gap"
+realised_inner_resistance = 0.125
+realised_outer_resistance = 0.033
+[gap]
+width = 0.016
+gas = { argon = 0.9, air = 0.1 }
+emissivity = [0.837, 0.03]
+"""
+
+
+def both(blind: Path, tmp_path: Path, *options):
+    """The systems of a run on the file with its `.toml`, and on the model it is attached to."""
+    with_data = tmp_path / "with_data.ifc"
+    attach(OFFICE, with_data, "--all", "--bsdf", blind, *options)
+    for building, system in ((OFFICE, blind), (with_data, None)):
+        inputs = read_inputs(
+            JobOptions(building=building, weather=WEATHER, system=system, spaces=("A",)), silent
+        )
+        (found,) = used_systems(inputs)
+        yield thermal_system(found)
+
+
+@pytest.mark.parametrize("reference", [False, True])
+@pytest.mark.parametrize(
+    "toml",
+    [
+        VENETIAN_BLIND.with_suffix(".toml").read_text() + FULL,
+        "u_value = 1.37\ng_value = 0.31\nu_model = 'linear'\n",
+        "shading_position = 'integrated'\n",
+    ],
+    ids=["all", "scalars", "position"],
+)
+def test_the_toml_beside_the_bsdf_is_attached_bit_for_bit(tmp_path, blind, toml, reference) -> None:
+    blind.with_suffix(".toml").write_text(toml)
+    options = ["--reference"] if reference else []
+    file, attached = both(blind, tmp_path, *options)
+    # dataclasses of arrays and numbers: the digest is of every bit; the names are the windows'
+    bare = [replace(one, fenestration=replace(one.fenestration, name=""), notes=())
+            for one in (file, attached)]  # fmt: skip
+    assert digest(bare[0]) == digest(bare[1])
+
+
+def test_a_model_that_names_a_bsdf_has_the_toml_beside_that(tmp_path, blind) -> None:
+    """The reference was made before there was a `.toml`, or by another program."""
+    with_data = tmp_path / "with_data.ifc"
+    attach(OFFICE, with_data, "--all", "--bsdf", blind, "--reference")
+    blind.with_suffix(".toml").write_text("u_value = 0.77\ng_value = 0.25\n")
+    (system,) = used_systems(read_inputs(JobOptions(with_data, WEATHER, spaces=("A",)), silent))
+    assert (system.u_value, system.g_value) == (0.77, 0.25)
+
+
+def test_the_same_room_has_the_same_temperatures_from_file_and_model(tmp_path, blind) -> None:
+    toml = VENETIAN_BLIND.with_suffix(".toml").read_text()
+    blind.with_suffix(".toml").write_text(toml + FULL)
+    with_data = tmp_path / "with_data.ifc"
+    attach(OFFICE, with_data, "--all", "--bsdf", blind)
+    assert job(OFFICE, tmp_path / "file", "--cfs", blind) == 0
+    assert job(with_data, tmp_path / "model") == 0
+    for name in TABLES:
+        one, other = ((tmp_path / folder / name).read_bytes() for folder in ("file", "model"))
+        assert one == other, name
+
+
+def test_what_is_given_goes_before_the_toml_and_is_said(tmp_path, blind, capsys) -> None:
+    blind.with_suffix(".toml").write_text("u_value = 1.2\ng_value = 0.31\n")
+    out = tmp_path / "out.ifc"
+    attach(OFFICE, out, "--all", "--bsdf", blind, "--u", "0.9", "--g", "0.28")
+    said = capsys.readouterr().out
+    assert "U 0.9 W/(m2 K) from --u (1.2 in blind.toml is not used)" in said
+    assert "g from --g 0.28 (g in blind.toml is not used)" in said
+    assert "BSDF (Visible, Solar) copied from blind.xml" in said
+    (system,) = used_systems(read_inputs(JobOptions(out, WEATHER, spaces=("A",)), silent))
+    assert (system.u_value, system.g_value, system.g_by_patch) == (0.9, 0.28, None)
+    attach(OFFICE, out, "--all", "--bsdf", blind)
+    assert "g 0.31 at normal incidence from blind.toml" in capsys.readouterr().out
+    assert run(["ifc", "attach", str(OFFICE), "--all", "--g", "1.4", "-o", str(out)]) == 1
+    assert run(["ifc", "attach", str(OFFICE), "--all", "--g", "no.csv", "-o", str(out)]) == 1
+    said = capsys.readouterr().err
+    assert "--g: expected 0 to 1" in said and "expected a number or a CSV file" in said

@@ -1,0 +1,80 @@
+"""Shades that are drawn before or behind a window whose BSDF holds them already.
+
+An IfcShadingDevice counts as the drawn shade of a window where it hangs in the window's plane and
+fills it: all of it lies within `REACH` of the glass, on either side, and its outline, with the
+gaps between slats closed, covers `COVERS` of the glass or more.  An overhang and a fin reach
+further or cover a strip only; neighbours stand further away.  The limits are our own judgement:
+the air gap of a blind or roller shade is 0.05 to 0.3 m, slats lie 0.02 to 0.2 m apart, and a blind
+that is a third down is drawn as such.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.model import Building, Element, Problem, Window
+from bim.planes import plane_through
+
+SHADES = "IfcShadingDevice"
+REACH = 0.5  # of the farthest part from the plane of the glass [m]
+GAP = 0.3  # between slats that are closed to an outline [m]
+COVERS = 0.3  # share of the glass
+
+
+def without_drawn_shades(
+    building: Building, shaded: Collection[str]
+) -> tuple[Building, tuple[Problem, ...]]:
+    """The building without the drawn shades of windows, and a problem for each with its area.
+
+    Args: shaded: GUIDs of the windows whose BSDF holds a shade.
+    """
+    windows = [window for window in building.windows if window.guid in shaded]
+    devices: dict[str, list[Element]] = {}
+    for element in building.elements:
+        if element.ifc_class.startswith(SHADES) and not element.is_kept:
+            devices.setdefault(element.guid, []).append(element)
+    problems = []
+    for guid, parts in devices.items():
+        triangles = np.concatenate([part.triangles for part in parts])
+        outlines = [(window, _outline(triangles, window)) for window in windows]
+        own = [(window, outline) for window, outline in outlines if not outline.is_empty]
+        if not own:
+            continue
+        area = max(outline.area for _, outline in own)
+        names = ", ".join(dict.fromkeys(window.name or window.guid for window, _ in own))
+        what = (
+            f"{parts[0].ifc_class} {parts[0].name}: its {area:.2f} m2 are the shade that the BSDF "
+            f"of window {names} holds already"
+        )
+        done = f"left out of the tracing; keep = ['{guid}'] in the model's corrections keeps it"
+        problems.append(Problem(guid, what, done))
+    gone = {problem.where for problem in problems}
+    if not gone:
+        return building, ()
+    kept = tuple(element for element in building.elements if element.guid not in gone)
+    found = tuple(problems)
+    return replace(building, elements=kept, problems=(*building.problems, *found)), found
+
+
+def _outline(triangles: NDArray[np.float64], window: Window) -> shapely.Geometry:
+    """Outline on the window's plane of a device [N, 3, 3] that shades it; empty if it does not."""
+    plane = plane_through(window.triangles[0, 0], window.normal)
+    local = plane.to_plane(triangles)
+    if np.abs(local[..., 2]).max() > REACH:
+        return shapely.Polygon()
+    glass = shapely.union_all(_flat(plane.to_plane(window.triangles)))
+    # a slat that lies flat is a line seen from before the window: its hull, widened, is none
+    wide = shapely.union_all(shapely.buffer(_flat(local), GAP / 2, cap_style="square"))
+    outline = shapely.buffer(wide, -GAP / 2, join_style="mitre")
+    covered = outline.intersection(glass).area >= COVERS * glass.area
+    return outline if covered else shapely.Polygon()
+
+
+def _flat(triangles: Sequence) -> NDArray:
+    """Hulls of triangles [N, 3, 3] on their plane: polygons, or lines where seen from the side."""
+    return shapely.convex_hull(shapely.multipoints(np.asarray(triangles)[..., :2]))

@@ -1,0 +1,91 @@
+"""What people call things in a model, and which of them they mean: by number, name or GUID."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from typing import Protocol, TypeVar
+
+SHOWN = 8  # names that a message lists
+
+
+class Named(Protocol):
+    """What is found by its names: a room of a building, a space of a file."""
+
+    @property
+    def guid(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def long_name(self) -> str: ...
+    @property
+    def label(self) -> str: ...
+
+
+T = TypeVar("T", bound=Named)
+
+
+def label_of(name: str, long_name: str, guid: str) -> str:
+    """Number and name of a room as people use them, each once; its GUID where it has neither."""
+    parts = [name] if long_name in ("", name) else [name, long_name]
+    return " ".join(part for part in parts if part) or guid
+
+
+def nearest(wanted: str, names: Iterable[str]) -> list[str]:
+    """The names, each once, those most like the wanted one first; capitals do not count."""
+    key = _key(wanted)
+
+    def likeness(name: str) -> float:
+        other = _key(name)
+        part = 1.0 if key and key in other else 0.0
+        return part + difflib.SequenceMatcher(None, key, other).ratio()
+
+    return sorted(dict.fromkeys(names), key=lambda name: (-likeness(name), name))
+
+
+def listed(wanted: str, names: Iterable[str]) -> str:
+    """The nearest names in one line, and how many more there are."""
+    names = nearest(wanted, names)
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(names[:SHOWN]) + more
+
+
+def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
+    """The one item of that GUID, name, long name, or name and long name.
+
+    Capitals and runs of spaces count only where they make the difference between two.
+
+    Args: kind: what a message calls an item, such as "space".
+    Raises: `KeyError` where there is none, `ValueError` where there are several; their texts list
+        the nearest.
+    """
+    found = [item for item in items if item.guid == wanted]
+    found = found or [i for i in items if wanted in (i.name, i.long_name, i.label)]
+    key = _key(wanted)
+    found = found or [
+        item for item in items if key and key in map(_key, (item.name, item.long_name, item.label))
+    ]
+    if not found:
+        there = listed(wanted, (item.label for item in items))
+        raise KeyError(f"no {kind} {wanted!r}; there are: {there}")
+    if len(found) > 1:
+        labels = [item.label for item in found]
+        same = len(set(labels)) < len(labels)
+        shown = (f"{item.label} ({item.guid})" if same else item.label for item in found)
+        raise ValueError(f"{len(found)} {kind}s are named {wanted!r}: {listed(wanted, shown)}")
+    return found[0]
+
+
+def _key(name: str) -> str:
+    return " ".join(name.split()).casefold()
+
+
+def folder_names(items: Sequence[Named]) -> list[str]:
+    """A folder name for each item: number and name, with its GUID where others have the same."""
+    names = [re.sub(r"[^\w.-]+", "_", item.label).strip("._") for item in items]
+    folded = [name.casefold() for name in names]
+    return [
+        name if name and folded.count(name.casefold()) == 1 else f"{name}_{item.guid}"
+        for name, item in zip(names, items, strict=True)
+    ]

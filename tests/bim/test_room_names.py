@@ -1,0 +1,61 @@
+"""Rooms found by number, long name, both or GUID; nearest names where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from bim.names import folder_names, found_by_name, label_of, nearest
+
+
+@dataclass(frozen=True)
+class Room:
+    guid: str
+    name: str
+    long_name: str = ""
+
+    @property
+    def label(self) -> str:
+        return label_of(self.name, self.long_name, self.guid)
+
+
+ROOMS = (
+    Room("0aB", "01", "Wohnzimmer"),
+    Room("1cD", "02", "Bad"),
+    Room("2eF", "03", "Bad"),
+    Room("3gH", "lab", "Lab"),
+    Room("4iJ", "Lab", "Big laboratory"),
+    Room("5kL", "", ""),
+)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "guid"),
+    [
+        ("01", "0aB"), ("Wohnzimmer", "0aB"), ("01 Wohnzimmer", "0aB"), ("0aB", "0aB"),
+        ("wohnzimmer", "0aB"), ("01  WOHNZIMMER ", "0aB"), ("03 bad", "2eF"),
+        ("lab", "3gH"), ("big laboratory", "4iJ"), ("5kL", "5kL"),
+    ],
+)  # fmt: skip
+def test_a_room_is_found_by_what_people_call_it(wanted, guid):
+    assert found_by_name(ROOMS, wanted, "space").guid == guid
+
+
+def test_a_name_of_several_lists_them_so_that_one_can_be_chosen():
+    with pytest.raises(ValueError, match="2 spaces are named 'bad': 02 Bad, 03 Bad"):
+        found_by_name(ROOMS, "bad", "space")
+    twins = (Room("a", "1", "Bad"), Room("b", "1", "Bad"))
+    with pytest.raises(ValueError, match=r"1 Bad \(a\), 1 Bad \(b\)"):
+        found_by_name(twins, "1 Bad", "space")
+
+
+def test_an_unknown_name_lists_the_nearest_first():
+    with pytest.raises(KeyError, match="no space 'Wonzimmer'; there are: 01 Wohnzimmer, "):
+        found_by_name(ROOMS, "Wonzimmer", "space")
+    assert nearest("Window B", ["Door", "Window A", "Window B2"])[0] == "Window B2"
+
+
+def test_rooms_of_one_name_have_folders_of_their_own():
+    rooms = (Room("a", "1", "Bad"), Room("b", "1", "bad"), Room("c", "2", "Küche/Essen"))
+    assert folder_names(rooms) == ["1_Bad_a", "1_bad_b", "2_Küche_Essen"]

@@ -1,0 +1,91 @@
+"""A room that was left out of the model: every command says why where it fails."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import ifcopenshell.api.pset
+import pytest
+
+from scenes import cli
+from scenes.demo import VENETIAN_BLIND, WEATHER
+from tests.bim.small_ifc import box_room, empty_project
+
+WHY = "R1 Room: is marked as external (left out)"
+
+
+@pytest.fixture
+def outdoors(tmp_path):
+    """A model whose only space says of itself that it is outdoors, and whose walls enclose none."""
+    small = empty_project()
+    space = small.box("IfcSpace", "R1", (0, 0, 0), (4, 6, 3), LongName="Room")
+    small.box("IfcWall", "alone", (0, -0.3, 0), (4, 0.3, 3))
+    pset = ifcopenshell.api.pset.add_pset(small.model, product=space, name="Pset_SpaceCommon")
+    ifcopenshell.api.pset.edit_pset(small.model, pset=pset, properties={"IsExternal": True})
+    path = tmp_path / "outdoors.ifc"
+    small.model.write(str(path))
+    return path
+
+
+def commands(path, folder):
+    system, weather = ["--cfs", VENETIAN_BLIND], ["--weather", WEATHER]
+    thermal, study = folder / "thermal.toml", folder / "study.toml"
+    thermal.write_text(
+        f'weather = "{WEATHER}"\nbuilding = "{path}"\n[[system]]\nbsdf = "{VENETIAN_BLIND}"\n'
+    )
+    study.write_text(
+        f'[[room]]\nname = "r"\nbuilding = "{path}"\n[[system]]\nbsdf = "{VENETIAN_BLIND}"\n'
+        f'[[climate]]\nweather = "{WEATHER}"\n'
+    )
+    coupled = folder / "coupled.toml"
+    coupled.write_text(f"couple = true\n{thermal.read_text()}")
+    out = ["--out", folder / "out"]
+    yield ["run", path, *weather, *system, *out]
+    yield ["dgp", path, *weather, *system, *out]
+    yield ["picture", path, *system, "--at", "06-21 12:00", "--out", folder / "a.hdr"]
+    yield ["thermal", thermal, *out]
+    yield ["thermal", coupled, *out]
+    yield ["study", study, *out]
+    yield ["ifc", "export", path, "--gltf", folder / "a.glb"]
+
+
+@pytest.mark.parametrize("number", range(7))
+def test_why_the_only_room_is_not_there(outdoors, number, tmp_path, capsys):
+    command = list(commands(outdoors, tmp_path))[number]
+    assert cli.run([str(word) for word in command]) == 1
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said.startswith("error: ") and WHY in said
+
+
+def test_a_room_asked_for_by_name_that_was_left_out(tmp_path, capsys):
+    """The other rooms are there: the message is about the one asked for."""
+    small = empty_project()
+    small.box("IfcSpace", "1", (0, 0, 0), (4, 4, 3), LongName="Hall")
+    small.box("IfcSpace", "7", (9, 0, 0), (0.1, 0.1, 3), LongName="Shaft")
+    small.model.write(str(tmp_path / "m.ifc"))
+    call = ["ifc", "export", str(tmp_path / "m.ifc"), "--gltf", str(tmp_path / "a.glb")]
+    assert cli.run([*call, "--space", "shaft"]) == 1
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "space 'shaft' was left out: space 7 Shaft: holds 0.030 m3 only" in said
+    assert cli.run([*call, "--space", "Hal"]) == 1
+    assert "no space 'Hal'; there are: 1 Hall" in capsys.readouterr().err
+    assert cli.run([*call, "--space", "1 hall"]) == 0
+
+
+def test_the_tables_of_check_are_whole_when_piped(tmp_path, capsys):
+    """Long names and texts: a program that reads on gets every character of them."""
+    model = box_room()
+    (space,) = model.by_type("IfcSpace")
+    space.LongName = "A room with a very long name " * 12 + "END"
+    for wall in model.by_type("IfcWall"):
+        wall.Name = f"{wall.Name} {'of a long name ' * 20}END"
+    model.by_type("IfcBuildingStorey")[0].Name = "storey " * 20 + "END"
+    path, table = tmp_path / "m.ifc", tmp_path / "p.csv"
+    model.write(str(path))
+    assert cli.run(["ifc", "check", str(path), "--csv", str(table)]) == 0
+    said = capsys.readouterr().out
+    assert "…" not in said and space.LongName in said
+    for row in csv.reader(io.StringIO(table.read_text())):
+        if row[0] != "where":
+            assert all(cell in said for cell in row)
