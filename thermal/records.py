@@ -23,8 +23,8 @@ TERMS += ("facade", "windows", "partitions", "storage")  # [W] into the zone; st
 # The records below only lend their arrays: without `_nrt=False` every access would count
 # references, and functions called from one cache file to another are not inlined by LLVM; together
 # that is nine tenths of a run.  So nothing that is compiled allocates, and all but the entry point
-# in `kernel` is inlined: by LLVM, which compiles in half the time of numba's `inline="always"`, that
-# types a function anew wherever it is called; and without what Python would call it by.
+# in `kernel` is inlined: by LLVM, which takes half as long as numba's `inline="always"`, where a
+# function is typed anew wherever it is called; and without what Python would call it by.
 _OPTIONS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
 INLINED = _OPTIONS | {"forceinline": True, "no_cpython_wrapper": True}
 inlined = njit(**INLINED)
