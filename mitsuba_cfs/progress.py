@@ -74,12 +74,15 @@ def item(
 
     Args:
         name: set before the label of each stage.
-        whole: the item has one stage, whose fraction is the item's.
+        whole: the item has one stage, whose fraction is the item's and whose label is the name.
     """
     before = f"{name}: " if name else ""
 
     def inner(label: str, fraction: float) -> None:
-        progress(Stage(before + label, noun, number, total, whole=whole), fraction)
+        label = name if whole else before + label
+        alone = total == 1 and not whole
+        stage = label if alone else Stage(label, noun, number, total, whole=whole)
+        progress(stage, fraction)
 
     return inner
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from scenes import quick
+from scenes.commands.quick_option import given, quick_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
 
@@ -63,6 +65,7 @@ _DEFAULT = YearOptions(Path(), Path(), Path())
 )  # fmt: skip
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
 @click.option("--seed", type=int, default=_DEFAULT.seed, show_default=True)
+@quick_option
 def command(building: Path | None, out: Path, **chosen) -> None:
     """Daylight glare probability of a room's views in every hour with the sun up.
 
@@ -79,6 +82,9 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare.year import rate_views, read_year
 
+    if chosen["quick"]:
+        click.echo(quick.NOTE)
+        chosen |= quick.picks(quick.VIEWS, given())
     kept = outputs.kept_folder(out)
     with ProgressBar() as progress:
         year = read_year(YearOptions(building or OFFICE, **chosen), progress)

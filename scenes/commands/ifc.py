@@ -21,6 +21,7 @@ from bim.to_mitsuba import write_mitsuba
 from bim.to_radiance import identifier, write_radiance
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.progress import Stage
 from scenes.commands.progress_bar import ProgressBar
 
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
@@ -150,9 +151,11 @@ def survey(files: tuple[Path, ...], out: Path | None) -> None:
     """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
     rows = []
     with ProgressBar() as progress:
+        progress(Stage("", "file", 1, len(files)), 0.0)
         for row in surveyed(files):
             rows.append(row)
-            progress("files", len(rows) / len(files))
+            if len(rows) < len(files):
+                progress(Stage("", "file", len(rows) + 1, len(files)), 0.0)
             if out is not None:  # what is done is kept if the rest is broken off
                 out.write_text(markdown(rows) + "\n", encoding="utf-8")
     click.echo(markdown(rows))

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import click
 
+from scenes import quick as quick_run
+from scenes.commands.quick_option import quick_option
+
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
@@ -24,6 +27,7 @@ FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
     "--write-ifc", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT.ifc",
     help="The study's building with each case's results in property sets.",
 )  # fmt: skip
+@quick_option
 def command(
     study: Path,
     out: Path,
@@ -33,6 +37,7 @@ def command(
     time_budget: str | None,
     dgp_error: str | None,
     write_ifc: Path | None,
+    quick: bool,
 ) -> None:
     """Every room of a study with every system, orientation, climate and method.
 
@@ -51,7 +56,9 @@ def command(
 
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
-    parsed = read_study(study, automatic=method is not None, **asked)
+    parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
+    if parsed.quick:
+        click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")

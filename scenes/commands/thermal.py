@@ -7,28 +7,36 @@ from pathlib import Path
 
 import click
 
+from scenes import quick as quick_run
+from scenes.commands.quick_option import quick_option
+
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
 
 
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
-def command(study: Path, out: Path) -> None:
+@quick_option
+def command(study: Path, out: Path, quick: bool) -> None:
     """Gains, temperatures, loads and comfort of rooms, hour by hour.
 
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
     files) and their control, gains, outdoor air and set points; docs/thermal.md lists every field.
     """
+    from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.heat.study import run_study
     from scenes.heat.study_file import read_study
     from scenes.result_folder import check_folder
 
-    parsed = read_study(study)
+    parsed = read_study(study, quick=quick)
     check_folder(out)
-    with ProgressBar() as progress:
+    if quick:
+        click.echo(quick_run.NOTE)
+    with ProgressBar() as progress, compiled_beside():
         rooms, notes = run_study(parsed, progress)
-    _write(rooms, notes, parsed, out)
+    notes = (*[quick_run.NOTE] * quick, *notes)
+    _write(rooms, notes, parsed, out, quick)
     for room in rooms:
         summary = room.summary
         click.echo(
@@ -37,12 +45,12 @@ def command(study: Path, out: Path) -> None:
             f"cooling {summary['cooling_kwh']:.0f} kWh, comfortable "
             f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of the occupied hours"
         )
-    for note in notes:
+    for note in notes[quick:]:
         click.echo(f"note: {note}")
     click.echo(f"results: {out}")
 
 
-def _write(rooms, notes: tuple[str, ...], study, out: Path) -> None:
+def _write(rooms, notes: tuple[str, ...], study, out: Path, quick: bool) -> None:
     """All files of a study."""
     import pandas as pd
 
@@ -58,5 +66,5 @@ def _write(rooms, notes: tuple[str, ...], study, out: Path) -> None:
         table.round(4).to_csv(folder / "summary.csv", index=False)
         months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
         months.to_csv(folder / "discomfort_by_month.csv")
-        record = {"study": study.model_dump(mode="json"), "notes": list(notes)}
+        record = {"quick": quick, "study": study.model_dump(mode="json"), "notes": list(notes)}
         (folder / MARK).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")

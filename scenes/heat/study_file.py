@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from mitsuba_cfs.errors import DataError
+from scenes.quick import HEAT, picks
 from thermal.zone import IdealLoads
 
 Positive = Annotated[float, Field(gt=0)]
@@ -191,8 +192,10 @@ class StudyFile(_Table):
         return self
 
 
-def read_study(path: Path) -> StudyFile:
+def read_study(path: Path, *, quick: bool = False) -> StudyFile:
     """The study of a TOML file, its paths made absolute.
+
+    Args: quick: few rays where the file does not say how many.
 
     Raises: `DataError` naming the file and the field.
     """
@@ -211,6 +214,9 @@ def read_study(path: Path) -> StudyFile:
     here = path.parent
     systems = tuple(s.model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system)
     found = {"weather": _there(here, study.weather, path), "system": systems}
+    if quick:
+        given = study.trace.model_fields_set
+        found["trace"] = study.trace.model_copy(update=picks(HEAT, given))
     if study.building is not None:
         found["building"] = _there(here, study.building, path)
     return study.model_copy(update=found)

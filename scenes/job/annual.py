@@ -27,7 +27,7 @@ def glare_by_state(maker: PictureMaker, progress: Progress) -> NDArray[np.float6
     """DGP of every hour in every state [J, H], 0 in the dark."""
     every, J = np.arange(len(maker.skies.lit)), len(maker.lights)
     lit = [
-        rated_hours(maker, j, every, part(progress, j / J, (j + 1) / J, "annual glare")).dgp
+        rated_hours(maker, j, every, part(progress, j / J, (j + 1) / J, "glare control")).dgp
         for j in range(J)
     ]
     return maker.skies.whole_year(np.stack(lit))

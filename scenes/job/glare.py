@@ -36,10 +36,13 @@ def wanted_hours(
 
 
 def default_hours(
-    times: pd.DatetimeIndex, lit: NDArray[np.int64], eye_illuminance: NDArray[np.float32]
+    times: pd.DatetimeIndex,
+    lit: NDArray[np.int64],
+    eye_illuminance: NDArray[np.float32],
+    count: int,
 ) -> list[int]:
-    """The equinox and the solstices at 9, 12 and 15 o'clock, as far as the sun is up, and the
-    hour of the year that is brightest at the eye.
+    """The hour of the year that is brightest at the eye, and with it up to `count` of the equinox
+    and the solstices at 9, 12 and 15 o'clock, as far as the sun is up.
 
     Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
     """
@@ -47,7 +50,8 @@ def default_hours(
     lit_set = set(lit.tolist())
     found = [hour for label in labels if (hour := _find(label, times)) in lit_set]
     brightest = int(lit[np.argmax(eye_illuminance)])
-    return found + [brightest] * (brightest not in found)
+    chosen = {brightest, *[hour for hour in found if hour != brightest][: count - 1]}
+    return [hour for hour in dict.fromkeys([*found, brightest]) if hour in chosen]
 
 
 def _hour(text: str, times: pd.DatetimeIndex, lit: set[int]) -> int:
@@ -68,6 +72,7 @@ def _find(text: str, times: pd.DatetimeIndex) -> int | None:
 
 def room_glare(maker: PictureMaker, hours: list[int], progress: Progress) -> GlareResults:
     """Pictures of the chosen hours of the year and their glare."""
+    progress("pictures", 0.0)
     columns = np.searchsorted(maker.skies.lit, hours)
     view = maker.scene.view
     pictures = maker.of_hours(columns, progress)

@@ -111,7 +111,7 @@ def picture_maker(
                 scene.interior,
                 scene.groups,
                 scene.view,
-                progress=part(progress, 0.0, 1.0, "pictures"),
+                progress=progress,
                 **sampling,
             ),
         )

@@ -184,9 +184,10 @@ class _Room:
         return self._maker(self.lit_state)
 
     def _maker(self, state: NDArray[np.int64]) -> PictureMaker:
-        steps = part(self.progress, 0.0, 0.5, "pictures")
+        steps = part(self.progress, 0.0, 1.0, "view matrices")
         if "view" in self.__dict__:
             return replace(self.view, state=state)
+        steps("", 0.0)
         self.__dict__["view"] = picture_maker(
             self.scene, self.matrices, self.lights, state, self.skies, self.options, self.cache,
             steps,
@@ -195,6 +196,7 @@ class _Room:
 
     def daylight(self) -> DaylightResult:
         """Illuminance of the work plane and its metrics."""
+        self.progress("daylight", 0.0)
         lights, state = self.lights, self.lit_state
         steps = part(self.progress, 0.9, 1.0, "daylight")
         found = room_daylight(
@@ -210,15 +212,18 @@ class _Room:
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
         if not hours and year is not None:
-            hours = worst_hours(year, WORST)
+            hours = worst_hours(year, min(WORST, self.options.picture_count))
         if not hours:
             eye = np.stack([light.eye for light in self.lights])
             eye = eye[self.lit_state, np.arange(eye.shape[1])]
-            hours = default_hours(self.weather.midpoints, self.skies.lit, eye)
-        return room_glare(self.maker, hours, part(self.progress, 0.5, 1.0, "pictures"))
+            hours = default_hours(
+                self.weather.midpoints, self.skies.lit, eye, self.options.picture_count
+            )
+        return room_glare(self.maker, hours, self.progress)
 
     def thermal(self, daylight: DaylightResult) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort."""
+        self.progress("heat", 0.0)
         operate = None
         if self.operation is not None:
             operate = lambda zone: self._operated(zone, daylight)  # noqa: E731

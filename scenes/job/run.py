@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from bim.model import Building, Problem, Space
-from bim.read_ifc import read_ifc
+from bim.read_ifc import STAGES, read_ifc
 from bim.templates import template_rooms
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.alike import as_room, same_light, same_systems
@@ -30,9 +30,17 @@ from scenes.job.room import compute_room, skies_for
 from scenes.job.skies import Skies
 from scenes.job.thermal import thermal_system
 from scenes.job.windows import States, everywhere
+from scenes.quick import NOTE
 from scenes.results import RunResult, SpaceResult
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+
+
+Told = Callable[[SpaceResult], None]  # called with each room as soon as it is computed
+
+
+def untold(room: SpaceResult) -> None:
+    """Say nothing of a room before all are computed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +54,14 @@ class JobInputs:
     operation: Operation | None
 
 
-def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
+def run_job(
+    options: JobOptions,
+    progress: Progress = silent,
+    told: Told = untold,
+) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
 
+    Args: told: called with each room as soon as it is computed, in the rooms' order.
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     start = time.monotonic()
@@ -62,12 +75,13 @@ def run_job(options: JobOptions, progress: Progress = silent) -> RunResult:
     progress("sky", 0.0)
     skies = skies_for(weather, options)
     progress("sky", 1.0)
-    results, problems, notes = _rooms(inputs, skies, options, progress)
+    results, problems, notes = _rooms(inputs, skies, options, progress, told)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
     manifest = _manifest(options, variant, inputs, used, results)
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
+        *([NOTE] if options.quick else []),
         *(note for system in used for note in system.notes),
         *thermal_notes,
         *_state_notes(inputs, options),
@@ -95,7 +109,8 @@ def read_inputs(options: JobOptions, progress: Progress) -> JobInputs:
         system = read_system(options.system, u_value=options.u_value, g_value=options.g_value)
     weather = read_weather(options.weather)
     progress("inputs", 0.1)
-    building = read_ifc(options.building, progress=part(progress, 0.1, 1.0, "inputs"))
+    reading = summed(part(progress, 0.1, 1.0), "inputs", STAGES)
+    building = read_ifc(options.building, progress=reading)
     spaces = chosen_spaces(building, options.spaces, options.building)
     systems: dict[str, States] = {}
     if operation is not None and operation.systems:
@@ -120,52 +135,53 @@ def used_systems(inputs: JobInputs) -> list[System]:
 
 
 def _rooms(
-    inputs: JobInputs, skies: Skies, options: JobOptions, progress: Progress
+    inputs: JobInputs,
+    skies: Skies,
+    options: JobOptions,
+    progress: Progress,
+    told: Told = untold,
 ) -> tuple[list[SpaceResult], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
     found: dict[str, SpaceResult] = {}
     problems, notes = [], []
     cache = MatrixCache.of_user() if options.cache else None
-    for group in template_rooms(inputs.spaces):
-        for space in group:
-            steps = _labelled(progress, f"{space.name or space.guid}: ")
-            try:
-                twin = next(
-                    (
-                        other
-                        for other in group
-                        if other.guid in found
-                        and not found[other.guid].like
-                        and same_systems(other, space, inputs.systems)
-                        and same_light(inputs.building, other, space, options, cache)
-                    ),
-                    None,
+    alike = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
+    for number, space in enumerate(inputs.spaces, 1):
+        name = space.name or space.guid
+        steps = item(progress, "room", number, len(inputs.spaces), name)
+        try:
+            twin = next(
+                (
+                    other
+                    for other in alike[space.guid]
+                    if other.guid in found
+                    and not found[other.guid].like
+                    and same_systems(other, space, inputs.systems)
+                    and same_light(inputs.building, other, space, options, cache)
+                ),
+                None,
+            )
+            if twin is not None:
+                found[space.guid] = as_room(found[twin.guid], space)
+                notes.append(
+                    f"Room {name} is like {twin.name or twin.guid} in shape, orientation, "
+                    "materials, windows and in what shades it: its results are those."
                 )
-                if twin is not None:
-                    found[space.guid] = as_room(found[twin.guid], space)
-                    name = space.name or space.guid
-                    notes.append(
-                        f"Room {name} is like {twin.name or twin.guid} in shape, orientation, "
-                        "materials, windows and in what shades it: its results are those."
-                    )
-                    continue
+            else:
                 found[space.guid] = compute_room(
                     inputs.building, space, inputs.systems, inputs.weather, options,
                     operation=inputs.operation, skies=skies, cache=cache, progress=steps,
                 )  # fmt: skip
-            except (CfsError, ValueError) as error:
-                if isinstance(error, DataError):
-                    raise
-                if len(inputs.spaces) == 1:
-                    where = f"space {space.name or space.guid}"
-                    raise DataError(str(error), file=options.building, element=where) from error
-                problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
-    return [found[s.guid] for s in inputs.spaces if s.guid in found], problems, notes
-
-
-def _labelled(progress: Progress, label: str) -> Progress:
-    """Progress with the room's name before each stage."""
-    return lambda stage, fraction: progress(label + stage, fraction)
+        except (CfsError, ValueError) as error:
+            if isinstance(error, DataError):
+                raise
+            if len(inputs.spaces) == 1:
+                where = f"space {name}"
+                raise DataError(str(error), file=options.building, element=where) from error
+            problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+            continue
+        told(found[space.guid])
+    return list(found.values()), problems, notes
 
 
 def _manifest(
@@ -187,6 +203,7 @@ def _manifest(
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
+        "quick": options.quick,
         "inputs": {
             name: {"path": str(path), "sha256": sha256(path)} for name, path in files.items()
         },

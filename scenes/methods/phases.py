@@ -72,28 +72,28 @@ def phase_scene(
     q, stopping = quality, Stopping(batches=BATCHES)
     points, normals = place.sensors(metric)
 
-    def daylight(depth: int) -> NDArray[np.float64]:
+    def daylight(depth: int, start: float) -> NDArray[np.float64]:
         return daylight_matrix(
             place.exterior, place.groups, subdivision=q.subdivision,
             samples=max(1, q.patch_samples // BATCHES), max_depth=depth, stopping=stopping,
-            seed=q.seed, progress=part(progress, 0.0, 0.2, "matrices"),
+            seed=q.seed, progress=part(progress, start, start + 0.1, "matrices"),
         ).values  # fmt: skip
 
-    def view(depth: int) -> NDArray[np.float64]:
+    def view(depth: int, start: float) -> NDArray[np.float64]:
         return view_matrix(
             place.interior, place.groups, points, normals,
             samples=max(1, q.sensor_samples // BATCHES), max_depth=depth, stopping=stopping,
-            seed=q.seed, progress=part(progress, 0.2, 0.3, "matrices"),
+            seed=q.seed, progress=part(progress, start, start + 0.05, "matrices"),
         ).values  # fmt: skip
 
     direct = five_phase or metric == "eDGP"
     pictured = metric in ("DGP", "eDGP")
     return PhaseScene(
         place, metric, five_phase, q,
-        other.daylight if other else daylight(DEPTH),
-        other.direct_daylight if other else daylight(1) if direct else None,
-        view(32) if len(points) else None,
-        view(1) if len(points) and five_phase else None,
+        other.daylight if other else daylight(DEPTH, 0.0),
+        other.direct_daylight if other else daylight(1, 0.1) if direct else None,
+        view(32, 0.2) if len(points) else None,
+        view(1, 0.25) if len(points) and five_phase else None,
         view_matrices(
             place.interior, place.groups, place.view, samples=q.pixel_samples, seed=q.seed,
             memory=q.memory, max_depth=32 if metric == "DGP" else 1,

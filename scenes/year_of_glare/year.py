@@ -13,14 +13,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.read_ifc import read_ifc
+from bim.read_ifc import STAGES, read_ifc
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import AnnualGlare, annual_glare, full_picture, kept_glare
 from mitsuba_cfs.glare.simplified import simplified_dgp
 from mitsuba_cfs.images.view import format_view
 from mitsuba_cfs.metrics.schedules import working_hours
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.matrix import sun_up
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.inputs import chosen_spaces, read_system, read_weather, sha256
@@ -63,7 +63,9 @@ def read_year(options: YearOptions, progress: Progress = silent) -> Year:
     """Read and check all inputs, the quick ones first; `DataError` where one cannot be used."""
     system, weather = read_system(options.system), read_weather(options.weather)
     progress("inputs", 0.1)
-    building = read_ifc(options.building, progress=part(progress, 0.1, 0.6, "inputs"))
+    building = read_ifc(
+        options.building, progress=summed(part(progress, 0.1, 0.6), "inputs", STAGES)
+    )
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     views = chosen_views(space, options)
@@ -99,7 +101,7 @@ def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[
     )
     times = year.weather.midpoints[year.lit]
     for number, named in enumerate(year.views):
-        label = f"{named.name} ({number + 1} of {len(year.views)})"
+        steps = item(progress, "view", number + 1, len(year.views), named.name, whole=True)
         start = time.monotonic()
         text = f"{year.digest} {format_view(named.view)} {named.view.width}"
         keep = kept / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
@@ -109,16 +111,16 @@ def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[
             place = replace(year.place, view=named.view)
             scene = phase_scene(
                 place, options.metric, five_phase=options.method == "five-phase",
-                quality=quality, other=scene, progress=part(progress, 0.0, 0.3, label),
+                quality=quality, other=scene, progress=part(steps, 0.0, 0.3),
             )  # fmt: skip
             system = scene.behind(year.system)
-            found = found or _rated(system, year, keep, part(progress, 0.3, 1.0, label))
+            found = found or _rated(system, year, keep, part(steps, 0.3, 1.0))
         table = pd.DataFrame(
             {name: getattr(found, name) for name in FIGURES}, index=times.rename("time")
         )
         worst = found.worst(options.worst)
         pictures = _pictures(system, year, worst) if system is not None else {}
-        progress(label, 1.0)
+        steps("", 1.0)
         yield ViewYear(named, table, pictures, time.monotonic() - start)
 
 

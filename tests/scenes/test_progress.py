@@ -103,9 +103,9 @@ def test_rooms_in_a_log_are_lines_from_time_to_time(capsys: pytest.CaptureFixtur
 def test_a_long_stage_in_a_log_says_how_far_it_is(capsys: pytest.CaptureFixture) -> None:
     clock = Clock()
     with ProgressBar(terminal=False, clock=clock) as progress:
-        steps = item(progress, "view", 1, 2, whole=True)
+        steps = item(progress, "view", 1, 2, "desk", whole=True)
         for fraction in (0.0, 0.1, 0.2, 0.3, 1.0):
-            steps("desk", fraction)
+            steps("glare", fraction)
             clock.now += 40.0
     assert capsys.readouterr().err.splitlines() == [
         "view 1 of 2",
