@@ -24,6 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from mitsuba_cfs.compiled import compiled
+
 BOLTZMANN = 8.617333262e-5  # k / q [V/K]
 STANDARD_TEMPERATURE = 298.15  # of the datasheet's standard test conditions [K]
 STANDARD_IRRADIANCE = 1000.0  # [W/m2]
@@ -143,7 +145,7 @@ def cell_voltage(
     return inner - np.asarray(current, dtype=float) * cell.series
 
 
-@numba.vectorize(["f8(f8,f8,f8,f8,f8,f8)"], nopython=True, cache=True)
+@compiled(numba.vectorize, ["f8(f8,f8,f8,f8,f8,f8)"], nopython=True)
 def diode_voltage(photo, first, second, thermal, shunt, current):
     """V_d [V] at a current [A], from I_ph, I_01, I_02 [A], V_t [V] and R_p [Ohm].
 

@@ -8,8 +8,11 @@ import itertools
 import pytest
 from rich.console import Console
 
+from bim.read_ifc import STAGES, read_ifc
 from mitsuba_cfs.progress import Stage, TimeLeft, item, part, spoken_left, summed
+from scenes.commands import compiling
 from scenes.commands.progress_bar import ProgressBar
+from scenes.demo import OFFICE
 
 
 class Clock:
@@ -168,3 +171,27 @@ def test_steps_of_known_shares_add_up() -> None:
         part(steps, 0.0, 1.0)(label, 0.5)
         steps(label, 1.0)
     assert told == [("inputs", f) for f in (0.375, 0.75, 0.875, 1.0)]
+
+
+def test_reading_a_building_is_one_stage_that_does_not_fall() -> None:
+    told: list[float] = []
+    read_ifc(OFFICE, progress=summed(lambda _, fraction: told.append(fraction), "inputs", STAGES))
+    assert told == sorted(told) and told[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("compiled_already", [True, False])
+def test_the_balance_is_compiled_beside_only_where_it_must_be(
+    compiled_already: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[list[str]] = []
+    real = compiling.subprocess.Popen
+
+    def begin(command, **options):
+        begun.append(command)
+        return real([command[0], "-c", "pass"], **options)
+
+    monkeypatch.setattr(compiling.subprocess, "Popen", begin)
+    monkeypatch.setattr("thermal.records.must_compile", lambda entry: not compiled_already)
+    with compiling.compiled_beside():
+        pass
+    assert len(begun) == (not compiled_already)
