@@ -56,13 +56,14 @@ def part(progress: Progress, start: float, end: float, stage: str | None = None)
 
 def summed(progress: Progress, stage: str, shares: Mapping[str, float]) -> Progress:
     """A `Progress` that shows steps of known shares, which follow each other, as one stage."""
-    total, starts, before = sum(shares.values()), {}, 0.0
+    total, bounds, before = sum(shares.values()), {}, 0.0
     for label, share in shares.items():
-        starts[label] = before / total
+        bounds[label] = before / total, (before + share) / total
         before += share
 
     def inner(label: str, fraction: float) -> None:
-        progress(stage, starts[label] + shares[label] / total * fraction)
+        start, end = bounds[label]
+        progress(stage, (1.0 - fraction) * start + fraction * end)  # exactly the end at its end
 
     return inner
 
