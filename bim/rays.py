@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from mitsuba_cfs.compiled import compiled
 
 LEAF = 4  # triangles in a leaf of the tree at the most
 DEEPEST = 64  # stack of the walk: the tree halves at every level
@@ -69,7 +70,7 @@ def ray_mesh(triangles: NDArray[np.float64]) -> RayMesh:
     return RayMesh(triangles, parts, np.concatenate(boxes))
 
 
-@numba.njit(cache=True)
+@compiled()
 def _first_hits(origins, directions, reach, triangles, leaves, boxes):
     """Walk the tree for each ray."""
     count = len(origins)
@@ -101,7 +102,7 @@ def _first_hits(origins, directions, reach, triangles, leaves, boxes):
     return distance, hit
 
 
-@numba.njit(cache=True)
+@compiled()
 def _meets(o, d, box, reach):
     """Whether the ray meets the box before `reach`."""
     near, far = 0.0, reach
@@ -120,7 +121,7 @@ def _meets(o, d, box, reach):
     return True
 
 
-@numba.njit(cache=True)
+@compiled()
 def _distance(o, d, triangle):
     """Distance along the ray to the triangle, inf where it misses; without arrays, they are slow.
 

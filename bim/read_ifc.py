@@ -31,6 +31,7 @@ from bim.solids import triangles_of
 from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.wall_middles import area_to_wall_middles
 
+STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
 AGREES = 0.02  # drawn and stated quantities may differ by this share before it is reported
 
 

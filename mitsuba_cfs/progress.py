@@ -2,10 +2,37 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 
 Progress = Callable[[str, float], None]
-"""Called with a stage's label and the fraction of that stage done, 0 to 1."""
+"""Called with a stage's label and the fraction of that stage done, 0 to 1.
+
+A stage is gone through once: its fraction does not fall, and what is done again has another label.
+"""
+
+LEAST = 0.05  # share of an item after which the time left is told
+
+
+class Stage(str):
+    """A stage's label that knows of which of several items alike it is a stage: room 3 of 6.
+
+    An empty label is that of items without stages of their own.
+    """
+
+    __slots__ = ("noun", "number", "total", "whole")
+
+    def __new__(
+        cls, label: str, noun: str, number: int, total: int, *, whole: bool = False
+    ) -> Stage:
+        """Label of a stage of item `number` of `total`; whole: the stage is all of the item."""
+        stage = super().__new__(cls, label)
+        stage.noun, stage.number, stage.total, stage.whole = noun, number, total, whole
+        return stage
+
+    def items_done(self, fraction: float) -> float:
+        """How many items are done with `fraction` of this stage."""
+        return self.number - 1 + (fraction if self.whole else 0.0)
 
 
 def silent(stage: str, fraction: float) -> None:
@@ -15,7 +42,8 @@ def silent(stage: str, fraction: float) -> None:
 def part(progress: Progress, start: float, end: float, stage: str | None = None) -> Progress:
     """A `Progress` that fills only `start` to `end` of the outer one.
 
-    For a step made of others: with `stage` its steps all appear under that one label.
+    For a step of one stage; with `stage` it appears under that label.  See `summed` for a step of
+    several stages.
     """
     if not 0.0 <= start <= end <= 1.0:
         raise ValueError(f"expected 0 <= start <= end <= 1, got {start} and {end}")
@@ -26,17 +54,68 @@ def part(progress: Progress, start: float, end: float, stage: str | None = None)
     return inner
 
 
-def staged(
-    progress: Progress, places: Mapping[str, tuple[float, float]], label: str | None = None
+def summed(progress: Progress, stage: str, shares: Mapping[str, float]) -> Progress:
+    """A `Progress` that shows steps of known shares, which follow each other, as one stage."""
+    total, bounds, before = sum(shares.values()), {}, 0.0
+    for label, share in shares.items():
+        bounds[label] = before / total, (before + share) / total
+        before += share
+
+    def inner(label: str, fraction: float) -> None:
+        start, end = bounds[label]
+        progress(stage, (1.0 - fraction) * start + fraction * end)  # exactly the end at its end
+
+    return inner
+
+
+def item(
+    progress: Progress, noun: str, number: int, total: int, name: str = "", *, whole: bool = False
 ) -> Progress:
-    """A progress whose stages are parts of larger ones: each from a start to an end.
+    """A `Progress` of item `number` (from 1) of `total` alike: rooms, views, passes.
 
-    Args: places: start and end of each stage, as shares; label: the one stage that they are parts
-        of, their own names by default.
+    Args:
+        name: set before the label of each stage.
+        whole: the item has one stage, whose fraction is the item's and whose label is the name.
     """
+    before = f"{name}: " if name else ""
 
-    def told(stage: str, fraction: float) -> None:
-        start, end = places.get(stage, (0.0, 1.0))
-        progress(label or stage, start + (end - start) * fraction)
+    def inner(label: str, fraction: float) -> None:
+        label = name if whole else before + label
+        alone = total == 1 and not whole
+        stage = label if alone else Stage(label, noun, number, total, whole=whole)
+        progress(stage, fraction)
 
-    return told
+    return inner
+
+
+class TimeLeft:
+    """How long the items that are left will take, from what those before took."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._first: tuple[float, float] | None = None  # items done, time [s]
+        self._last = (0.0, 0.0)
+
+    def seconds(self, stage: Stage, fraction: float) -> float | None:
+        """Seconds left; None before enough of the first item is done to tell."""
+        done, now = stage.items_done(fraction), self._clock()
+        if self._first is None:
+            self._first = self._last = (done, now)
+        if done > self._last[0]:
+            self._last = (done, now)
+        items, taken = self._last[0] - self._first[0], self._last[1] - self._first[1]
+        if items < LEAST:
+            return None
+        left = (stage.total - self._last[0]) * taken / items
+        return max(left - (now - self._last[1]), 0.0)
+
+
+def spoken_left(seconds: float | None) -> str:
+    """The time left in words, as rough as it is known; empty for None."""
+    if seconds is None:
+        return ""
+    if seconds < 95:
+        return f"about {max(round(seconds / 10), 1) * 10} s left"
+    if seconds < 95 * 60:
+        return f"about {round(seconds / 60)} min left"
+    return f"about {round(seconds / 1800) / 2:g} h left"

@@ -23,6 +23,7 @@ from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
 COLOURS = "turbo"
 DARKEST, KEY = 1.0, 0.18  # [cd/m2] lower end of the falsecolour scale; middle grey of a print
 DPI = 150
+TITLE = {"fontsize": 9, "loc": "left", "y": 1.0}  # without y each title's place is looked for
 
 
 def scale_limits(luminance: NDArray) -> tuple[float, float]:
@@ -58,9 +59,9 @@ def write_falsecolour(
     axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
     image = axes.imshow(shown, cmap=COLOURS, norm=norm, interpolation="nearest")
     axes.set_axis_off()
-    axes.set_title(title, fontsize=9, loc="left")
+    axes.set_title(title, **TITLE)
     bar = figure.colorbar(image, cax=figure.add_axes((0.83, 0.08, 0.035, 0.78)))
-    bar.ax.set_title("cd/m²", fontsize=9, loc="left")
+    bar.ax.set_title("cd/m²", **TITLE)
     bar.ax.tick_params(labelsize=8)
     if logarithmic:
         bar.ax.yaxis.set_major_locator(LogLocator(10, subs=(1.0, 3.0), numticks=20))
@@ -133,9 +134,9 @@ def write_tone_mapped(path: Path, pixels: NDArray, *, scale: bool = False, title
     axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
     axes.imshow(tone_mapped(pixels), interpolation="nearest")
     axes.set_axis_off()
-    axes.set_title(title, fontsize=9, loc="left")
+    axes.set_title(title, **TITLE)
     bar = figure.add_axes((0.83, 0.08, 0.035, 0.78))
-    bar.set_title("cd/m²", fontsize=9, loc="left")
+    bar.set_title("cd/m²", **TITLE)
     bar.imshow(_srgb(greys), extent=(0, 1, 0, 1), aspect="auto")
     marks = 10.0 ** np.arange(np.log10(low), np.log10(high) + 0.5)
     bar.set_yticks(np.log(marks / low) / np.log(high / low), [f"{m:,.6g}" for m in marks])
@@ -187,7 +188,7 @@ def write_check_picture(path: Path, result: GlareResult, *, title: str = "") -> 
     axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
     axes.imshow(shown, interpolation="nearest")
     axes.set_axis_off()
-    axes.set_title(title or f"DGP {result.dgp:.3f}", fontsize=9, loc="left")
+    axes.set_title(title or f"DGP {result.dgp:.3f}", **TITLE)
     outline = [withStroke(linewidth=2.5, foreground="white")]
     found, height = result.sources, result.geometry.view.height
     largest = np.argsort(-(found.luminance**2) * found.solid_angle / result.position**2)[:12]

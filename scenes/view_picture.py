@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.read_ifc import read_ifc
+from bim.read_ifc import STAGES, read_ifc
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
@@ -19,7 +19,7 @@ from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, part, silent, summed
 from mitsuba_cfs.sky.annual import annual_sky
 from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import chosen_spaces
@@ -50,8 +50,8 @@ def room_picture(
     """
     files = files or read_files(options)
     system, weather, hour = files.system, files.weather, files.hour
-    steps = part(progress, 0.0, 0.4, "inputs")
-    building = read_ifc(options.building, join=options.join, progress=steps)
+    reading = summed(part(progress, 0.0, 0.4), "inputs", STAGES)
+    building = read_ifc(options.building, join=options.join, progress=reading)
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     view = fisheye(*view_point(space, options.eye_height), options.size)

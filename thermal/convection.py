@@ -6,7 +6,9 @@ Angles enter as the z component of the surface's normal out of the room: floor -
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba.extending import register_jitable
+
+from thermal.records import INLINED
 
 MINIMUM = 0.1  # EnergyPlus' lower limit of an inside film
 
@@ -28,7 +30,7 @@ def local_wind_factor(height: float, terrain: str) -> float:
     return float((270.0 / 10.0) ** 0.14 * (max(height, 0.1) / depth) ** exponent)
 
 
-@njit(inline="always", error_model="numpy")
+@register_jitable(**INLINED)
 def tarp_inside(surface_c: float, air_c: float, normal_z: float) -> float:
     """Natural convection at an inside face (Walton 1983, TARP; EnergyPlus)."""
     dt = surface_c - air_c
@@ -42,7 +44,7 @@ def tarp_inside(surface_c: float, air_c: float, normal_z: float) -> float:
     return max(h, MINIMUM)
 
 
-@njit(inline="always", error_model="numpy")
+@register_jitable(**INLINED)
 def constant_inside(surface_c: float, air_c: float, normal_z: float) -> float:
     """Constant inside films that only know the direction of the heat (Walton 1983, "simple")."""
     unstable = (surface_c - air_c) * normal_z < 0.0
@@ -53,7 +55,7 @@ def constant_inside(surface_c: float, air_c: float, normal_z: float) -> float:
     return 4.040 if unstable else 0.948
 
 
-@njit(inline="always", error_model="numpy")
+@register_jitable(**INLINED)
 def iso15099_inside(glass_c: float, air_c: float, height: float) -> float:
     """Natural convection at the room side of vertical glass (ISO 15099:2003, 8.3.2.2)."""
     dt = abs(glass_c - air_c)
@@ -73,13 +75,13 @@ def iso15099_inside(glass_c: float, air_c: float, height: float) -> float:
     return nusselt * conductivity / height
 
 
-@njit(inline="always", error_model="numpy")
+@register_jitable(**INLINED)
 def natural_outside(surface_c: float, air_c: float, normal_z: float) -> float:
     """Natural part of the outside film; the outward face of a roof looks up."""
     return tarp_inside(surface_c, air_c, -normal_z)
 
 
-@njit(inline="always", error_model="numpy")
+@register_jitable(**INLINED)
 def doe2_outside(
     surface_c: float, air_c: float, normal_z: float, forced: float, roughness: float
 ) -> float:
@@ -88,7 +90,7 @@ def doe2_outside(
     return natural + roughness * (np.sqrt(natural * natural + forced * forced) - natural)
 
 
-@njit(inline="always", error_model="numpy")
+@register_jitable(**INLINED)
 def mowitt_outside(surface_c: float, air_c: float, forced: float) -> float:
     """MoWiTT outside film of smooth glass: sqrt((0.84 |dT|^(1/3))^2 + (a V^b)^2)."""
     natural = 0.84 * np.cbrt(abs(surface_c - air_c))

@@ -23,24 +23,41 @@ TERMS += ("facade", "windows", "partitions", "storage")  # [W] into the zone; st
 # The records below only lend their arrays: without `_nrt=False` every access would count
 # references, and functions called from one cache file to another are not inlined by LLVM; together
 # that is nine tenths of a run.  So nothing that is compiled allocates, and all but the entry point
-# in `kernel` is inlined.
-inlined = njit(inline="always", error_model="numpy", _nrt=False)
+# in `kernel` is inlined: by LLVM, which takes half as long as numba's `inline="always"`, where a
+# function is typed anew wherever it is called; and without what Python would call it by.
+_OPTIONS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+INLINED = _OPTIONS | {"forceinline": True, "no_cpython_wrapper": True}
+inlined = njit(**INLINED)
 
 
 def compiled(entry: Callable) -> Callable:
-    """The compiled entry point, kept on disk where a folder for it can be written."""
-    _drop_stale_cache(Path(inspect.getfile(entry)))
+    """The compiled entry point, kept on disk where a folder for it can be written.
+
+    That is `__pycache__` beside the module, else (a read-only install) the user's cache folder, or
+    the one that NUMBA_CACHE_DIR names.
+    """
     try:
-        return njit(cache=True, error_model="numpy", _nrt=False)(entry)
+        kept = njit(**_OPTIONS, cache=True)(entry)
     except RuntimeError:  # numba: no locator available
-        return njit(error_model="numpy", _nrt=False)(entry)
+        return njit(**_OPTIONS)(entry)
+    _drop_stale_cache(Path(inspect.getfile(entry)), Path(kept.stats.cache_path))
+    return kept
 
 
-def _drop_stale_cache(entry: Path) -> None:
+def must_compile(entry: Callable) -> bool:
+    """Whether the first call of a compiled entry point will compile it."""
+    if entry.signatures:
+        return False
+    folder = entry.stats.cache_path
+    name = f"{Path(inspect.getfile(entry.py_func)).stem}.{entry.py_func.__name__}-*.nbc"
+    return folder is None or not any(Path(folder).glob(name))
+
+
+def _drop_stale_cache(entry: Path, folder: Path) -> None:
     """Remove cached code of a module that is older than one of the modules inlined into it."""
     with suppress(OSError):
         newest = max(source.stat().st_mtime for source in entry.parent.glob("*.py"))
-        for file in (entry.parent / "__pycache__").glob(f"{entry.stem}.*.nb[ic]"):
+        for file in folder.glob(f"{entry.stem}.*.nb[ic]"):
             if file.stat().st_mtime < newest:
                 file.unlink(missing_ok=True)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from mitsuba_cfs.compiled import compiled
 
 EFFICACY = 179.0  # [lm/W] of Radiance's white, for evalglare's rounding
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def gather(luminance, weight, projected, picture):
     """Fill picture [nx, ny] in scan order from luminance [ny, nx], and its sums.
 
@@ -43,7 +44,7 @@ def gather(luminance, weight, projected, picture):
     return illuminance, flux, largest, bad
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def brightest_of(labels, luminance, size):
     """Largest luminance [size] of each label [cd/m2]; that of 0 is 0."""
     brightest = np.zeros(size)
@@ -55,7 +56,7 @@ def brightest_of(labels, luminance, size):
     return brightest
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def renumber(labels, numbers, luminance, projected, count):
     """Replace labels [nx, ny] by numbers[label]; illuminance [count] [lx] of what is numbered."""
     illuminance = np.zeros(count + 1)

@@ -14,12 +14,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from mitsuba_cfs.compiled import compiled
 
 COUNT, OMEGA, FLUX, FLUX_X, FLUX_Y = range(5)  # columns of the sums of a source
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def near(directions, x, y, other_x, other_y, radius, cosine):
     """Whether twice the angle between two pixels is at most `radius`; cosine = cos(radius/2)."""
     dot = (
@@ -32,7 +33,7 @@ def near(directions, x, y, other_x, other_y, radius, cosine):
     return dot > cosine + 1e-9 or 2.0 * math.acos(dot) <= radius
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def search(labels, directions, omega, x, y, radius, cosine, reach, own, lowest, highest):
     """A label near pixel (x, y), or 0.
 
@@ -70,7 +71,7 @@ def search(labels, directions, omega, x, y, radius, cosine, reach, own, lowest, 
     return found
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def label_bright(luminance, valid, directions, threshold, radius, reach, follow):
     """First scan: labels [nx, ny] of the pixels above the threshold, and how many there are.
 
@@ -102,7 +103,7 @@ def label_bright(luminance, valid, directions, threshold, radius, reach, follow)
     return labels, count
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def sum_sources(labels, luminance, solid_angle, size):
     """Sums [size, 5] of pixels, solid angle, luminance x solid angle, and its moments in x, y."""
     sums = np.zeros((size, 5))
@@ -115,7 +116,7 @@ def sum_sources(labels, luminance, solid_angle, size):
     return sums
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def add_pixel(sums, label, x, y, luminance, omega, sign):
     """Add a pixel to a source (or take it away with sign = -1)."""
     flux = luminance * omega * sign
@@ -126,7 +127,7 @@ def add_pixel(sums, label, x, y, luminance, omega, sign):
     sums[label, FLUX_Y] += flux * y
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def boxes_of(labels, size):
     """Extents [size, 4] of the sources: first and last x, first and last y."""
     nx, ny = labels.shape
@@ -143,7 +144,7 @@ def boxes_of(labels, size):
     return boxes
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def larger_in_reach(sums, boxes, x, y, own, lowest, highest, reach_x, reach_y):
     """Whether the box of any larger source comes within reach of the pixel (else none is near)."""
     for label in range(lowest, highest + 1):
@@ -156,7 +157,7 @@ def larger_in_reach(sums, boxes, x, y, own, lowest, highest, reach_x, reach_y):
     return False
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def inside(labels, x, y):
     """Whether all eight neighbours have the pixel's label (never so at the picture's edge)."""
     nx, ny = labels.shape
@@ -170,7 +171,7 @@ def inside(labels, x, y):
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def move_source(labels, sums, boxes, luminance, solid_angle, old, new):
     """Give all pixels of the source `old` to the source `new`."""
     sums[old] = 0.0
@@ -184,7 +185,7 @@ def move_source(labels, sums, boxes, luminance, solid_angle, old, new):
         boxes[new, low + 1] = max(boxes[new, low + 1], boxes[old, low + 1])
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def merge_sources(
     labels, sums, luminance, solid_angle, valid, directions, radius, reach, lowest, highest, edges
 ):
@@ -216,7 +217,7 @@ def merge_sources(
                     changed = True
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def smooth(labels, primary, sums, luminance, solid_angle, valid, circle):
     """Add pixels to the sources that fill more than a fifth of the circle [px] around them.
 
@@ -250,7 +251,7 @@ def smooth(labels, primary, sums, luminance, solid_angle, valid, circle):
                 inside_omega[:] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def search_peak(labels, directions, x, y, radius, cosine, lowest, highest):
     """The last label lowest..highest near pixel (x, y) in the order of the search, or 0.
 
@@ -279,7 +280,7 @@ def search_peak(labels, directions, x, y, radius, cosine, lowest, highest):
     return found
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def peaks_of(source, first, labels, sums, luminance, solid_angle, valid, directions, limit, radius):
     """Take a source's pixels of at least `limit` out of it, into sources first..; the last one."""
     nx, ny = labels.shape

@@ -10,8 +10,9 @@ Source: G. Ward, "Real Pixels", Graphics Gems II (1991), and Radiance's file for
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from mitsuba_cfs.compiled import compiled
 
 SHORTEST, LONGEST = 8, 32767  # widths that the new run-length code can hold
 
@@ -39,7 +40,7 @@ def rgbe_from_pixels(pixels: NDArray) -> NDArray[np.uint8]:
     return rgbe
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def decode_scanlines(data, rgbe):
     """Fill rgbe [lines, width, 4] from the bytes `data`; the number of whole lines that it held."""
     lines, width = rgbe.shape[0], rgbe.shape[1]
@@ -64,7 +65,7 @@ def decode_scanlines(data, rgbe):
     return lines
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _decode_planes(data, at, scanline):
     """Read the four planes of one line; the place after them, or -1 where the data ends or lies."""
     width, size = scanline.shape[0], data.shape[0]
@@ -87,7 +88,7 @@ def _decode_planes(data, at, scanline):
     return at
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _decode_old(data, at, scanline):
     """Read one flat or old-coded line; the place after it, or -1 where the data ends or lies."""
     width, size = scanline.shape[0], data.shape[0]
@@ -112,7 +113,7 @@ def _decode_old(data, at, scanline):
     return at
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _encode(rgbe, out):
     """Write the lines of rgbe [lines, width, 4] into `out` in the new code; the bytes used."""
     lines, width = rgbe.shape[0], rgbe.shape[1]

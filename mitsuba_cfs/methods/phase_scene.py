@@ -151,6 +151,6 @@ class PhaseScene:
                 seed=chosen.seed,
                 memory=chosen.memory,
                 max_depth=depth,
-                progress=part(self.progress, 0.0, 1.0, "pictures"),
+                progress=part(self.progress, 0.0, 1.0, "view matrices"),
             ),
         )

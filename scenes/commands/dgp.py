@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
+from scenes import quick
 from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import join_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
@@ -65,6 +67,7 @@ _DEFAULT = YearOptions(Path(), Path(), Path())
 )  # fmt: skip
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
 @click.option("--seed", type=int, default=_DEFAULT.seed, show_default=True)
+@quick_option
 def command(building: Path | None, out: Path, **chosen) -> None:
     """Daylight glare probability of a room's views in every hour with the sun up.
 
@@ -80,6 +83,8 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     from scenes.result_folder import ResultFolder
     from scenes.year_of_glare.files import read_files
 
+    if chosen["quick"]:
+        chosen |= quick.picks(quick.VIEWS, given())
     options = YearOptions(building or OFFICE, **chosen)
     files = (building, chosen["weather"], chosen["system"], *map(Path, chosen["views"]))
     folder = ResultFolder(out, "dgp", inputs=files)
@@ -88,6 +93,8 @@ def command(building: Path | None, out: Path, **chosen) -> None:
     from scenes.year_of_glare import outputs
     from scenes.year_of_glare.year import rate_views, read_year
 
+    if options.quick:
+        click.echo(quick.NOTE)
     with ProgressBar() as progress:
         year = read_year(options, progress, read)
         views = rate_views(year, folder.kept(outputs.KEPT), progress)

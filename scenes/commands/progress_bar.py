@@ -1,9 +1,11 @@
-"""The bar that shows a `mitsuba_cfs.progress.Progress` on the terminal."""
+"""The bars, or the lines of a log, that show a `mitsuba_cfs.progress.Progress`."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from types import TracebackType
 
 import click
@@ -18,31 +20,58 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from mitsuba_cfs.progress import Stage, TimeLeft, spoken_left
+
+NEXT_ITEM_S = 10.0  # of a log: items that are shorter do not get a line each
+SILENCE_S = 60.0  # of a log: a longer stage says how far it is
+
+
+@dataclass(slots=True)
+class _Pass:
+    """One time through a stage."""
+
+    label: str
+    started: float
+    fraction: float = 0.0
+    done: bool = False
+    task: TaskID | None = None
+
 
 class ProgressBar:
     """A `Progress` callback drawn on stderr: one bar per stage, in the order they come.
 
-    Where stderr is no terminal, one line per finished stage. Use as a context manager:
+    A bar never goes back, and one that is ticked stays so: a stage that begins again gets a bar of
+    its own.  Of items alike (`mitsuba_cfs.progress.item`) one bar says which is computed and how
+    long the others take; only its own stages are shown.  Where stderr is no terminal, one line per
+    finished stage, and lines of the items from time to time.  Use as a context manager:
 
         with ProgressBar() as progress:
             annual_run(..., progress=progress)
     """
 
-    def __init__(self, *, terminal: bool | None = None) -> None:
+    def __init__(
+        self, *, terminal: bool | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """Draw on a terminal or write lines; by default what stderr is."""
         self._terminal = sys.stderr.isatty() if terminal is None else terminal
+        self._clock = clock
         self._bars = Progress(
             SpinnerColumn(finished_text="[green]✓"),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=30),
             TaskProgressColumn(),
             TimeElapsedColumn(),
             console=Console(stderr=True),
+            redirect_stdout=sys.stdout.isatty(),  # into a file results go past the bars
         )
-        self._tasks: dict[str, TaskID] = {}
-        self._started: dict[str, float] = {}
-        self._written: set[str] = set()
-        self._current: str | None = None
+        self._passes: dict[str, list[_Pass]] = {}
+        self._current: _Pass | None = None
+        self._item: Stage | None = None
+        self._items: TaskID | None = None  # the bar of the items
+        self._items_done = 0.0  # what it shows
+        self._left, self._seconds = TimeLeft(clock), None
+        self._told = clock()  # when the log's last line was written
+        self._begun = clock() - NEXT_ITEM_S  # when the log last told of an item
 
     def __enter__(self) -> ProgressBar:
         if self._terminal:
@@ -57,28 +86,112 @@ class ProgressBar:
     ) -> None:
         if error is None:
             self._finish(self._current)
+            self._end_items()
         if self._terminal:
             self._bars.stop()
 
     def __call__(self, stage: str, fraction: float) -> None:
         """Show that `fraction` (0 to 1) of `stage` is done; a new stage ends the one before."""
-        if stage != self._current:
+        fraction = min(max(fraction, 0.0), 1.0)
+        if isinstance(stage, Stage):
+            self._show_item(stage, fraction)
+        elif stage != self._label and self._item is not None:
             self._finish(self._current)
-            self._current = stage
-        self._started.setdefault(stage, time.perf_counter())
-        if self._terminal:
-            if stage not in self._tasks:
-                self._tasks[stage] = self._bars.add_task(stage, total=1.0)
-            self._bars.update(self._tasks[stage], completed=min(max(fraction, 0.0), 1.0))
-        if fraction >= 1.0:
-            self._finish(stage)
+            self._end_items()
+        if stage:
+            self._show_stage(str(stage), fraction)
 
-    def _finish(self, stage: str | None) -> None:
-        if stage is None:
+    @property
+    def _label(self) -> str:
+        return "" if self._current is None else self._current.label
+
+    def _show_stage(self, label: str, fraction: float) -> None:
+        one = self._pass_of(label, fraction)
+        if one is None:
             return
+        if one is not self._current:
+            self._finish(self._current)
+            self._current = one
+        one.fraction = max(one.fraction, fraction)
         if self._terminal:
-            self._bars.update(self._tasks[stage], completed=1.0)
-        elif stage not in self._written:
-            self._written.add(stage)
-            seconds = time.perf_counter() - self._started[stage]
-            click.echo(f"{stage}: {seconds:.1f} s", err=True)
+            if one.task is None:
+                one.task = self._bars.add_task(one.label, total=1.0)
+            self._bars.update(one.task, completed=one.fraction)
+        elif one.fraction < 1.0 and self._clock() - self._told >= SILENCE_S:
+            self._write(f"{one.label}: {100 * one.fraction:.0f} %{self._item_text(', ')}")
+        if one.fraction >= 1.0:
+            self._finish(one)
+
+    def _pass_of(self, label: str, fraction: float) -> _Pass | None:
+        """The pass through a stage that is under way, else a new one; None: it is over already."""
+        passes = self._passes.setdefault(label, [])
+        if passes and not passes[-1].done:
+            return passes[-1]
+        if passes and fraction >= 1.0:
+            return None
+        again = f" ({len(passes) + 1})" if passes else ""
+        passes.append(_Pass(label + again, self._clock()))
+        return passes[-1]
+
+    def _finish(self, one: _Pass | None) -> None:
+        if one is None or one.done:
+            return
+        one.done = True
+        if one.task is not None:
+            self._bars.update(one.task, completed=1.0)
+        if not self._terminal:
+            self._write(f"{one.label}: {self._clock() - one.started:.1f} s")
+
+    def _show_item(self, stage: Stage, fraction: float) -> None:
+        """Say which item is computed and how long the rest takes."""
+        if self._item is not None and stage.noun != self._item.noun:
+            self._finish(self._current)
+            self._end_items()
+        fresh = self._item is None or stage.number != self._item.number
+        if fresh:
+            self._finish(self._current)
+            self._hide_stages()
+        self._item = stage
+        self._seconds = self._left.seconds(stage, fraction)
+        if self._terminal:
+            if self._items is None:
+                self._items = self._bars.add_task("", total=1.0)
+            done = stage.items_done(fraction) / stage.total
+            self._items_done = max(self._items_done, done)
+            text = self._item_text()
+            self._bars.update(self._items, completed=self._items_done, description=text)
+        elif fresh and self._clock() - self._begun >= NEXT_ITEM_S:
+            self._begun = self._clock()
+            self._write(self._item_text())
+
+    def _item_text(self, before: str = "") -> str:
+        """Such as "room 3 of 6, about 4 min left"; empty where there are no items."""
+        if self._item is None:
+            return ""
+        left = spoken_left(self._seconds)
+        text = f"{self._item.noun} {self._item.number} of {self._item.total}"
+        return before + text + (f", {left}" if left else "")
+
+    def _hide_stages(self) -> None:
+        """Take the finished bars of the item before away."""
+        if self._item is None:
+            return
+        for one in [p for passes in self._passes.values() for p in passes]:
+            if one.task is not None and one.task > (self._items or 0):
+                self._bars.update(one.task, visible=False)
+
+    def _end_items(self) -> None:
+        """Tick the items' bar."""
+        if self._item is None:
+            return
+        self._hide_stages()
+        if self._items is not None:
+            noun, total = self._item.noun, self._item.total
+            text = f"{total} {noun}{'s' if total > 1 else ''}"
+            self._bars.update(self._items, completed=1.0, description=text)
+        self._item, self._items, self._items_done = None, None, 0.0
+        self._left, self._seconds = TimeLeft(self._clock), None
+
+    def _write(self, line: str) -> None:
+        self._told = self._clock()
+        click.echo(line, err=True)

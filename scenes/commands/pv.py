@@ -12,6 +12,8 @@ from scenes.commands.parameters import FILE, IFC_FILE
 
 if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
+from scenes import quick as quick_run
+from scenes.commands.quick_option import quick_option
 
 
 @click.command()
@@ -21,8 +23,15 @@ if TYPE_CHECKING:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
 @click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
+@quick_option
 def command(
-    building: Path, weather: Path, study_file: Path, out: Path, seed: int, no_cache: bool
+    building: Path,
+    weather: Path,
+    study_file: Path,
+    out: Path,
+    seed: int,
+    no_cache: bool,
+    quick: bool,
 ) -> None:
     """Irradiance and yield of the photovoltaic modules of a building.
 
@@ -44,13 +53,16 @@ def command(
 
     variants.activate()
     cache = None if no_cache else MatrixCache.of_user()
+    if quick:
+        click.echo(quick_run.NOTE)
     with ProgressBar() as progress:
         result = run_pv(
-            building, climate, study, file=study_file, seed=seed, progress=progress, cache=cache
-        )
+            building, climate, study, file=study_file, seed=seed, progress=progress, cache=cache,
+            **(quick_run.PV if quick else {}),
+        )  # fmt: skip
         progress("results", 0.0)
         record = {
-            "building": str(building), "weather": str(weather),
+            "quick": quick, "building": str(building), "weather": str(weather),
             "study": study.model_dump(mode="json"), "seed": seed,
             "relative_standard_error_of_diffuse": result.irradiance.diffuse_error,
         }  # fmt: skip

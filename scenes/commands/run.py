@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
+from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import join_option
 from scenes.job.options import METHODS, JobOptions
 
@@ -39,15 +42,15 @@ _DEFAULT = JobOptions(Path(), Path())
     show_default=True, help="Pixels of a side.",
 )  # fmt: skip
 @click.option(
-    "--spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.sensor_spacing,
+    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.sensor_spacing,
     show_default=True, help="Sensor spacing [m].",
 )  # fmt: skip
 @click.option(
-    "--height", type=click.FloatRange(0, 5), default=_DEFAULT.sensor_height,
+    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.sensor_height,
     show_default=True, help="Work plane above the floor [m].",
 )  # fmt: skip
 @click.option(
-    "--ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
+    "--ach", "infiltration_ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
     show_default=True, help="Outdoor air changes [1/h].",
 )  # fmt: skip
 @click.option(
@@ -57,65 +60,29 @@ _DEFAULT = JobOptions(Path(), Path())
 @click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
 @click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
-@click.option("--quick", is_flag=True, help="A tenth of the rays, for a first look.")
+@quick_option
 def command(
     building: Path,
     weather: Path,
     system: Path | None,
     out: Path,
-    method: str,
-    spaces: tuple[str, ...],
-    join: tuple[str, ...],
-    u_value: float | None,
-    g_value: float | None,
-    picture_hours: tuple[str, ...],
-    picture_size: int,
-    spacing: float,
-    height: float,
-    ach: float,
-    operation: Path | None,
-    annual_glare: bool,
-    seed: int,
     no_cache: bool,
     quick: bool,
+    **chosen,
 ) -> None:
     """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
-    if annual_glare and method == "point-in-time":
+    if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
-    if system is None and (u_value is not None or g_value is not None):
+    if system is None and (chosen["u_value"] is not None or chosen["g_value"] is not None):
         raise click.UsageError("--u and --g belong to --cfs")
-    share = 10 if quick else 1
-    run_to_folder(
-        JobOptions(
-            building,
-            weather,
-            system,
-            operation,
-            method=method,
-            annual_glare=annual_glare,
-            spaces=spaces,
-            join=join,
-            u_value=u_value,
-            g_value=g_value,
-            picture_hours=picture_hours,
-            picture_size=picture_size,
-            picture_samples=max(_DEFAULT.picture_samples // share, 4),
-            sensor_spacing=spacing,
-            sensor_height=height,
-            sensor_samples=_DEFAULT.sensor_samples // share,
-            patch_samples=_DEFAULT.patch_samples // share,
-            sun_points=_DEFAULT.sun_points // (4 if quick else 1),
-            path_samples=_DEFAULT.path_samples // share,
-            infiltration_ach=ach,
-            cache=not no_cache,
-            seed=seed,
-        ),
-        out,
-    )
+    options = JobOptions(building, weather, system, cache=not no_cache, quick=quick, **chosen)
+    if quick:
+        options = replace(options, **quick_run.picks(quick_run.ROOM, given()))
+    run_to_folder(options, out)
 
 
 def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
-    """Run the job with a progress bar, write its files and say what came out."""
+    """Run the job with a progress bar, say what comes out room by room, and write its files."""
     from mitsuba_cfs.matrices.cache import default_folder
     from scenes.job.files import read_files
     from scenes.result_folder import ResultFolder
@@ -125,20 +92,22 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if options.cache:
         default_folder()  # or one line that it cannot be one
     files = read_files(options)  # before anything heavy is loaded
+    from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.job.outputs import write_results
     from scenes.job.run import run_job
     from scenes.report import write_report
 
-    with ProgressBar() as progress:
-        result = run_job(options, progress, files)
+    if options.quick:
+        click.echo(quick_run.NOTE)
+    with ProgressBar() as progress, compiled_beside():
+        result = run_job(options, progress, files, told=lambda room: click.echo(summary_line(room)))
         progress("results", 0.0)
         write_results(result, folder, write_report)
         progress("results", 1.0)
-    for room in result.spaces:
-        click.echo(summary_line(room))
     for note in result.notes:
-        click.echo(f"note: {note}")
+        if note != quick_run.NOTE:
+            click.echo(f"note: {note}")
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import click
 
+from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
+from scenes.commands.quick_option import quick_option
 
 
 @click.command()
@@ -24,6 +26,7 @@ from scenes.commands.parameters import FILE
     "--write-ifc", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT.ifc",
     help="The study's building with each case's results in property sets.",
 )  # fmt: skip
+@quick_option
 def command(
     study: Path,
     out: Path,
@@ -33,6 +36,7 @@ def command(
     time_budget: str | None,
     dgp_error: str | None,
     write_ifc: Path | None,
+    quick: bool,
 ) -> None:
     """Every room of a study with every system, orientation, climate and method.
 
@@ -49,7 +53,7 @@ def command(
 
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
-    parsed = read_study(study, automatic=method is not None, **asked)
+    parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
     store = Store(out, inputs=(study, *parsed.files))
     default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
@@ -66,6 +70,8 @@ def command(
     from scenes.study.write_ifc import write_study_ifc
     from scenes.study_report import write_study_report
 
+    if parsed.quick:
+        click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")

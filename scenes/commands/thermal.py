@@ -12,12 +12,15 @@ from scenes.commands.parameters import FILE
 
 if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
+from scenes import quick as quick_run
+from scenes.commands.quick_option import quick_option
 
 
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
-def command(study: Path, out: Path) -> None:
+@quick_option
+def command(study: Path, out: Path, quick: bool) -> None:
     """Gains, temperatures, loads and comfort of rooms, hour by hour.
 
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
@@ -27,16 +30,21 @@ def command(study: Path, out: Path) -> None:
     from scenes.heat.study_file import read_study
     from scenes.result_folder import ResultFolder
 
-    parsed = read_study(study)
+    parsed = read_study(study, quick=quick)
     inputs = (study, parsed.weather, parsed.building, *(one.bsdf for one in parsed.system))
     folder = ResultFolder(out, "thermal", inputs=inputs)
     files = read_files(parsed)  # before anything heavy is loaded
+    from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.heat.study import run_study
 
-    with ProgressBar() as progress:
+    if quick:
+        click.echo(quick_run.NOTE)
+    with ProgressBar() as progress, compiled_beside():
         rooms, notes = run_study(parsed, progress, files)
-    _write(rooms, notes, parsed, folder)
+    notes = (*[quick_run.NOTE] * quick, *notes)
+    record = {"quick": quick, "study": parsed.model_dump(mode="json"), "notes": list(notes)}
+    _write(rooms, record, folder)
     for room in rooms:
         summary = room.summary
         click.echo(
@@ -45,12 +53,12 @@ def command(study: Path, out: Path) -> None:
             f"cooling {summary['cooling_kwh']:.0f} kWh, comfortable "
             f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of the occupied hours"
         )
-    for note in notes:
+    for note in notes[quick:]:
         click.echo(f"note: {note}")
     click.echo(f"results: {out}")
 
 
-def _write(rooms, notes: tuple[str, ...], study, results: ResultFolder) -> None:
+def _write(rooms, record: dict, results: ResultFolder) -> None:
     """All files of a study."""
     import pandas as pd
 
@@ -66,5 +74,4 @@ def _write(rooms, notes: tuple[str, ...], study, results: ResultFolder) -> None:
         write_table(table.round(4), folder / "summary.csv", index=False)
         months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
         write_table(months, folder / "discomfort_by_month.csv")
-        record = {"study": study.model_dump(mode="json"), "notes": list(notes)}
         write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")

@@ -12,10 +12,12 @@ from PIL import Image
 
 def png_uri(rgba: NDArray[np.uint8]) -> str:
     """Colours [ny, nx, 3 or 4] as a PNG data URI, at most 256 colours kept exactly."""
-    flat = rgba.reshape(-1, rgba.shape[-1])
-    palette, index = np.unique(flat, axis=0, return_inverse=True)
-    if len(palette) <= 256 and rgba.shape[-1] == 3:
+    if rgba.shape[-1] == 3:
+        packed = rgba.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
+        colours, index = np.unique(packed, return_inverse=True)
+    if rgba.shape[-1] == 3 and len(colours) <= 256:
         picture = Image.fromarray(index.reshape(rgba.shape[:2]).astype(np.uint8))
+        palette = colours[:, None] >> np.array([16, 8, 0], dtype=np.uint32) & 255
         picture.putpalette(palette.astype(np.uint8).tobytes())
     else:
         picture = Image.fromarray(np.ascontiguousarray(rgba))

@@ -20,7 +20,7 @@ from bim.to_thermal import (
 )
 from mitsuba_cfs import variants
 from mitsuba_cfs.directions import window_frame
-from mitsuba_cfs.progress import Progress, part
+from mitsuba_cfs.progress import Progress, item, part
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -32,7 +32,7 @@ from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.drawn_shades import traced_building
 from scenes.job.inputs import System, chosen_spaces, named_spaces
-from scenes.job.thermal import climate
+from scenes.job.thermal import COMPILING, climate
 from scenes.job.thermal_system import ThermalSystem
 from scenes.job.windows import everywhere
 from thermal.balance import ZoneResult, simulate_zones
@@ -46,6 +46,8 @@ from thermal.control import (
     switched,
 )
 from thermal.gains import dimmed_share, split_gains
+from thermal.kernel import advance
+from thermal.records import must_compile
 from thermal.zone import WindowElement, Zone, work_hours
 
 FloatArray = NDArray[np.float64]
@@ -95,12 +97,12 @@ def run_study(
     skies = _skies(weather, study)
     ready = []
     for i, (space, zone) in enumerate(zip(spaces, zones, strict=True)):
-        share = part(progress, 0.9 * i / len(spaces), 0.9 * (i + 1) / len(spaces))
-        room = ready_room(study, building, space, zone, systems, thermals, weather, skies, share)
+        steps = item(progress, "room", i + 1, len(spaces), zone.zone.name)
+        room = ready_room(study, building, space, zone, systems, thermals, weather, skies, steps)
         ready.append(room)
         if room.radiant is None and study.trace.view_factors:
             notes[f"{zone.zone.name}: is not closed, its longwave goes through a mean star."] = None
-    results = balances(study, ready, weather, part(progress, 0.9, 1.0))
+    results = balances(study, ready, weather, progress)
     years = [
         RoomYear(
             room.zone.name,
@@ -118,6 +120,8 @@ def balances(
 ) -> list[ZoneResult]:
     """The rooms' years: together where the study couples them, else one by one."""
     outdoors, step_s = climate(weather), 60.0 * study.step_minutes
+    if must_compile(advance):
+        progress(COMPILING, 0.0)
     if study.couple:
         progress("heat balance", 0.0)
         links = door_links([r.space for r in rooms], study.air.door_m3_s)
@@ -174,20 +178,18 @@ def ready_room(
     progress: Progress,
 ) -> ReadyRoom:
     """Trace a room in all its shading states, choose the state of every hour."""
-    label, trace = room.zone.name, study.trace
+    trace = study.trace
     omega = systems[0].solar.basis_in.projected_solid_angles()
-    light = room_light(building, space, room, skies, omega, trace, part(progress, 0.0, 0.4, label))
+    light = room_light(building, space, room, skies, omega, trace, progress)
     surfaces = len(room.zone.surfaces)
     suns = []
     for j, (system, thermal) in enumerate(zip(systems, thermals, strict=True)):
-        steps = part(progress, 0.4 + 0.4 * j / len(systems), 0.4 + 0.4 * (j + 1) / len(systems))
+        steps = part(progress, j / len(systems), (j + 1) / len(systems), "gains")
         suns.append(state_solar(light, system, thermal, skies, surfaces, trace, steps))
     plane, eye = None, None
     lamps = study.gains.lighting_w_m2 > 0
     if space.windows and (study.control.rule == "glare" or lamps):
-        plane, eye = illuminances(
-            building, space, systems, skies, trace, part(progress, 0.8, 1.0, label)
-        )
+        plane, eye = illuminances(building, space, systems, skies, trace, progress)
     state = _states(study, space, light, weather, eye)
     daylight = None if plane is None else plane[state, np.arange(len(state))]
     radiant = None

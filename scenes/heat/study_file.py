@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
+from scenes.quick import HEAT, picks
 from scenes.toml_file import read_table, validated
 from thermal.closure import Closure
 from thermal.glazing import Gap
@@ -224,8 +225,10 @@ class StudyFile(_Table):
         return self
 
 
-def read_study(path: Path) -> StudyFile:
+def read_study(path: Path, *, quick: bool = False) -> StudyFile:
     """The study of a TOML file, its paths made absolute.
+
+    Args: quick: few rays where the file does not say how many.
 
     Raises: `DataError` naming the file and the field.
     """
@@ -233,6 +236,9 @@ def read_study(path: Path) -> StudyFile:
     here = path.parent
     systems = tuple(s.model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system)
     found = {"weather": _there(here, study.weather, path), "system": systems}
+    if quick:
+        given = study.trace.model_fields_set
+        found["trace"] = study.trace.model_copy(update=picks(HEAT, given))
     if study.building is not None:
         found["building"] = _there(here, study.building, path)
         check_head(found["building"])

@@ -20,7 +20,7 @@ def glare_by_state(light: PhaseLight, progress: Progress) -> NDArray[np.float64]
     lit = [
         glare(
             light, "DGP", np.full(count, j),
-            progress=part(progress, j / J, (j + 1) / J, "annual glare"),
+            progress=part(progress, j / J, (j + 1) / J, "glare control"),
         ).dgp
         for j in range(J)
     ]  # fmt: skip

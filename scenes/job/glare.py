@@ -21,10 +21,13 @@ DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
 
 
 def default_hours(
-    times: pd.DatetimeIndex, lit: NDArray[np.int64], eye_illuminance: NDArray[np.float32]
+    times: pd.DatetimeIndex,
+    lit: NDArray[np.int64],
+    eye_illuminance: NDArray[np.float32],
+    count: int,
 ) -> list[int]:
-    """The equinox and the solstices at 9, 12 and 15 o'clock, as far as the sun is up, and the
-    hour of the year that is brightest at the eye.
+    """The hour of the year that is brightest at the eye, and with it up to `count` of the equinox
+    and the solstices at 9, 12 and 15 o'clock, as far as the sun is up.
 
     Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
     """
@@ -32,7 +35,8 @@ def default_hours(
     lit_set = set(lit.tolist())
     found = [hour for label in labels if (hour := hour_index(label, times)) in lit_set]
     brightest = int(lit[np.argmax(eye_illuminance)])
-    return found + [brightest] * (brightest not in found)
+    chosen = {brightest, *[hour for hour in found if hour != brightest][: count - 1]}
+    return [hour for hour in dict.fromkeys([*found, brightest]) if hour in chosen]
 
 
 def room_glare(
@@ -46,6 +50,7 @@ def room_glare(
 
     Args: state: [L] of the windows in each hour with the sun up.
     """
+    progress("pictures", 0.0)
     columns = np.searchsorted(light.sky.lit, hours)
     geometry = GlareView(view)
     rated = []

@@ -15,6 +15,7 @@ class RoomOptions:
 
     method: str = "five-phase"  # one of METHODS
     picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.job.glare.default_hours`
+    picture_count: int = 10  # at most, where no hours are asked for
     picture_size: int = 600  # pixels of a side of the fisheye picture
     picture_samples: int = 8  # paths for each pixel; 4 x 4 of them share what is reflected
     sky_subdivision: int = 4  # Reinhart's MF
@@ -26,6 +27,7 @@ class RoomOptions:
     sun_points: int = 1024  # places on each window group that the direct sun is taken at
     annual_glare: bool = False  # rate every lit hour, not only the pictures
     path_samples: int = 2_048  # point-in-time: paths for each sensor and hour
+    heat_step_s: float = 600.0  # of the heat balance; a whole fraction of an hour
     infiltration_ach: float = 0.5  # [1/h]
     equipment_w_m2: float = 8.0  # while occupied, half of it radiant
     person_w: float = 75.0  # sensible heat of a person
@@ -67,3 +69,4 @@ class JobOptions(RoomOptions):
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence
     cache: bool = True  # keep traced matrices and find them again
+    quick: bool = False  # said in the results; what it chooses is in `scenes.quick`

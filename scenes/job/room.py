@@ -28,7 +28,7 @@ from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.phases import window_radiance
-from mitsuba_cfs.progress import Progress, part, silent, staged
+from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.annual import glare_by_state, glare_of_year, worst_hours
@@ -148,8 +148,12 @@ class _Room:
             self.options.sampling,
             five_phase=self.options.method != "three-phase",
             cache=self.cache,
-            progress=staged(self.progress, {"daylight": (0.0, 0.6), "pictures": (0.0, 0.5)}),
+            progress=self._tracing,
         )
+
+    def _tracing(self, stage: str, fraction: float) -> None:
+        """The sensors' matrices are a part of the daylight, those of the view a stage."""
+        self.progress(stage, (0.6 if stage == "daylight" else 1.0) * fraction)
 
     @cached_property
     def light(self) -> PhaseLight:
@@ -187,6 +191,7 @@ class _Room:
 
     def daylight(self) -> DaylightResult:
         """Illuminance of the work plane and its metrics."""
+        self.progress("daylight", 0.0)
         steps = part(self.progress, 0.9, 1.0, "daylight")
         found = room_daylight(self.light, self.lit_state, self.weather, self.options, steps)
         self.progress("daylight", 1.0)
@@ -217,15 +222,16 @@ class _Room:
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
         if not hours and year is not None:
-            hours = worst_hours(year, WORST)
+            hours = worst_hours(year, min(WORST, self.options.picture_count))
         if not hours:
             eye = self.eye()[self.lit_state, np.arange(len(self.skies.lit))]
-            hours = default_hours(self.weather.midpoints, self.skies.lit, eye)
-        steps = part(self.progress, 0.5, 1.0, "pictures")
-        return room_glare(self.pictured, self.scene.view, self.lit_state, hours, steps)
+            count = self.options.picture_count
+            hours = default_hours(self.weather.midpoints, self.skies.lit, eye, count)
+        return room_glare(self.pictured, self.scene.view, self.lit_state, hours, self.progress)
 
     def thermal(self, daylight: DaylightResult) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort."""
+        self.progress("heat", 0.0)
         operate = None
         if self.operation is not None:
             operate = lambda zone: self._operated(zone, daylight)  # noqa: E731

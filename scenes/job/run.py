@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 
 from bim.model import Building, Problem, Space
-from bim.read_ifc import read_ifc
+from bim.read_ifc import STAGES, read_ifc
 from bim.templates import template_rooms
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -29,9 +29,17 @@ from scenes.job.options import JobOptions
 from scenes.job.room import compute_room, skies_for
 from scenes.job.thermal_system import thermal_system
 from scenes.job.windows import States, everywhere
+from scenes.quick import NOTE
 from scenes.results import RunResult, SpaceResult
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+
+
+Told = Callable[[SpaceResult], None]  # called with each room as soon as it is computed
+
+
+def untold(room: SpaceResult) -> None:
+    """Say nothing of a room before all are computed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +54,17 @@ class JobInputs:
 
 
 def run_job(
-    options: JobOptions, progress: Progress = silent, files: JobFiles | None = None
+    options: JobOptions,
+    progress: Progress = silent,
+    files: JobFiles | None = None,
+    *,
+    told: Told = untold,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
 
-    Args: files: what `read_files` has read of the options; read now without.
+    Args:
+        files: what `read_files` has read of the options; read now without.
+        told: called with each room as soon as it is computed, in the rooms' order.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
@@ -64,13 +78,14 @@ def run_job(
     progress("sky", 0.0)
     skies = skies_for(weather, options)
     progress("sky", 1.0)
-    results, problems, notes = _rooms(inputs, skies, options, progress)
+    results, problems, notes = _rooms(inputs, skies, options, progress, told)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
     holes = [problem for result in results for problem in result.problems]
     manifest = _manifest(options, variant, inputs, used, results)
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
+        *([NOTE] if options.quick else []),
         *(note for system in used for note in system.notes),
         *thermal_notes,
         *_state_notes(inputs, options),
@@ -98,8 +113,8 @@ def read_inputs(
     files = files or read_files(options)
     system, operation, weather = files.system, files.operation, files.weather
     progress("inputs", 0.1)
-    steps = part(progress, 0.1, 1.0, "inputs")
-    building = read_ifc(options.building, join=options.join, progress=steps)
+    reading = summed(part(progress, 0.1, 1.0), "inputs", STAGES)
+    building = read_ifc(options.building, join=options.join, progress=reading)
     spaces = chosen_spaces(building, options.spaces, options.building)
     systems: dict[str, States] = {}
     if operation is not None and operation.systems:
@@ -125,52 +140,53 @@ def used_systems(inputs: JobInputs) -> list[System]:
 
 
 def _rooms(
-    inputs: JobInputs, skies: AnnualSky, options: JobOptions, progress: Progress
+    inputs: JobInputs,
+    skies: AnnualSky,
+    options: JobOptions,
+    progress: Progress,
+    told: Told = untold,
 ) -> tuple[list[SpaceResult], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
     found: dict[str, SpaceResult] = {}
     problems, notes = [], []
     cache = MatrixCache.of_user() if options.cache else None
-    for group in template_rooms(inputs.spaces):
-        for space in group:
-            steps = _labelled(progress, f"{space.label}: ")
-            try:
-                twin = next(
-                    (
-                        other
-                        for other in group
-                        if other.guid in found
-                        and not found[other.guid].like
-                        and same_systems(other, space, inputs.systems)
-                        and same_light(inputs.building, other, space, options, cache)
-                    ),
-                    None,
+    alike = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
+    for number, space in enumerate(inputs.spaces, 1):
+        name = space.label
+        steps = item(progress, "room", number, len(inputs.spaces), name)
+        try:
+            twin = next(
+                (
+                    other
+                    for other in alike[space.guid]
+                    if other.guid in found
+                    and not found[other.guid].like
+                    and same_systems(other, space, inputs.systems)
+                    and same_light(inputs.building, other, space, options, cache)
+                ),
+                None,
+            )
+            if twin is not None:
+                found[space.guid] = as_room(found[twin.guid], space)
+                notes.append(
+                    f"Room {name} is like {twin.label} in shape, orientation, "
+                    "materials, windows and in what shades it: its results are those."
                 )
-                if twin is not None:
-                    found[space.guid] = as_room(found[twin.guid], space)
-                    name = space.label
-                    notes.append(
-                        f"Room {name} is like {twin.label} in shape, orientation, "
-                        "materials, windows and in what shades it: its results are those."
-                    )
-                    continue
+            else:
                 found[space.guid] = compute_room(
                     inputs.building, space, inputs.systems, inputs.weather, options,
                     operation=inputs.operation, skies=skies, cache=cache, progress=steps,
                 )  # fmt: skip
-            except (CfsError, ValueError) as error:
-                if isinstance(error, DataError):
-                    raise
-                if len(inputs.spaces) == 1:
-                    where = f"space {space.label}"
-                    raise DataError(str(error), file=options.building, element=where) from error
-                problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
-    return [found[s.guid] for s in inputs.spaces if s.guid in found], problems, notes
-
-
-def _labelled(progress: Progress, label: str) -> Progress:
-    """Progress with the room's name before each stage."""
-    return lambda stage, fraction: progress(label + stage, fraction)
+        except (CfsError, ValueError) as error:
+            if isinstance(error, DataError):
+                raise
+            if len(inputs.spaces) == 1:
+                where = f"space {name}"
+                raise DataError(str(error), file=options.building, element=where) from error
+            problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+            continue
+        told(found[space.guid])
+    return list(found.values()), problems, notes
 
 
 def _manifest(
@@ -192,6 +208,7 @@ def _manifest(
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
+        "quick": options.quick,
         "inputs": {
             name: {"path": str(path), "sha256": sha256(path)} for name, path in files.items()
         },

@@ -31,11 +31,13 @@ from thermal.balance import ZoneResult, simulate
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.comfort import adaptive_comfort, hours_between, running_mean, summarise
 from thermal.control import switched
+from thermal.kernel import advance
+from thermal.records import must_compile
 from thermal.zone import Gains, Zone, work_hours
 
 BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
+COMPILING = "compiling the heat balance, once: about 10 s"
 RADIANT_SHARE = 0.5  # of the heat of people and equipment
-STEP_S = 600.0  # of the heat balance
 
 
 def room_thermal(
@@ -78,7 +80,9 @@ def room_thermal(
         name: np.stack([sums[name] for _, sums in suns])[state, np.arange(len(state))]
         for name in suns[0][1]
     }
-    result = simulate(zone, climate(weather), per_window(solar, zone), step_s=STEP_S)
+    if must_compile(advance):
+        progress(COMPILING, 0.0)
+    result = simulate(zone, climate(weather), per_window(solar, zone), step_s=options.heat_step_s)
     progress("heat", 1.0)
     times = weather.midpoints
     comfort, summary = _comfort(result, weather, options)

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.compiled import compiled
 from scenes.photovoltaics.two_diode import Cell, cell_currents
 
 NEWTON_STEPS = 60
@@ -24,7 +25,7 @@ def cell_voltage(
     return inner - np.asarray(current, dtype=float) * cell.series
 
 
-@numba.vectorize(["f8(f8,f8,f8,f8,f8,f8)"], nopython=True, cache=True)
+@compiled(numba.vectorize, ["f8(f8,f8,f8,f8,f8,f8)"], nopython=True)
 def diode_voltage(photo, first, second, thermal, shunt, current):
     """V_d [V] at a current [A], from I_ph, I_01, I_02 [A], V_t [V] and R_p [Ohm].
 

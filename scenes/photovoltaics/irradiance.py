@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bim.model import Element
 from bim.to_tracer import element_surfaces
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.progress import Progress, item, silent
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
@@ -73,13 +73,14 @@ def cell_irradiance(
     beam = shares * cosine * series.direct_normal[steps]
     modifier = pvlib.iam.physical(WHOLE_DEGREES)
     results, error = [], 0.0
-    for acceptance in (None, modifier):
+    for before, acceptance in ((0, None), (2, modifier)):
         whole, own = (
             sky_irradiance_matrix(
                 surfaces, points, normals, subdivision=SUBDIVISION, acceptance=acceptance,
-                samples=samples, max_depth=depth, seed=seed, progress=progress, cache=cache,
+                samples=samples, max_depth=depth, seed=seed, cache=cache,
+                progress=item(progress, "sky irradiance", before + k, 4, whole=True),
             )
-            for depth in (16, 1)
+            for k, depth in enumerate((16, 1), 1)
         )  # fmt: skip
         diffuse = whole.values.astype(np.float32) @ sky
         diffuse += np.maximum(whole.values - own.values, 0.0).astype(np.float32) @ sun

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.compiled import compiled
 from scenes.photovoltaics.diode import diode_voltage
 from scenes.photovoltaics.two_diode import Cell, cell_currents
 
@@ -134,7 +135,7 @@ def _made_table(cell: Cell, largest: float) -> _DiodeTable:
     return _DiodeTable(diode_voltage(spare, first, second, thermal, cell.shunt, 0.0), reach)
 
 
-@numba.njit(parallel=True, cache=True)
+@compiled(parallel=True)
 def _string_voltage(
     current, photo, temperature, cells, substring, table, reach, series, bypass
 ):  # fmt: skip

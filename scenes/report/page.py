@@ -12,6 +12,7 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
+from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
@@ -78,7 +79,8 @@ def script_json(value: object) -> Markup:
 def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     """The run in a few facts."""
     building = result.building
-    rows = [("Building", building.name or "without a name")]
+    rows = [("Run", NOTE)] if result.manifest.get("quick") else []
+    rows.append(("Building", building.name or "without a name"))
     if building.latitude_deg is not None and building.longitude_deg is not None:
         north, east = building.latitude_deg, building.longitude_deg
         place = f"{abs(north):.2f}° {'N' if north >= 0 else 'S'}, "
@@ -167,7 +169,17 @@ def timings_table(result: RunResult) -> tables.Table:
 
 def remaining(manifest: Mapping) -> dict:
     """What the manifest holds besides the parts shown in tables of their own."""
-    shown = ("inputs", "options", "versions", "seconds", "rooms", "building", "site", "system")
+    shown = (
+        "quick",
+        "inputs",
+        "options",
+        "versions",
+        "seconds",
+        "rooms",
+        "building",
+        "site",
+        "system",
+    )
     return {key: value for key, value in manifest.items() if key not in shown}
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bim.model import Problem, Space
-from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.calibration.durations import spoken_time
 from scenes.report.glare_figures import compass
 from scenes.study.case import Case
@@ -30,6 +30,7 @@ class StudyResult:
     results: tuple[CaseResult, ...]  # of each case of the plan
     reused: int  # cases that an earlier run had finished
     seconds: float
+    quick: bool = False
 
     @property
     def failed(self) -> int:
@@ -100,17 +101,22 @@ def run_study(
     cases = {case.key: case for case in plan.cases}
     found = {key: result for key in cases if (result := store.load(key)) is not None}
     reused, total = len(found), len(cases)
-    progress("cases", len(found) / total)
+
+    def under_way() -> None:
+        progress(Stage("", "case", min(len(found) + 1, total), total), 0.0)
+
+    under_way()
     left = [case for key, case in cases.items() if key not in found]
     for result in computed(left, compute, processes=processes, scheduler=scheduler):
         if not result.error:
             store.save(result)
         found[result.key] = result
-        progress("cases", len(found) / total)
+        under_way()
         if told is not None:
             told(cases[result.key], result, len(found), total)
     results = tuple(found[case.key] for case in plan.cases)
-    return StudyResult(study.title, plan, results, reused, round(time.monotonic() - start, 3))
+    seconds = round(time.monotonic() - start, 3)
+    return StudyResult(study.title, plan, results, reused, seconds, study.quick)
 
 
 def write_study(
@@ -156,6 +162,7 @@ def manifest(study: StudyFile, plan: Plan) -> dict:
             if path := getattr(source, "path", None):
                 files[str(path)] = source.sha256
     return {
+        "quick": study.quick,
         "study": study.model_dump(mode="json"),
         "sha256": files,
         "cases": [case.key for case in plan.cases],

@@ -20,6 +20,7 @@ from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable, Hours
 from scenes.job.operation import read_operation
 from scenes.job.options import RoomOptions
+from scenes.quick import ROOM, picks
 from scenes.toml_file import read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
@@ -103,6 +104,7 @@ class StudyFile(_Table):
     operation: Path | None = None  # control, gains, air, set points: as for `cfs run`
     auto: AutoTable = AutoTable()
     options: OptionsTable = OptionsTable()
+    quick: bool = False  # a first look: what the options do not say is chosen by `scenes.quick`
 
     @model_validator(mode="after")
     def _no_twins(self) -> StudyFile:
@@ -129,11 +131,14 @@ def _unique(key: str, values) -> None:
         seen.add(value)
 
 
-def read_study(path: Path, *, automatic: bool = False, **auto: str) -> StudyFile:
+def read_study(
+    path: Path, *, automatic: bool = False, quick: bool = False, **auto: str
+) -> StudyFile:
     """The study of a TOML file, its paths made absolute and every entry named.
 
     Args:
         automatic: `auto` in place of the file's methods.
+        quick: as if the file said so.
         auto: `time_budget`, `dgp_error` in place of those in the file's `[auto]`.
 
     Raises: `DataError` naming the file and the key.
@@ -142,9 +147,15 @@ def read_study(path: Path, *, automatic: bool = False, **auto: str) -> StudyFile
     _name_entries(table)
     if automatic:
         table["methods"] = ["auto"]
+    if quick:
+        table["quick"] = True
     if auto:
         table["auto"] = table.get("auto", {}) | auto
-    return _with_places(validated(StudyFile, table, path), path)
+    study = validated(StudyFile, table, path)
+    if study.quick:
+        chosen = picks(ROOM, study.options.model_fields_set)
+        study = study.model_copy(update={"options": study.options.model_copy(update=chosen)})
+    return _with_places(study, path)
 
 
 def _name_entries(table: dict) -> None:

@@ -10,6 +10,7 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
+from scenes.quick import NOTE
 from scenes.report import page as run_page
 from scenes.report import tables
 from scenes.report.names import glossary
@@ -83,6 +84,7 @@ def facts(study: StudyResult) -> tuple[tuple[str, str], ...]:
         return ", ".join(values) if len(values) <= 4 else f"{len(values)}"
 
     return (
+        *([("Run", NOTE)] if study.quick else []),
         ("Cases", f"{len(cases)}" + (f", {study.failed} failed" if study.failed else "")),
         ("Rooms", named(c.place for c in cases)),
         ("Systems", named(c.system for c in cases)),

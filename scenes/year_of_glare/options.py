@@ -31,3 +31,4 @@ class YearOptions:
     worst: int = 3  # pictures of each view's worst hours
     hdr: bool = False  # the pictures as .hdr too
     seed: int = 0
+    quick: bool = False  # said in the results; what it chooses is in `scenes.quick`

@@ -118,6 +118,7 @@ def write_summary(year: Year, rows: list[dict[str, object]], folder: Path) -> pd
     write_table(table, folder / "views.csv", index=False)
     options = year.options
     manifest = {
+        "quick": options.quick,
         "room": year.room,
         "options": {name: _plain(getattr(options, name)) for name in options.__slots__},
         "inputs": year.digest,

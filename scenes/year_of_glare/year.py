@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.ifc.corrections import corrections_file
-from bim.read_ifc import read_ifc
+from bim.read_ifc import STAGES, read_ifc
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import AnnualGlare, kept_glare
@@ -27,7 +27,7 @@ from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.metrics.schedules import working_hours
-from mitsuba_cfs.progress import Progress, part, silent, staged
+from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
@@ -38,7 +38,7 @@ from scenes.year_of_glare.files import YearFiles, read_files
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
 
-TRACING = {"daylight": (0.0, 0.1), "pictures": (0.1, 0.3)}  # shares of a view's time
+TRACING = {"daylight": 1.0, "view matrices": 2.0}  # shares of the time
 DARK = 0.0  # DGP of the hours of use without sun, for the share of hours
 
 
@@ -78,8 +78,8 @@ def read_year(
     files = files or read_files(options)
     system, weather = files.system, files.weather
     progress("inputs", 0.1)
-    steps = part(progress, 0.1, 0.6, "inputs")
-    building = read_ifc(options.building, join=options.join, progress=steps)
+    reading = summed(part(progress, 0.1, 0.6), "inputs", STAGES)
+    building = read_ifc(options.building, join=options.join, progress=reading)
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     views = chosen_views(space, options)
@@ -126,22 +126,21 @@ def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[
     )
     times = year.weather.midpoints[year.sky.lit]
     for number, named in enumerate(year.views):
-        label = f"{named.name} ({number + 1} of {len(year.views)})"
+        steps = item(progress, "view", number + 1, len(year.views), named.name, whole=True)
         start = time.monotonic()
         text = f"{year.digest} {format_view(named.view)} {named.view.width}"
         keep = kept / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npy"
         found = kept_glare(keep, len(times)) if keep.is_file() else None
-        traced = traced.seen_from(named.view, staged(progress, TRACING, label))
+        tracing = summed(part(steps, 0.0, 0.3), named.name, TRACING)
+        traced = traced.seen_from(named.view, tracing)
         filled = PhaseSystems(traced, [[year.optics]] * len(traced.scene.groups))
         light = filled.light(year.sky)
-        found = found or glare(
-            light, options.metric, keep=keep, progress=part(progress, 0.3, 1.0, label)
-        )
+        found = found or glare(light, options.metric, keep=keep, progress=part(steps, 0.3, 1.0))
         table = pd.DataFrame(
             {name: getattr(found, name) for name in FIGURES}, index=times.rename("time")
         )
         shown = _pictures(light, year, found)
-        progress(label, 1.0)
+        steps("", 1.0)
         yield ViewYear(named, table, shown, time.monotonic() - start)
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from scenes.cli import run
+from scenes.quick import NOTE
 
 DEMO = Path(str(files("scenes") / "demo"))
 OFFICE = DEMO / "office.ifc"
@@ -53,6 +54,12 @@ def test_files_of_a_run(results):
     manifest = json.loads((results / "run.json").read_text())
     assert manifest["inputs"]["weather"]["sha256"] and manifest["seed"] == 0
     assert not list(results.parent.glob(".*")), "temporary folders are gone"
+
+
+def test_a_quick_run_says_so_at_the_head_of_its_results(results):
+    assert next(iter(json.loads((results / "run.json").read_text()).items())) == ("quick", True)
+    report = (results / "report.html").read_text()
+    assert NOTE in report[: report.index("<main>")]
 
 
 def test_numbers_hang_together(results):

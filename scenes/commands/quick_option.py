@@ -1,0 +1,20 @@
+"""The option `--quick` of the commands that trace, and which options the user gave beside it."""
+
+from __future__ import annotations
+
+import click
+from click.core import ParameterSource
+
+quick_option = click.option(
+    "--quick", is_flag=True, help="A first look: few rays, small pictures, one hour."
+)
+
+
+def given() -> set[str]:
+    """Names of the parameters of the command under way that do not have their default."""
+    context = click.get_current_context()
+    return {
+        name
+        for name in context.params
+        if context.get_parameter_source(name) not in (ParameterSource.DEFAULT, None)
+    }

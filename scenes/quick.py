@@ -1,0 +1,31 @@
+"""What `--quick` chooses where the user does not: every number of a first look is stated here."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+NOTE = (
+    "A quick run: few rays, small pictures, one hour. For a first look; leave --quick away for "
+    "results to rely on."
+)
+
+ROOM = {  # of `scenes.job.options.RoomOptions`: `cfs run` and `cfs study`
+    "picture_count": 1,
+    "picture_size": 200,
+    "picture_samples": 4,
+    "sky_subdivision": 2,
+    "sensor_spacing": 1.0,
+    "sensor_samples": 2_048,
+    "patch_samples": 1_024,
+    "sun_points": 128,
+    "path_samples": 128,
+    "heat_step_s": 3600.0,
+}
+VIEWS = {"size": 200, "samples": 8, "worst": 1}  # of `scenes.year_of_glare.options.YearOptions`
+HEAT = {"patch_samples": 1_024, "sensor_samples": 2_048}  # of `[trace]` in `cfs thermal`
+PV = {"samples": 512}  # of `scenes.photovoltaics.study.run_pv`
+
+
+def picks(table: Mapping[str, object], given: Collection[str]) -> dict:
+    """The choices of a table for options that the user has not given."""
+    return {name: value for name, value in table.items() if name not in given}
