@@ -14,7 +14,6 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.parameters import FILE, IFC_FILE
-from scenes.commands.progress_bar import ProgressBar
 from scenes.commands.room_options import join_option
 from scenes.result_folder import ResultFolder
 
@@ -45,6 +44,7 @@ def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
     from rich.console import Console
 
     from bim.read_ifc import read_ifc
+    from scenes.commands.progress_bar import ProgressBar
 
     with ProgressBar() as progress:
         read = read_ifc(building, join=join, progress=progress)
@@ -169,6 +169,7 @@ def export(
     from bim.to_gltf import write_gltf
     from bim.to_mitsuba import write_mitsuba
     from bim.to_radiance import write_radiance
+    from scenes.commands.progress_bar import ProgressBar
     from scenes.job.inputs import named_spaces
 
     writers = {"--radiance": write_radiance, "--mitsuba": write_mitsuba}
@@ -226,6 +227,7 @@ def survey(files: tuple[Path, ...], out: Path | None) -> None:
         check_file(out, field="--markdown", inputs=files)
     from bim.ifc.survey import markdown
     from bim.ifc.survey import survey as surveyed
+    from scenes.commands.progress_bar import ProgressBar
 
     rows = []
     with ProgressBar() as progress:
