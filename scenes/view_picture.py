@@ -15,6 +15,7 @@ from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
@@ -22,6 +23,7 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent, summed
 from mitsuba_cfs.sky.annual import annual_sky
 from scenes.job.drawn_shades import traced_building
+from scenes.job.holes import hole_notes
 from scenes.job.inputs import chosen_spaces
 from scenes.job.windows import everywhere
 from scenes.picture_files import PictureFiles, read_files
@@ -74,7 +76,7 @@ def room_picture(
     luminance = light.picture(0, progress=part(progress, 0.4, 1.0, "picture"))
     return RoomPicture(
         luminance, view, space.label, weather.midpoints[hour],
-        (*system.notes, *weather.notes),
+        (*system.notes, *weather.notes, *hole_notes(space, cache=MatrixCache.of_user())),
     )  # fmt: skip
 
 

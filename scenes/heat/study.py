@@ -20,6 +20,7 @@ from bim.to_thermal import (
 )
 from mitsuba_cfs import variants
 from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, item, part
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
@@ -31,6 +32,7 @@ from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_sola
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.drawn_shades import traced_building
+from scenes.job.holes import hole_notes
 from scenes.job.inputs import System, chosen_spaces, named_spaces
 from scenes.job.thermal import COMPILING, climate
 from scenes.job.thermal_system import ThermalSystem
@@ -100,6 +102,8 @@ def run_study(
         steps = item(progress, "room", i + 1, len(spaces), zone.zone.name)
         room = ready_room(study, building, space, zone, systems, thermals, weather, skies, steps)
         ready.append(room)
+        if space.windows:
+            notes |= dict.fromkeys(hole_notes(space, cache=MatrixCache.of_user()))
         if room.radiant is None and study.trace.view_factors:
             notes[f"{zone.zone.name}: is not closed, its longwave goes through a mean star."] = None
     results = balances(study, ready, weather, progress)

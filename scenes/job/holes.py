@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from bim.model import Problem, Space
+from bim.sensors import sensor_grid, view_point
+from bim.to_tracer import interior_surfaces, window_groups
+from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.progress import Progress
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.escape import SIDES, Escape, escaped_view
-from scenes.job.options import RoomOptions
 
+SPACING, WORK_PLANE = 1.0, 0.8  # of the sensors that are looked from [m]
+EYE_PIXELS = 64  # of the eye's view, of which only place and direction count
 MOST_LOST = 0.01  # of a sensor's view, before it is a problem
 WHERE = {"floor": "through the floor", "ceiling": "through the ceiling"}
 
@@ -20,19 +25,41 @@ WHERE = {"floor": "through the floor", "ceiling": "through the ceiling"}
 def hole_problems(
     space: Space,
     scene: DaylightScene,
-    options: RoomOptions,
-    cache: MatrixCache | None,
-    progress: Progress,
+    *,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
+    progress: Progress = silent,
 ) -> tuple[Problem, ...]:
-    """A problem where a sensor loses more than 1 % of its view, direct and reflected."""
+    """A problem where a sensor loses more than 1 % of its view, direct and reflected.
+
+    Args: scene: the room with its sensors and an eye.
+    """
     points, directions = scene.sensors()
     found = escaped_view(
         scene.interior, scene.groups, points, directions,
-        seed=options.seed, progress=progress, cache=cache,
+        seed=seed, progress=progress, cache=cache,
     )  # fmt: skip
     if not (found.share - 2 * found.error > MOST_LOST).any():
         return ()
     return (_problem(space, points, found),)
+
+
+def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None) -> list[str]:
+    """The problems of a room's holes as sentences, where no scene with sensors is at hand."""
+    try:
+        points, _ = sensor_grid(space, spacing=SPACING, height=WORK_PLANE, margin=SPACING / 2)
+    except ValueError:  # too low or too narrow for a work plane: the eye alone
+        points = np.empty((0, 3))
+    scene = DaylightScene(
+        interior_surfaces(space, "visible"),
+        Surfaces.none(),
+        window_groups(space),
+        points,
+        np.tile([0.0, 0.0, 1.0], (len(points), 1)),
+        fisheye(*view_point(space), EYE_PIXELS),
+    )
+    found = hole_problems(space, scene, seed=seed, cache=cache)
+    return [f"{problem.what}: {problem.consequence}" for problem in found]
 
 
 def _problem(space: Space, points: np.ndarray, found: Escape) -> Problem:

@@ -207,7 +207,7 @@ class _Room:
 
     def holes(self) -> tuple[Problem, ...]:
         """What of the light leaves through no window."""
-        return hole_problems(self.space, self.scene, self.options, self.cache, silent)
+        return hole_problems(self.space, self.scene, seed=self.options.seed, cache=self.cache)
 
     def annual_glare(self) -> pd.DataFrame:
         """Glare of every hour."""

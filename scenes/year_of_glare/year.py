@@ -32,6 +32,7 @@ from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
 from scenes.job.drawn_shades import traced_building
+from scenes.job.holes import hole_notes
 from scenes.job.inputs import chosen_spaces, sha256
 from scenes.job.windows import everywhere
 from scenes.year_of_glare.files import YearFiles, read_files
@@ -105,7 +106,7 @@ def read_year(
     return Year(
         options, space.label, views, scene,
         BsdfOptics(system.visible, system.fine), weather, sky, used, digest,
-        (*system.notes, *weather.notes),
+        (*system.notes, *weather.notes, *hole_notes(space, cache=MatrixCache.of_user())),
     )  # fmt: skip
 
 

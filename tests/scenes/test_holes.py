@@ -14,7 +14,7 @@ from scenes.job.daylight import room_scene
 from scenes.job.holes import hole_problems, moved
 from scenes.job.inputs import read_system
 from scenes.job.options import RoomOptions
-from scenes.job.windows import everywhere
+from scenes.job.windows import everywhere, room_windows
 
 pytestmark = pytest.mark.usefixtures("variant")
 BLIND = OFFICE.parent / "venetian_blind.xml"
@@ -28,13 +28,14 @@ def problems_of(cache=None, *, missing: str = ""):
     """The problems of the box room, without the wall `missing`."""
     building = shoebox()
     (space,) = building.spaces
-    scene = room_scene(building, space, everywhere(space, read_system(BLIND)), RoomOptions())
+    windows = room_windows(space, everywhere(space, read_system(BLIND)))
+    scene = room_scene(building, space, windows, RoomOptions())
     if missing:
         room = scene.interior
         keep = room.surface != [face.name for face in space.faces].index(missing)
         parts = (part[keep] for part in (room.triangles, room.reflectance, room.surface))
         scene = replace(scene, interior=Surfaces(*parts))
-    return space, hole_problems(space, scene, RoomOptions(), cache, quiet)
+    return space, hole_problems(space, scene, cache=cache, progress=quiet)
 
 
 def test_a_closed_room_has_no_problem():

@@ -7,28 +7,44 @@ import pytest
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.cli import run as main
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.job import daylight
+from scenes.job import daylight, holes
 
 pytestmark = pytest.mark.usefixtures("variant")
 
 
-def test_a_run_says_that_a_room_is_open(tmp_path, monkeypatch, capsys):
-    """The biggest triangle of the room is left out of what is traced."""
+@pytest.fixture
+def holed(monkeypatch, tmp_path) -> list[str]:
+    """The biggest triangle of every room is left out of what is traced; the demo's files."""
     whole = daylight.interior_surfaces
 
-    def holed(space, band="visible"):
+    def without(space, band="visible"):
         found = whole(space, band)
         keep = found.areas < found.areas.max() - 1e-9
         parts = (part[keep] for part in (found.triangles, found.reflectance, found.surface))
         return Surfaces(*parts, found.names)
 
-    monkeypatch.setattr(daylight, "interior_surfaces", holed)
+    for module in (daylight, holes):
+        monkeypatch.setattr(module, "interior_surfaces", without)
     monkeypatch.setenv("CFS_CACHE", str(tmp_path / "cache"))
+    return [str(OFFICE), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND), "--space", "A"]
+
+
+def test_a_run_says_that_a_room_is_open(tmp_path, holed, capsys):
     out = tmp_path / "out"
-    files = [str(OFFICE), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND)]
-    assert main(["run", *files, "--space", "A", "--quick", "--out", str(out)]) == 0
+    assert main(["run", *holed, "--quick", "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "room A is open: up to" in said
+    assert "is open: up to" in said
     for file in ("problems.csv", "report.html"):
         text = (out / file).read_text()
-        assert "room A is open: up to" in text and "this light is lost" in text
+        assert "is open: up to" in text and "this light is lost" in text
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["picture", "--at", "06-21 12:00", "--size", "32"], ["dgp", "--size", "32", "--quick"]],
+    ids=lambda words: words[0],
+)
+def test_other_commands_that_trace_say_so_too(tmp_path, holed, capsys, command):
+    out = tmp_path / ("out.png" if command[0] == "picture" else "out")
+    assert main([command[0], *holed, *command[1:], "--out", str(out)]) == 0
+    assert "note: room A South office is open: up to" in capsys.readouterr().out
