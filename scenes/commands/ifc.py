@@ -112,13 +112,14 @@ def attach(
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
     # g may be a number, which no file is; the building may be written back
     check_file(out, inputs=[bsdf, None if g_value is None else Path(g_value)])
-    from bim.ifc.attach import attach as attach_to_ifc
-    from bim.ifc.targets import Targets
     from scenes.job.state_to_attach import state_to_attach
 
     one, notes = state_to_attach(
         bsdf, name=state, u_value=u_value, g_value=g_value, copy_bsdf=not reference
     )
+    from bim.ifc.attach import attach as attach_to_ifc
+    from bim.ifc.targets import Targets
+
     count = attach_to_ifc(
         building, out, one, Targets(**chosen), bsdf_reference=bsdf if reference else None
     )

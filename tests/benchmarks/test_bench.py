@@ -81,7 +81,7 @@ def test_only_peers_missing_is_a_failure(registry, capsys):
 def test_unknown_name_and_folder_are_usage_errors(registry, capsys, tmp_path):
     assert cli.run(["bench", "--only", "three"]) == 2
     assert "there are one, two" in capsys.readouterr().err
-    assert cli.run(["bench", "--json", str(tmp_path / "no" / "x.json")]) == 2
+    assert cli.run(["bench", "--json", str(tmp_path / "no" / "x.json")]) == 1
 
 
 def test_without_pyradiance_the_peer_is_missing(monkeypatch):

@@ -19,7 +19,6 @@ OUTSIDE = {
 KINDS = {
     "fisheye": "-vta -vh 180 -vv 180",
     "perspective": "-vtv -vh 60 -vv 60",
-    "parallel": "-vtl -vh 2 -vv 2",
 }
 
 

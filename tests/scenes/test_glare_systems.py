@@ -50,7 +50,7 @@ def test_paths_draw_what_the_system_gives(closed_blind):
     import drjit as dr
     import mitsuba as mi
 
-    system = closed_blind[0].system
+    system = closed_blind[0].paths
     si = dr.zeros(mi.SurfaceInteraction3f, POINTS)
     si.n = mi.Normal3f(0, -1, 0)  # a window in a wall: its normal outwards
     si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 0, 1), mi.Vector3f(0, -1, 0))

@@ -121,7 +121,7 @@ def test_one_picture_is_the_brightest_hours() -> None:
 @pytest.fixture
 def three_rooms(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Rooms of which the third is alike to the first, each computed by a stub."""
-    rooms = [SimpleNamespace(guid=g, name=g.upper(), like="") for g in ("a", "b", "c")]
+    rooms = [SimpleNamespace(guid=g, label=g.upper(), like="") for g in ("a", "b", "c")]
     a, b, c = rooms
     monkeypatch.setattr(job, "template_rooms", lambda spaces: [(a, c), (b,)])
     monkeypatch.setattr(job, "same_systems", lambda *_: False)
@@ -154,7 +154,7 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, told):
+    def half(options, progress, files, *, told):
         told("the first room")
         raise DataError("the second failed")
 

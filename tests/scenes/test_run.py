@@ -169,7 +169,6 @@ def test_bad_files_give_one_line_that_names_them(fault, tmp_path, capsys):
     ("options", "word"),
     [
         (["--space", "Nowhere"], "Nowhere"),
-        (["--u", "9"], "U"),
         (["--g", "0.01"], "g"),
         (["--picture", "noon"], "noon"),
         (["--height", "4.5"], "4.5"),
@@ -183,6 +182,11 @@ def test_bad_options_give_one_line(options, word, tmp_path, capsys):
     errors = [s for s in capsys.readouterr().err.splitlines() if s.startswith("error")]
     assert len(errors) == 1 and word in errors[0], errors
     assert not (tmp_path / "out").exists()
+
+
+def test_an_impossible_u_value_is_wrong_usage(tmp_path, capsys):
+    assert call(tmp_path / "out", *QUICK, "--u", "9") == 2
+    assert "'--u': 9.0 is not in the range" in capsys.readouterr().err
 
 
 def test_a_folder_that_cannot_be_written_is_found_before_the_work(tmp_path, capsys):
