@@ -60,7 +60,7 @@ def as_room(result: SpaceResult, space: Space) -> SpaceResult:
     daylight, glare = result.daylight, result.glare
     table = daylight.sensor_metrics.copy()
     table[["x", "y", "z"]] += shift
-    name = result.space.name or result.space.guid
+    name = result.space.label
     place = tuple((np.asarray(glare.view.position) + shift).tolist())
     return replace(
         result,

@@ -70,7 +70,7 @@ def _problem(space: Space, points: np.ndarray, found: Escape) -> Problem:
     side = int(np.argmax(found.by_side.sum(axis=0)))
     towards = WHERE.get(SIDES[side], f"to the {SIDES[side]}")
     what = (
-        f"room {space.name or space.guid} is open: up to {100 * found.share[worst]:.0f} % of what "
+        f"room {space.label} is open: up to {100 * found.share[worst]:.0f} % of what "
         f"a sensor sees is neither wall nor window ({name} at {_place(points[worst])}; "
         f"{count} of {sensors} sensors above {100 * MOST_LOST:g} %); most of it leaves "
         f"{towards} near {_place(found.place[side])}"
@@ -87,5 +87,5 @@ def _place(point: np.ndarray) -> str:
 
 def moved(problem: Problem, space: Space, like: str) -> Problem:
     """The problem of a room as that of another one alike."""
-    what = f"room {space.name or space.guid} is like room {like}: {problem.what}"
+    what = f"room {space.label} is like room {like}: {problem.what}"
     return replace(problem, where=space.guid, what=what)

@@ -41,7 +41,7 @@ def test_a_run_says_that_a_room_is_open(tmp_path, holed, capsys):
 
 @pytest.mark.parametrize(
     "command",
-    [["picture", "--at", "06-21 12:00", "--size", "32"], ["dgp", "--size", "32", "--quick"]],
+    [["picture", "--at", "06-21 12:00", "--size", "32"], ["dgp", "--size", "64", "--quick"]],
     ids=lambda words: words[0],
 )
 def test_other_commands_that_trace_say_so_too(tmp_path, holed, capsys, command):
