@@ -15,9 +15,7 @@ from mitsuba_cfs.sky.weather import Weather
 FloatArray = NDArray[np.float64]
 
 CLEAR_SHARE = 0.3  # of the days, the clearest: their radiation lies evenly about noon
-NOTED_H = (
-    0.4  # offset of its centre from noon; 27 sound files have 0.06 at most, 0.13 without global
-)
+NOTED_H = 0.4  # offset of its centre from noon; 27 sound files have 0.13 at most
 REFUSED_H = 1.5
 FEW_DAYS, MANY_DAYS = 5, 30  # with light: too few for any judgement, enough for a note
 FAR_ZONE_H = 3.5  # of a zone from its longitude: more than in any country (west China: 3.1)
