@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.building import read_ifc
 from bim.model import Building, Space
-from bim.read_ifc import read_ifc
 from bim.to_thermal import (
     ThermalRoom,
     coupled_rooms,

@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 
+from bim.ifc.building import STAGES, read_ifc
 from bim.model import Building, Problem, Space
-from bim.read_ifc import STAGES, read_ifc
 from bim.templates import template_rooms
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import CfsError, DataError

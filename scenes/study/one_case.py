@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.building import read_ifc
 from bim.model import Building, Space
-from bim.read_ifc import read_ifc
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from bim.ifc.building import read_ifc
 from bim.model import Building, Space
-from bim.read_ifc import read_ifc
 from scenes.heat.box import box_building
 from scenes.job.inputs import chosen_spaces
 from scenes.job.options import RoomOptions

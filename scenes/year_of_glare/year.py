@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.building import STAGES, read_ifc
 from bim.ifc.corrections import corrections_file
-from bim.read_ifc import STAGES, read_ifc
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import AnnualGlare, kept_glare
