@@ -65,13 +65,13 @@ class OperationResult:
 
 
 @dataclass(frozen=True, slots=True)
-class SpaceResult:
+class RoomYear:
     """Everything computed for one room."""
 
     space: Space
     daylight: DaylightResult
     glare: GlareResults
-    thermal: ThermalResult
+    heat: ThermalResult
     seconds: dict[str, float]  # by stage
     operation: OperationResult | None = None  # None: one state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
@@ -87,7 +87,7 @@ class RunResult:
     building: Building
     times: pd.DatetimeIndex  # [H] middle of each interval, local standard time
     sun: NDArray[np.float64]  # [H, 3] direction to the sun
-    spaces: tuple[SpaceResult, ...]
+    spaces: tuple[RoomYear, ...]
     problems: tuple[Problem, ...]
     manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know

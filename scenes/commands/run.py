@@ -116,7 +116,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
 def summary_line(room) -> str:
     """One line of headline figures of a room."""
     worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
-    daylight, heat = room.daylight.room_metrics, room.thermal
+    daylight, heat = room.daylight.room_metrics, room.heat
     direct = f"ASE {daylight['ase1000_250']:.0f} %, " if "ase1000_250" in daylight else ""
     loads = ""
     if room.operation is not None:

@@ -42,7 +42,7 @@ from scenes.job.picture_hours import wanted_hours
 from scenes.job.thermal import room_thermal
 from scenes.job.thermal_system import ThermalSystem, state_of, thermal_system
 from scenes.job.windows import States, room_windows
-from scenes.results import DaylightResult, GlareResults, OperationResult, SpaceResult, ThermalResult
+from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYear, ThermalResult
 from thermal.balance import ZoneResult
 from thermal.zone import Zone
 
@@ -69,7 +69,7 @@ def compute_room(
     pictures: bool = True,
     rate: tuple[str, NDArray[np.int64]] | None = None,
     progress: Progress = silent,
-) -> SpaceResult:
+) -> RoomYear:
     """Daylight, glare, temperatures and comfort of one room, with one method.
 
     A Mitsuba variant must be active (`mitsuba_cfs.variants.activate()`).
@@ -106,9 +106,7 @@ def compute_room(
     dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
     heat, balance = room.timed("thermal", lambda: room.thermal(daylight))
     ran = None if operation is None else room.operation_result(balance)
-    return SpaceResult(
-        space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes
-    )
+    return RoomYear(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes)
 
 
 class _Room:

@@ -30,15 +30,15 @@ from scenes.job.room import compute_room, skies_for
 from scenes.job.thermal_system import thermal_system
 from scenes.job.windows import States, everywhere
 from scenes.quick import NOTE
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
 
-Told = Callable[[SpaceResult], None]  # called with each room as soon as it is computed
+Told = Callable[[RoomYear], None]  # called with each room as soon as it is computed
 
 
-def untold(room: SpaceResult) -> None:
+def untold(room: RoomYear) -> None:
     """Say nothing of a room before all are computed."""
 
 
@@ -145,9 +145,9 @@ def _rooms(
     options: JobOptions,
     progress: Progress,
     told: Told = untold,
-) -> tuple[list[SpaceResult], list[Problem], list[str]]:
+) -> tuple[list[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
-    found: dict[str, SpaceResult] = {}
+    found: dict[str, RoomYear] = {}
     problems, notes = [], []
     cache = MatrixCache.of_user() if options.cache else None
     alike = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
@@ -194,7 +194,7 @@ def _manifest(
     variant: str,
     inputs: JobInputs,
     used: list[System],
-    results: list[SpaceResult],
+    results: list[RoomYear],
 ) -> dict:
     """What a reader needs to make the same numbers again."""
     files = {"building": options.building, "weather": options.weather}
