@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from bim.model import Building, Problem, Space
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.glare import glare
+from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
@@ -215,7 +215,9 @@ class _Room:
         """A glare metric in some hours of the year with the sun up [n]."""
         columns = np.searchsorted(self.skies.lit, hours)
         steps = part(self.progress, 0.0, 1.0, "annual glare")
-        return glare(self.pictured, metric, self.lit_state, hours=columns, progress=steps).dgp
+        return hourly_glare(
+            self.pictured, metric, self.lit_state, hours=columns, progress=steps
+        ).dgp
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
