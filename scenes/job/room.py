@@ -4,7 +4,6 @@ weather = read_weather(Path("city.epw"))
 system = read_system(Path("blind.xml"))                 # scenes.job.inputs
 building = read_ifc("house.ifc")                        # or bim.shoebox.shoebox(...)
 space = building.spaces[0]
-variants.activate()
 result = compute_room(building, space, everywhere(space, system), weather, RoomOptions())
 """
 
@@ -71,8 +70,6 @@ def compute_room(
     progress: Progress = silent,
 ) -> RoomYear:
     """Daylight, glare, temperatures and comfort of one room, with one method.
-
-    A Mitsuba variant must be active (`mitsuba_cfs.variants.activate()`).
 
     Args:
         building: what stands around the room is its `elements`.
