@@ -120,7 +120,7 @@ class PatchSky:
         dr.scatter_add(result, mi.Float64(beta), slot, active)
 
 
-class Room:
+class LitRoom:
     """The scenes on both sides of the windows, and the systems in them."""
 
     def __init__(
