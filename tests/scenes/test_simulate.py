@@ -130,7 +130,7 @@ def test_the_carpet_shows_the_brightest_hour_at_its_place(year) -> None:
     grid, mean = np.asarray(image.get_array()), year.hours["illuminance_lx"]
     row, day = np.unravel_index(np.argmax(grid), grid.shape)
     when = mean.idxmax()
-    assert (23 - row, day + 1) == (when.hour, when.dayofyear)
+    assert (23 - row, day + 1) == (when.hour, when.day_of_year)
     pyplot.close("all")
 
 
@@ -161,7 +161,7 @@ def test_a_file_that_is_not_there_is_one_line(read, tmp_path) -> None:
 
 
 def test_a_room_that_is_not_there_is_one_line() -> None:
-    with pytest.raises(DataError, match=r"office\.ifc: space: no space 'C'; there are: A South"):
+    with pytest.raises(DataError, match=r"office\.ifc: space: no space 'C'; there are: B East"):
         cfs.read_building(OFFICE).room("C")
 
 
