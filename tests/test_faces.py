@@ -101,13 +101,13 @@ def test_a_planted_import_from_a_face_is_found() -> None:
     assert from_faces("def f():\n    from mitsuba_cfs import View, variants") == ["View"]
 
 
-@pytest.mark.parametrize("suffix", ["xml", "klems"])
-def test_the_variant_is_chosen_by_itself(suffix: str) -> None:
+@pytest.mark.parametrize("first", ["optics", "matrices"])
+def test_the_variant_is_chosen_by_itself(first: str) -> None:
     """At the first use, whatever is first: matrices of a scene, or a system's optics."""
-    first = {
-        "xml": "light = cfs.PathSystems(scene, [[optics]]).room([0])",
-        "klems": "traced = cfs.PhaseScene(scene, few).sensors.values; assert traced.max() > 0",
-    }[suffix]
+    use = {
+        "optics": "room = cfs.PathSystems(scene, [[optics]]).room([0])",
+        "matrices": "traced = cfs.PhaseScene(scene, few).sensors.values; assert traced.max() > 0",
+    }[first]
     code = f"""
 import numpy as np
 import mitsuba
@@ -123,7 +123,7 @@ scene = cfs.DaylightScene(
 )
 few = cfs.Sampling(sensor_samples=256, patch_samples=64)
 assert mitsuba.variant() is None
-{first}
+{use}
 assert mitsuba.variant() is not None
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
