@@ -8,11 +8,13 @@ one closed surface round the room's air: the room and the recesses of its window
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.names import found_by_name, label_of
+from mitsuba_cfs.errors import DataError
 
 FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "reveal")
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
@@ -203,6 +205,7 @@ class Building:
     latitude_deg: float | None = None
     longitude_deg: float | None = None  # east positive
     elevation: float = 0.0  # above the sea [m]
+    file: Path | None = None  # that it was read from
 
     @property
     def windows(self) -> tuple[Window, ...]:
@@ -212,6 +215,24 @@ class Building:
     def space(self, name_or_guid: str) -> Space:
         """The space of that GUID, number, name or both; see `bim.names.found_by_name`."""
         return found_by_name(self.spaces, name_or_guid, "space")
+
+    def room(self, name_or_guid: str) -> Room:
+        """The space of that GUID, number, name or both, together with its building.
+
+        Raises: `DataError` that lists the nearest names.
+        """
+        try:
+            return Room(self, self.space(name_or_guid))
+        except (KeyError, ValueError) as error:
+            raise DataError(str(error.args[0]), file=self.file, field="space") from error
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """A space and the building that it is in, whose elements shade it."""
+
+    building: Building
+    space: Space
 
 
 def set_normal_and_area(surface: Face | Window) -> None:

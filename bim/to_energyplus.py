@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
+from os import PathLike
 
 import numpy as np
 import shapely
@@ -28,7 +28,7 @@ DEFAULT_U, DEFAULT_G = 1.3, 0.6  # double glazing with low emissivity [W/(m2 K)]
 
 def write_epjson(
     building: Building,
-    path: str | Path,
+    path: str | PathLike[str],
     *,
     spaces: Sequence[Space] | None = None,
     u_value: float | None = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from os import PathLike
 
 import numpy as np
 import trimesh
@@ -26,7 +26,7 @@ COLOURS = {  # red, green, blue, opacity, 0 to 255
 TO_GLTF = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
-def write_gltf(building: Building, path: str | Path, *, outdoors: bool = True) -> None:
+def write_gltf(building: Building, path: str | PathLike[str], *, outdoors: bool = True) -> None:
     """Write a binary glTF (.glb): one node for each kind of face of each room, normals inwards."""
     scene = trimesh.Scene()
     for space in building.spaces:

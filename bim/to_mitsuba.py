@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,7 +21,7 @@ GLASS_INDEX = 1.52  # refractive index of the plain panes that the glass is draw
 
 
 def write_mitsuba(
-    space: Space, building: Building, folder: str | Path, *, band: str = "visible"
+    space: Space, building: Building, folder: str | PathLike[str], *, band: str = "visible"
 ) -> Path:
     """Write `scene.xml` and its meshes into a folder; the path of the XML.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,7 @@ class RadianceFiles:
 def write_radiance(
     space: Space,
     building: Building,
-    folder: str | Path,
+    folder: str | PathLike[str],
     *,
     band: str = "visible",
     sky_division: int = 1,

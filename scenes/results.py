@@ -33,6 +33,22 @@ class DaylightResult:
     sensor_metrics: pd.DataFrame  # by sensor: x, y, z, da300, cda300, udi..., daylight_factor
     room_metrics: dict[str, float]  # sda, ase, en17037..., by name; percentages as 0..100
 
+    @property
+    def sda(self) -> float:
+        """Spatial daylight autonomy sDA300/50% (LM-83) [%]."""
+        return float(self.room_metrics["sda300_50"])
+
+    @property
+    def da(self) -> float:
+        """Daylight autonomy at 300 lx, the mean of the sensors [%]."""
+        return float(self.room_metrics["da300"])
+
+    @property
+    def ase(self) -> float | None:
+        """Annual sunlight exposure ASE1000/250h (LM-83) [%]; None where the sun is not apart."""
+        share = self.room_metrics.get("ase1000_250")
+        return None if share is None else float(share)
+
 
 @dataclass(frozen=True, slots=True)
 class GlareResults:
@@ -40,6 +56,16 @@ class GlareResults:
 
     view: View
     pictures: tuple[LuminancePicture, ...]
+
+    @property
+    def worst(self) -> float:
+        """The highest DGP of the pictures.
+
+        Raises: `ValueError` where none was made.
+        """
+        if not self.pictures:
+            raise ValueError("no picture was made, so none is the worst")
+        return max(picture.glare["dgp"] for picture in self.pictures)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +79,21 @@ class ThermalResult:
     # one entry a system: its name; u_value, g_value, transmittances, ... at normal incidence
     fenestration: tuple[dict[str, float | str], ...]
 
+    @property
+    def air_c(self) -> pd.Series:
+        """Temperature of the air of every hour [H] [degC]."""
+        return self.temperatures["air_c"]
+
+    @property
+    def operative_c(self) -> pd.Series:
+        """Operative temperature of every hour [H] [degC]."""
+        return self.temperatures["operative_c"]
+
+    @property
+    def comfortable(self) -> float:
+        """Share of the occupied hours within the 80 % limits of ASHRAE 55 [%]."""
+        return float(self.comfort_summary["within_80"])
+
 
 @dataclass(frozen=True, slots=True)
 class OperationResult:
@@ -65,19 +106,36 @@ class OperationResult:
 
 
 @dataclass(frozen=True, slots=True)
-class SpaceResult:
-    """Everything computed for one room."""
+class RoomYear:
+    """The year of one room: its daylight, glare, heat and operation."""
 
     space: Space
     daylight: DaylightResult
     glare: GlareResults
-    thermal: ThermalResult
+    heat: ThermalResult
     seconds: dict[str, float]  # by stage
     operation: OperationResult | None = None  # None: one state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: NDArray[np.float64] | None = None  # [n] of the metric and hours asked for
     problems: tuple[Problem, ...] = ()  # that tracing found
     like: str = ""  # name of the room alike that these results were computed for; "": this one
+
+    @property
+    def hours(self) -> pd.DataFrame:
+        """Every hour [H]: mean illuminance [lx], temperatures [degC], gains [W], comfort.
+
+        Shading state and loads are with them where the room is operated, glare where every hour
+        was rated.
+        """
+        heat = self.heat
+        mean = self.daylight.illuminance.mean(axis=1, dtype=float)
+        light = pd.DataFrame({"illuminance_lx": mean}, index=heat.temperatures.index)
+        tables = [light, heat.temperatures, heat.gains, heat.comfort]
+        if self.operation is not None:
+            tables.append(self.operation.hours)
+        if self.annual_glare is not None:
+            tables.append(self.annual_glare)
+        return pd.concat(tables, axis=1).rename_axis("time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +145,7 @@ class RunResult:
     building: Building
     times: pd.DatetimeIndex  # [H] middle of each interval, local standard time
     sun: NDArray[np.float64]  # [H, 3] direction to the sun
-    spaces: tuple[SpaceResult, ...]
+    spaces: tuple[RoomYear, ...]
     problems: tuple[Problem, ...]
     manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.read_ifc import STAGES, read_ifc
+from bim.ifc.building import STAGES, read_ifc
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants

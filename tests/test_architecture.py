@@ -40,7 +40,7 @@ SOLVERS = tuple(
         "by_name", "glare", "optics", "path_light", "phase_light", "phase_scene", "view_cache",
     )
 )  # fmt: skip
-IFC = ("bim/ifc/", "bim/read_ifc.py", "scenes/demo/")
+IFC = ("bim/ifc/", "scenes/demo/")
 PLOTTING = ("scenes/",)
 LIMITED = {
     "mitsuba": TRACING,

@@ -24,6 +24,7 @@ import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -124,7 +125,7 @@ def corrections_beside(model_path: str | Path, join: Sequence[str] = ()) -> Corr
     return replace(corrections, join=(*corrections.join, *groups))
 
 
-def read_corrections(path: str | Path) -> Corrections:
+def read_corrections(path: str | PathLike[str]) -> Corrections:
     """Corrections from a TOML file; `DataError` names the entry that is wrong."""
     path = Path(path)
     try:

@@ -7,6 +7,7 @@ import contextlib
 import re
 from collections.abc import Iterable
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -40,7 +41,7 @@ from thermal.gvalue import TYPICAL_SYSTEMS
 Entity = ifcopenshell.entity_instance
 
 
-def read_fenestration(path: str | Path) -> dict[str, tuple[ShadingState, ...]]:
+def read_fenestration(path: str | PathLike[str]) -> dict[str, tuple[ShadingState, ...]]:
     """Shading states that an IFC file holds for its windows, by GUID; see `read_states`."""
     return read_states(open_ifc(path), Path(path).parent, file=path)
 

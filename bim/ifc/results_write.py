@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
+from os import PathLike
 
 import ifcopenshell
 
@@ -19,9 +19,9 @@ Value = bool | int | float | str
 
 
 def write_results(
-    path: str | Path,
+    path: str | PathLike[str],
     results: Mapping[str, Mapping[str, Value]],
-    out: str | Path,
+    out: str | PathLike[str],
     *,
     set_name: str = SET_NAME,
     description: str = "Computed by mitsuba-cfs",

@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields
 from multiprocessing import get_context
 from pathlib import Path
 
+from bim.ifc.building import AGREES, read_ifc
 from bim.ifc.project import open_ifc
 from bim.model import Building, Space
-from bim.read_ifc import AGREES, read_ifc
 from bim.shell import open_edges
 from bim.to_energyplus import write_epjson
 from bim.to_gltf import write_gltf

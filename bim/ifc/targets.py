@@ -11,9 +11,9 @@ import ifcopenshell
 import ifcopenshell.util.element
 import numpy as np
 
+from bim.ifc.building import read_ifc
 from bim.model import Building, Window
 from bim.names import found_by_name, listed
-from bim.read_ifc import read_ifc
 from bim.to_tracer import orientation_name
 from mitsuba_cfs.errors import DataError
 

@@ -29,13 +29,14 @@ def tensor_tree_plugin(
     up: tuple[float, float, float] | None = None,
     peak: bool = False,
 ) -> dict:
-    """The `load_dict` entry of a system's BSDF.
+    """The `load_dict` entry of a system's BSDF, for the active Mitsuba variant.
 
     Args:
         colour: its CIE-X and CIE-Z bands, for variants of colour.
         up: [3] world vector of the system's up.
         peak: let what goes straight on pass undisturbed.
     """
+    variants.activate(vectorised=False)
     import mitsuba as mi
 
     entry = {"type": PLUGIN, "peak": peak}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.errors import CfsError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods import METHODS, METRICS
-from mitsuba_cfs.methods.glare import glare
+from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
@@ -65,5 +65,5 @@ def values(light: PhaseLight | PathLight, metric: str) -> NDArray[np.float64]:
     if metric not in METRICS:
         raise UnknownMethodError(f"metric {metric!r}: expected one of {', '.join(METRICS)}")
     if metric != "illuminance":
-        return glare(light, metric).dgp
+        return hourly_glare(light, metric).dgp
     return light.illuminance()

@@ -26,7 +26,7 @@ FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_lumin
 State = ArrayLike | None  # [G, L] of each window group in each hour, or [L] of all; None: the first
 
 
-def glare(
+def hourly_glare(
     light: PhaseLight | PathLight,
     metric: str = "DGP",
     state: State = None,

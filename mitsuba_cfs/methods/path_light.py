@@ -14,7 +14,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.lit_room import Room, Sky
+from mitsuba_cfs.trace.lit_room import LitRoom, Sky
 from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 from mitsuba_cfs.trace.point_in_time import point_in_time
 
@@ -34,19 +34,19 @@ class PathSystems:
         if len(systems) != len(scene.groups):
             raise ValueError(f"systems of {len(systems)} groups for {len(scene.groups)}")
         self.scene, self.systems, self.sampling = scene, systems, sampling or Sampling()
-        self._rooms: dict[tuple[int, ...], Room] = {}
+        self._rooms: dict[tuple[int, ...], LitRoom] = {}
 
     def light(self, sky: AnnualSky, *, progress: Progress = silent) -> PathLight:
         """The light of the sky's hours."""
         return PathLight(self, sky, progress)
 
-    def room(self, state: Sequence[int]) -> Room:
+    def room(self, state: Sequence[int]) -> LitRoom:
         """The room with each window group in a state [G]."""
         key = tuple(int(j) for j in state)
         if key not in self._rooms:
             scene = self.scene
             paths = [optics.paths for optics in in_state(self.systems, key)]
-            self._rooms[key] = Room(scene.interior, scene.exterior, scene.groups, paths)
+            self._rooms[key] = LitRoom(scene.interior, scene.exterior, scene.groups, paths)
         return self._rooms[key]
 
 

@@ -37,7 +37,7 @@ class PhaseScene:
         cache: MatrixCache | None = None,
         progress: Progress = silent,
     ) -> None:
-        """A Mitsuba variant must be active.
+        """Of a scene; nothing is traced yet.
 
         Args: cache: where matrices are kept and found again, `MatrixCache.of_user()`.
         """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 
 from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.sky import wea_table, weather_table
@@ -36,6 +37,7 @@ def read_wea(path: str | PathLike[str], *, whole_year: bool = True) -> Weather:
         times=times,
         direct_normal=direct,
         diffuse_horizontal=diffuse,
+        file=Path(path),
     )
     if unit == 1:
         return checked_sun(weather, path)

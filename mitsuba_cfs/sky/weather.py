@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -48,6 +49,7 @@ class Weather:
     ground_temperature_c: FloatArray | None = None  # [G, 12] monthly, January first
     turned_deg: float = 0.0  # north is so far counter-clockwise of +y, see `turned`
     notes: tuple[str, ...] = ()  # what the reader made up, or found to be odd
+    file: Path | None = None  # that it was read from
 
     def __post_init__(self) -> None:
         if not -90 <= self.latitude_deg <= 90 or not -180 <= self.longitude_deg <= 180:
@@ -145,6 +147,7 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         ground_depth_m=depth,
         ground_temperature_c=ground,
         notes=notes,
+        file=Path(path),
     )
     return checked_sun(weather, path)
 

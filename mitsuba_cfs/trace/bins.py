@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KlemsBasis
 from mitsuba_cfs.sky.patches import ReinhartSky
 
@@ -18,6 +19,7 @@ class DirectionBins:
     """
 
     def __init__(self, basis: KlemsBasis) -> None:
+        variants.activate()
         bounds = np.asarray(basis.theta_bounds, dtype=float)
         counts = np.asarray(basis.phi_counts, dtype=int)
         first = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -105,6 +107,7 @@ class SkyBins:
     """The patches of a Reinhart sky: index of a world direction, the ground being 0."""
 
     def __init__(self, sky: ReinhartSky) -> None:
+        variants.activate()
         self.size = sky.size
         self._row_height = float(sky.row_height)
         self._last_row = len(sky.row_counts) - 1

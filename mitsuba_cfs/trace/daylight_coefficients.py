@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.lit_room import PatchSky, Room
+from mitsuba_cfs.trace.lit_room import LitRoom, PatchSky
 from mitsuba_cfs.trace.point_in_time import sensor_batches
 
 
 def daylight_coefficients(
-    room: Room,
+    room: LitRoom,
     points: ArrayLike,
     directions: ArrayLike,
     *,

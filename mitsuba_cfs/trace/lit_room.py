@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KlemsBasis
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -22,6 +23,7 @@ class AngularBeam:
 
     def __init__(self, values: ArrayLike) -> None:
         """From the shares [n] at n angles of incidence evenly spaced in cosine, 0 to 1."""
+        variants.activate()
         self._values = mi.Float(np.asarray(values, dtype=np.float32))
         self._last = len(np.asarray(values)) - 1
 
@@ -118,7 +120,7 @@ class PatchSky:
         dr.scatter_add(result, mi.Float64(beta), slot, active)
 
 
-class Room:
+class LitRoom:
     """The scenes on both sides of the windows, and the systems in them."""
 
     def __init__(

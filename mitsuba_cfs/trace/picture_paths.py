@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.lit_room import Room, Sky
+from mitsuba_cfs.trace.lit_room import LitRoom, Sky
 from mitsuba_cfs.trace.picture_disc import disc_rays, disc_reach
 from mitsuba_cfs.trace.picture_sharing import SharedLight, Tiles, face_numbers
 from mitsuba_cfs.trace.point_in_time import (
@@ -43,7 +43,7 @@ SURFACE_STEPS, WINDOW_STEPS = (1, 2), (1,)  # [tiles] of the smoothing, one afte
 
 
 def point_in_time_picture(
-    room: Room,
+    room: LitRoom,
     sky: Sky,
     view: View,
     *,
@@ -84,7 +84,7 @@ def point_in_time_picture(
 
 
 def colour_picture(
-    rooms: Sequence[Room], skies: Sequence[Sky], view: View, **options
+    rooms: Sequence[LitRoom], skies: Sequence[Sky], view: View, **options
 ) -> NDArray[np.float32]:
     """Radiance picture [ny, nx, 3] [W/m2/sr] of red, green and blue.
 
@@ -115,7 +115,7 @@ def _add_shared(picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence,
     np.add.at(picture, pixel, weight * light.at(pixel, face))
 
 
-def _add_disc(picture: NDArray, shown: NDArray, room: Room, sky: Sky, view: View) -> None:
+def _add_disc(picture: NDArray, shown: NDArray, room: LitRoom, sky: Sky, view: View) -> None:
     """Add the sun's disc seen through the straight beam, by its share of each pixel."""
     sun = sky.sun.numpy().ravel()
     size = _pixel_size(view)
@@ -137,14 +137,14 @@ def _pixel_size(view: View) -> float:
     return float(np.sqrt(pixel_solid_angles(view).max()))
 
 
-def _eye(room: Room, view: View) -> mi.Point3f:
+def _eye(room: LitRoom, view: View) -> mi.Point3f:
     return mi.Point3f(*map(float, np.asarray(view.position) - room.inside.centre))
 
 
 class _Faces:
     """Numbers of the faces of a room: windows, both sides of faces indoors, then outdoors."""
 
-    def __init__(self, room: Room) -> None:
+    def __init__(self, room: LitRoom) -> None:
         self.windows = len(room.systems) + 1  # the last: windows seen from outdoors
         self._inside, count = self._table(room.inside)
         self._outside, _ = self._table(room.outside)
@@ -198,7 +198,7 @@ class _Kernel:
 
     def __init__(
         self,
-        room: Room,
+        room: LitRoom,
         sky: Sky,
         view: View,
         faces: _Faces,

@@ -13,7 +13,7 @@ from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.lit_room import PatchSky, Room, Sky
+from mitsuba_cfs.trace.lit_room import LitRoom, PatchSky, Sky
 from mitsuba_cfs.trace.sampling import path_generator
 from mitsuba_cfs.trace.scene import OPAQUE
 
@@ -24,7 +24,7 @@ CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that pa
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
 
-def _interaction(room: Room, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
+def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
     """What a plugin needs to know of a ray along `direction` that meets a window from the room."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
     normal = mi.Normal3f(*map(float, room.inside.groups[group].frame[2]))
@@ -41,7 +41,7 @@ def on_disc(sky: Sky, u: mi.Point2f) -> mi.Vector3f:
 
 
 def straight_to_sky(
-    room: Room,
+    room: LitRoom,
     position: mi.Point3f,
     towards: mi.Vector3f,
     outdoors: mi.Bool,
@@ -70,7 +70,7 @@ def straight_to_sky(
 
 
 def sun_at(
-    room: Room,
+    room: LitRoom,
     sky: Sky,
     position: mi.Point3f,
     normal: mi.Vector3f,
@@ -87,7 +87,7 @@ def sun_at(
 
 
 def leave(
-    room: Room,
+    room: LitRoom,
     sky: Sky,
     position: mi.Point3f,
     normal: mi.Vector3f,
@@ -116,7 +116,7 @@ def leave(
 
 
 def _density(
-    room: Room,
+    room: LitRoom,
     sky: Sky,
     cosine: mi.Float,
     direction: mi.Vector3f,
@@ -143,7 +143,7 @@ def _density(
 
 
 def window_parts(
-    room: Room,
+    room: LitRoom,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
@@ -177,7 +177,7 @@ def window_parts(
 
 
 def _at_window(
-    room: Room,
+    room: LitRoom,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
@@ -201,7 +201,7 @@ def _at_window(
 
 @dr.syntax
 def add_paths(
-    room: Room,
+    room: LitRoom,
     sky: Sky | PatchSky,
     result: mi.Float64,  # [rows], or [rows * P] of a `PatchSky`, accumulated in place
     row: mi.UInt32,
@@ -298,7 +298,7 @@ def add_paths(
 
 
 def point_in_time(
-    room: Room,
+    room: LitRoom,
     sky: Sky,
     points: ArrayLike,
     directions: ArrayLike,
@@ -328,7 +328,7 @@ def point_in_time(
 
 
 def sensor_batches(
-    room: Room,
+    room: LitRoom,
     sky: Sky | PatchSky,
     points: ArrayLike,
     directions: ArrayLike,

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
 
 OPAQUE = -1  # window index of a triangle that is not glazed
@@ -37,6 +38,7 @@ class TracedScene:
             window_reflectance: [G] diffuse, of the windows from the room; 0 by default.
             centre: [3] origin of the scene's coordinates; the middle of the windows by default.
         """
+        variants.activate()
         windows = [(g, window) for g, group in enumerate(groups) for window in group.windows]
         if not windows and centre is None:
             raise ValueError("a scene needs a window group or a centre")

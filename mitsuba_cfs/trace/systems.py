@@ -34,19 +34,19 @@ def lit_system(bsdf: Bsdf) -> System:
     """
     if isinstance(bsdf, TensorTreeBsdf):
         scattering, beam = _without_beam(bsdf), TreeBeam(bsdf) if _has_beams(bsdf) else None
-        return System(mi.load_dict(tensor_tree_plugin(scattering)), beam)
+        return System(_loaded(tensor_tree_plugin(scattering)), beam)
     full = bsdf.filled()
     front = through_peak(full.transmission_front, bsdf.basis_in)
     back = through_peak(full.transmission_back, bsdf.basis_in)
     rest = replace(full, transmission_front=front.scattered, transmission_back=back.scattered)
-    return System(mi.load_dict(klems_plugin(rest)), PatchBeam(bsdf.basis_in, front.transmittance))
+    return System(_loaded(klems_plugin(rest)), PatchBeam(bsdf.basis_in, front.transmittance))
 
 
 class TreeBeam:
     """The share of light that keeps its beam in a tensor tree of rank 4."""
 
     def __init__(self, tree: TensorTreeBsdf) -> None:
-        self._bsdf = mi.load_dict(tensor_tree_plugin(tree, up=WINDOW_UP, peak=True))
+        self._bsdf = _loaded(tensor_tree_plugin(tree, up=WINDOW_UP, peak=True))
 
     def at(self, local: mi.Vector3f) -> mi.Float:
         """Share at local directions of light that passes along the line of `local`."""
@@ -60,7 +60,7 @@ class TreeScattering(PluginScattering):
     def __init__(self, tree: TensorTreeBsdf) -> None:
         self._beam = TreeBeam(tree) if _has_beams(tree) else None
         plugin = tensor_tree_plugin(tree, up=WINDOW_UP, peak=self._beam is not None)
-        super().__init__(mi.load_dict(plugin), key=tree)
+        super().__init__(_loaded(plugin), key=tree)
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
@@ -81,3 +81,8 @@ def _without_beam(bsdf: TensorTreeBsdf) -> TensorTreeBsdf:
         for name, tree in bsdf.blocks().items()
     }
     return TensorTreeBsdf(**trees)
+
+
+def _loaded(entry: dict) -> mi.BSDF:
+    """The BSDF of a `load_dict` entry; making the entry has chosen the variant."""
+    return mi.load_dict(entry)

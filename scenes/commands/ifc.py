@@ -43,7 +43,7 @@ def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
         check_file(table, field="--csv", inputs=[building])
     from rich.console import Console
 
-    from bim.read_ifc import read_ifc
+    from bim.ifc.building import read_ifc
     from scenes.commands.progress_bar import ProgressBar
 
     with ProgressBar() as progress:
@@ -165,7 +165,7 @@ def export(
         parent: ResultFolder(parent, "ifc export", adding=True, field=options[0])
         for parent, options in formats.items()
     }
-    from bim.read_ifc import read_ifc
+    from bim.ifc.building import read_ifc
     from bim.to_energyplus import write_epjson
     from bim.to_gltf import write_gltf
     from bim.to_mitsuba import write_mitsuba

@@ -115,8 +115,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
 
 def summary_line(room) -> str:
     """One line of headline figures of a room."""
-    worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
-    daylight, heat = room.daylight.room_metrics, room.thermal
+    daylight, heat = room.daylight.room_metrics, room.heat
     direct = f"ASE {daylight['ase1000_250']:.0f} %, " if "ase1000_250" in daylight else ""
     loads = ""
     if room.operation is not None:
@@ -126,7 +125,7 @@ def summary_line(room) -> str:
         f"{room.space.label}: "
         f"sDA {daylight['sda300_50']:.0f} %, "
         f"{direct}mean DA {daylight['da300']:.0f} %, "
-        f"worst DGP {worst:.2f}, "
+        f"worst DGP {room.glare.worst:.2f}, "
         f"operative {heat.temperatures['operative_c'].min():.1f} "
         f"to {heat.temperatures['operative_c'].max():.1f} C, "
         f"comfortable {heat.comfort_summary['within_80']:.0f} % of occupied hours{loads}"

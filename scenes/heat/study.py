@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.building import read_ifc
 from bim.model import Building, Space
-from bim.read_ifc import read_ifc
 from bim.to_thermal import (
     ThermalRoom,
     coupled_rooms,
@@ -56,8 +56,8 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class RoomYear:
-    """One room's year."""
+class ThermalYear:
+    """One room's year of heat and comfort."""
 
     name: str
     floor_area: float  # [m2]
@@ -80,7 +80,7 @@ class ReadyRoom:
 
 def run_study(
     study: StudyFile, progress: Progress, files: HeatFiles | None = None
-) -> tuple[list[RoomYear], tuple[str, ...]]:
+) -> tuple[list[ThermalYear], tuple[str, ...]]:
     """The rooms of a study, and what had to be assumed.
 
     Args: files: what `read_files` has read of the study; read now without.
@@ -108,7 +108,7 @@ def run_study(
             notes[f"{zone.zone.name}: is not closed, its longwave goes through a mean star."] = None
     results = balances(study, ready, weather, progress)
     years = [
-        RoomYear(
+        ThermalYear(
             room.zone.name,
             room.space.floor_area,
             hourly_table(result, room.state, room.daylight, weather, study.comfort),

@@ -17,7 +17,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from scenes.job.holes import moved
 from scenes.job.options import RoomOptions
 from scenes.job.windows import States
-from scenes.results import SpaceResult
+from scenes.results import RoomYear
 
 SAME_LIGHT = 0.005  # share of the light from anywhere that may come another way
 NEAR = 0.01  # [m] between the places of windows in their rooms
@@ -54,7 +54,7 @@ def same_light(
     return True
 
 
-def as_room(result: SpaceResult, space: Space) -> SpaceResult:
+def as_room(result: RoomYear, space: Space) -> RoomYear:
     """The results of a room for another one alike, moved to its place."""
     shift = corner(space) - corner(result.space)
     daylight, glare = result.daylight, result.glare

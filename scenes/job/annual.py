@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.glare import glare
+from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.weather import Weather
@@ -18,7 +18,7 @@ def glare_by_state(light: PhaseLight, progress: Progress) -> NDArray[np.float64]
     """DGP of every hour in every state [J, H], 0 in the dark."""
     J, count = light.filled.states, len(light.sky.lit)
     lit = [
-        glare(
+        hourly_glare(
             light, "DGP", np.full(count, j),
             progress=part(progress, j / J, (j + 1) / J, "glare control"),
         ).dgp
@@ -31,7 +31,7 @@ def glare_of_year(
     light: PhaseLight, state: NDArray[np.int64], weather: Weather, progress: Progress
 ) -> pd.DataFrame:
     """Glare of every hour [H] with the state [L] that holds in it; NaN in the dark."""
-    rated = glare(light, "DGP", state, progress=part(progress, 0.0, 1.0, "annual glare"))
+    rated = hourly_glare(light, "DGP", state, progress=part(progress, 0.0, 1.0, "annual glare"))
     table = np.full((light.sky.hours, len(COLUMNS)), np.nan)
     table[light.sky.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
     frame = pd.DataFrame(table, index=weather.midpoints, columns=list(COLUMNS))

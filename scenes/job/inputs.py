@@ -6,6 +6,7 @@ import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,7 @@ class System:
     shading_position: str | None = None  # a key of thermal.gvalue.TYPICAL_SYSTEMS
     notes: tuple[str, ...] = ()
     tree: TensorTreeBsdf | None = None  # visible, where the data are a tree: for sun and pictures
+    file: Path | None = None  # that it was read from
 
     @property
     def fine(self) -> Bsdf:
@@ -47,12 +49,15 @@ class System:
 
 
 def read_system(
-    path: Path, *, u_value: float | None = None, g_value: float | None = None
+    path: str | PathLike[str], *, u_value: float | None = None, g_value: float | None = None
 ) -> System:
     """The system of a BSDF XML file, with U and g given, or of the `.toml` file beside it.
 
     The `.toml` file has the name of the XML file; see `ThermalFile`.
+
+    Raises: `DataError` for a file that cannot be used.
     """
+    path = Path(path)
     file = read_bsdf_xml(path)
     beside = ThermalFile.read(path.with_suffix(".toml"))
     return system_of(
@@ -65,6 +70,7 @@ def read_system(
         closure=beside.closure,
         shading_position=beside.shading_position,
         notes=file.notes,
+        file=path,
     )
 
 
@@ -74,11 +80,11 @@ def system_of(
     *,
     path: Path,
     notes: Sequence[str] = (),
-    **thermal: float | str | NDArray[np.float64] | Closure | None,
+    **more: float | str | Path | NDArray[np.float64] | Closure | None,
 ) -> System:
     """The system of BSDF data by band, Klems full or tensor trees.
 
-    Args: path: the file that the data come from; thermal: fields of `System`.
+    Args: path: the file that the data come from; more: fields of `System`.
     """
     notes = list(notes)
     if "Visible" not in bands and "Solar" not in bands:
@@ -95,7 +101,7 @@ def system_of(
         klems if solar is visible else _klems(solar, path, "Solar"),
         notes=tuple(notes),
         tree=visible if isinstance(visible, TensorTreeBsdf) else None,
-        **thermal,
+        **more,
     )
 
 
@@ -111,8 +117,11 @@ def _klems(bsdf: Bsdf, path: Path, band: str) -> KlemsBsdf:
     return klems_of(bsdf)
 
 
-def read_weather(path: Path) -> Weather:
-    """Hourly weather of one year from an EPW file."""
+def read_weather(path: str | PathLike[str]) -> Weather:
+    """Hourly weather of one year from an EPW file.
+
+    Raises: `DataError` for a file that cannot be used.
+    """
     weather = read_epw(path)
     if weather.step_h != 1.0:
         raise DataError(f"has steps of {weather.step_h:g} h; the run needs hours", file=path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -70,11 +71,12 @@ class Operation:
         return next((table for known, table in pairs if known is system), None)
 
 
-def read_operation(path: Path) -> Operation:
+def read_operation(path: str | PathLike[str]) -> Operation:
     """The operation of a TOML file; the paths in it start at its folder.
 
     Raises: `DataError` that names file and field.
     """
+    path = Path(path)
     tables = validated(OperationFile, read_table(path), path)
     warm, cool = tables.loads.heating_c, tables.loads.cooling_c
     if warm is not None and cool is not None and warm > cool:

@@ -60,8 +60,8 @@ class RoomOptions:
 class JobOptions(RoomOptions):
     """Inputs and choices of a run."""
 
-    building: Path
-    weather: Path
+    building: Path | None  # None: not from a file
+    weather: Path | None
     system: Path | None = None  # of every window; None: what the building's file holds
     operation: Path | None = None
     spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window

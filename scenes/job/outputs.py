@@ -14,7 +14,7 @@ from scenes.job.daylight import illuminance_table
 from scenes.job.glare import glare_table
 from scenes.pictures import write_falsecolour
 from scenes.result_folder import ResultFolder
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 
 def write_results(result: RunResult, folder: ResultFolder, write_report=None) -> None:
@@ -36,7 +36,7 @@ def write_results(result: RunResult, folder: ResultFolder, write_report=None) ->
         write_text(temporary / "run.json", text + "\n")
 
 
-def _write_room(result: RunResult, room: SpaceResult, place: Path) -> None:
+def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
     table = illuminance_table(room.daylight, result.times)
     write_table(table, place / "illuminance.parquet")
     metrics = room.daylight.sensor_metrics.copy()
@@ -44,7 +44,7 @@ def _write_room(result: RunResult, room: SpaceResult, place: Path) -> None:
     _csv(metrics, place / "daylight_metrics.csv")
     _csv(pd.DataFrame([room.daylight.room_metrics]), place / "room_metrics.csv", index=False)
     _csv(glare_table(room.glare, result.times), place / "dgp.csv")
-    heat = room.thermal
+    heat = room.heat
     _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
     if room.operation is not None:
         _csv(room.operation.hours, place / "operation.csv")

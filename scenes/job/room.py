@@ -4,7 +4,6 @@ weather = read_weather(Path("city.epw"))
 system = read_system(Path("blind.xml"))                 # scenes.job.inputs
 building = read_ifc("house.ifc")                        # or bim.shoebox.shoebox(...)
 space = building.spaces[0]
-variants.activate()
 result = compute_room(building, space, everywhere(space, system), weather, RoomOptions())
 """
 
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from bim.model import Building, Problem, Space
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.glare import glare
+from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
@@ -42,7 +41,7 @@ from scenes.job.picture_hours import wanted_hours
 from scenes.job.thermal import room_thermal
 from scenes.job.thermal_system import ThermalSystem, state_of, thermal_system
 from scenes.job.windows import States, room_windows
-from scenes.results import DaylightResult, GlareResults, OperationResult, SpaceResult, ThermalResult
+from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYear, ThermalResult
 from thermal.balance import ZoneResult
 from thermal.zone import Zone
 
@@ -69,10 +68,8 @@ def compute_room(
     pictures: bool = True,
     rate: tuple[str, NDArray[np.int64]] | None = None,
     progress: Progress = silent,
-) -> SpaceResult:
+) -> RoomYear:
     """Daylight, glare, temperatures and comfort of one room, with one method.
-
-    A Mitsuba variant must be active (`mitsuba_cfs.variants.activate()`).
 
     Args:
         building: what stands around the room is its `elements`.
@@ -106,9 +103,7 @@ def compute_room(
     dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
     heat, balance = room.timed("thermal", lambda: room.thermal(daylight))
     ran = None if operation is None else room.operation_result(balance)
-    return SpaceResult(
-        space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes
-    )
+    return RoomYear(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes)
 
 
 class _Room:
@@ -217,7 +212,9 @@ class _Room:
         """A glare metric in some hours of the year with the sun up [n]."""
         columns = np.searchsorted(self.skies.lit, hours)
         steps = part(self.progress, 0.0, 1.0, "annual glare")
-        return glare(self.pictured, metric, self.lit_state, hours=columns, progress=steps).dgp
+        return hourly_glare(
+            self.pictured, metric, self.lit_state, hours=columns, progress=steps
+        ).dgp
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 
 from bim.model import Building, Problem, Space
-from bim.read_ifc import STAGES, read_ifc
 from bim.templates import template_rooms
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, item, part, silent, summed
+from mitsuba_cfs.progress import Progress, item, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.alike import as_room, same_light, same_systems
 from scenes.job.attached import attached_systems
+from scenes.job.building import read_building
 from scenes.job.drawn_shades import traced_building
 from scenes.job.files import JobFiles, read_files
 from scenes.job.inputs import System, chosen_spaces, sha256
@@ -30,15 +30,15 @@ from scenes.job.room import compute_room, skies_for
 from scenes.job.thermal_system import thermal_system
 from scenes.job.windows import States, everywhere
 from scenes.quick import NOTE
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
 
-Told = Callable[[SpaceResult], None]  # called with each room as soon as it is computed
+Told = Callable[[RoomYear], None]  # called with each room as soon as it is computed
 
 
-def untold(room: SpaceResult) -> None:
+def untold(room: RoomYear) -> None:
     """Say nothing of a room before all are computed."""
 
 
@@ -70,6 +70,24 @@ def run_job(
     """
     start = time.monotonic()
     inputs = read_inputs(options, progress, files)
+    return run_inputs(inputs, options, progress, told=told, start=start)
+
+
+def run_inputs(
+    inputs: JobInputs,
+    options: JobOptions,
+    progress: Progress = silent,
+    *,
+    told: Told = untold,
+    start: float | None = None,
+) -> RunResult:
+    """Daylight, glare, temperatures and comfort of the rooms of `inputs`.
+
+    Args:
+        options: what was chosen; its files are named in the manifest only.
+        start: when the run began, by `time.monotonic`; now by default.
+    """
+    start = time.monotonic() if start is None else start
     building, weather = inputs.building, inputs.weather
     used = used_systems(inputs)
     thermal_notes = [note for system in used for note in thermal_system(system).notes]
@@ -111,11 +129,21 @@ def read_inputs(
 ) -> JobInputs:
     """The inputs, the building last."""
     files = files or read_files(options)
-    system, operation, weather = files.system, files.operation, files.weather
     progress("inputs", 0.1)
-    reading = summed(part(progress, 0.1, 1.0), "inputs", STAGES)
-    building = read_ifc(options.building, join=options.join, progress=reading)
-    spaces = chosen_spaces(building, options.spaces, options.building)
+    steps = part(progress, 0.1, 1.0)
+    building = read_building(options.building, join=options.join, progress=steps)
+    inputs = job_inputs(building, options.spaces, files)
+    progress("inputs", 1.0)
+    return inputs
+
+
+def job_inputs(building: Building, names: Sequence[str], files: JobFiles) -> JobInputs:
+    """A building's rooms of those names with what fills their windows.
+
+    Raises: `DataError` for a room that is not there, a window without a system.
+    """
+    system, operation, weather = files.system, files.operation, files.weather
+    spaces = chosen_spaces(building, names, building.file)
     systems: dict[str, States] = {}
     if operation is not None and operation.systems:
         for space in spaces:
@@ -125,10 +153,9 @@ def read_inputs(
             systems |= everywhere(space, system)
     else:
         windows = [window for space in spaces for window in space.windows]
-        systems = attached_systems(options.building, windows)
+        systems = attached_systems(building.file, windows)
     if operation is not None:
         check_states(operation, max(len(states) for states in systems.values()))
-    progress("inputs", 1.0)
     building = traced_building(building, systems)
     return JobInputs(building, spaces, weather, systems, operation)
 
@@ -145,9 +172,9 @@ def _rooms(
     options: JobOptions,
     progress: Progress,
     told: Told = untold,
-) -> tuple[list[SpaceResult], list[Problem], list[str]]:
+) -> tuple[list[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
-    found: dict[str, SpaceResult] = {}
+    found: dict[str, RoomYear] = {}
     problems, notes = [], []
     cache = MatrixCache.of_user() if options.cache else None
     alike = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
@@ -194,10 +221,11 @@ def _manifest(
     variant: str,
     inputs: JobInputs,
     used: list[System],
-    results: list[SpaceResult],
+    results: list[RoomYear],
 ) -> dict:
     """What a reader needs to make the same numbers again."""
     files = {"building": options.building, "weather": options.weather}
+    files = {name: path for name, path in files.items() if path is not None}
     if options.system is not None:
         files["system"] = options.system
         beside = options.system.with_suffix(".toml")
@@ -235,8 +263,9 @@ def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
     if inputs.operation is not None or not several:
         return ()
     names = ", ".join(dict.fromkeys(several))
+    held_by = inputs.building.name if options.building is None else options.building.name
     return (
-        f"{options.building.name} holds several shading states; without --operation the first of "
+        f"{held_by} holds several shading states; without --operation the first of "
         f"each window ({names}) holds all year.",
     )
 

@@ -11,12 +11,12 @@ from scenes.figures.scale import ColourScale, round_limits
 from scenes.report.headline import sensor_column
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded, significant
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 DARK_LX = 1.0  # less than this is night, left empty
 
 
-def plans(room: SpaceResult) -> tuple[Plan, ...]:
+def plans(room: RoomYear) -> tuple[Plan, ...]:
     """Plans of daylight autonomy, useful illuminance, daylight factor, direct sun and the mean."""
     daylight, view = room.daylight, room.glare.view
     eye = (np.asarray(view.position), np.asarray(view.direction)) if room.glare.pictures else None
@@ -50,7 +50,7 @@ def plans(room: SpaceResult) -> tuple[Plan, ...]:
     return tuple(pictures)
 
 
-def useful_column(room: SpaceResult, names: tuple[str, ...]) -> str | None:
+def useful_column(room: RoomYear, names: tuple[str, ...]) -> str | None:
     """The column of these names; of useful illuminances the one with two limits."""
     columns = list(room.daylight.sensor_metrics)
     ranges = [c for c in columns if c.startswith("udi") and "–" in quantity(c).label]
@@ -60,7 +60,7 @@ def useful_column(room: SpaceResult, names: tuple[str, ...]) -> str | None:
     return sensor_column(room, *names)
 
 
-def illuminance_carpet(result: RunResult, room: SpaceResult) -> Chart:
+def illuminance_carpet(result: RunResult, room: RoomYear) -> Chart:
     """Median over the work plane for each hour."""
     median = np.median(room.daylight.illuminance, axis=1).astype(float)
     lit = median >= DARK_LX

@@ -14,7 +14,7 @@ from scenes.figures.scale import ColourScale
 from scenes.pictures import tone_mapped
 from scenes.report.numbers import rounded, significant
 from scenes.report.tables import glare_class, spoken
-from scenes.results import LuminancePicture, RunResult, SpaceResult
+from scenes.results import LuminancePicture, RoomYear, RunResult
 
 MOST_PICTURES = 4  # the worst ones; the table has them all
 MOST_OF_A_RUN = 24  # shared by its rooms, so that the file stays small
@@ -49,7 +49,7 @@ class GlareGallery:
     left_out: int
 
 
-def gallery(result: RunResult, room: SpaceResult) -> GlareGallery | None:
+def gallery(result: RunResult, room: RoomYear) -> GlareGallery | None:
     """The pictures with most glare, worst first; None without any."""
     pictures = sorted(room.glare.pictures, key=lambda picture: -picture.glare["dgp"])
     if not pictures:

@@ -13,7 +13,7 @@ from mitsuba_cfs.glare.classes import hour_not_exceeded, protection_level
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded, significant
 from scenes.report.tables import glare_class, spoken, step_hours
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 WARM_C = 26.0  # operative temperature above which hours are counted
 LEVELS = ("none", "minimum", "medium", "high")  # of EN 17037
@@ -35,7 +35,7 @@ class Card:
     meter: float | None = None  # 0..100, drawn as a bar
 
 
-def cards(result: RunResult, room: SpaceResult) -> tuple[Card, ...]:
+def cards(result: RunResult, room: RoomYear) -> tuple[Card, ...]:
     """All headline figures that this room's results hold."""
     found = [
         _spatial_autonomy(room),
@@ -51,14 +51,14 @@ def cards(result: RunResult, room: SpaceResult) -> tuple[Card, ...]:
     return tuple(card for card in found if card is not None)
 
 
-def room_metric(room: SpaceResult, *names: str) -> float | None:
+def room_metric(room: RoomYear, *names: str) -> float | None:
     """The first room metric of these names."""
     key = named_like(room.daylight.room_metrics, *names)
     value = None if key is None else room.daylight.room_metrics[key]
     return None if value is None else float(value)
 
 
-def sensor_column(room: SpaceResult, *names: str) -> str | None:
+def sensor_column(room: RoomYear, *names: str) -> str | None:
     """The first column of the sensor metrics of these names."""
     return named_like(room.daylight.sensor_metrics, *names)
 
@@ -73,15 +73,15 @@ def named_like(keys: Iterable[str], *names: str) -> str | None:
     return None
 
 
-def occupied(room: SpaceResult) -> pd.Series:
+def occupied(room: RoomYear) -> pd.Series:
     """Which hours count for comfort [H]; all of them where the results do not say."""
-    comfort = room.thermal.comfort
+    comfort = room.heat.comfort
     if "occupied" in comfort:
         return comfort["occupied"].astype(bool)
     return pd.Series(True, index=comfort.index)
 
 
-def heated(room: SpaceResult) -> str:
+def heated(room: RoomYear) -> str:
     """Whether the room is heated and cooled, as a sentence."""
     if room.operation is None:
         return "Without heating and cooling."
@@ -99,7 +99,7 @@ def applicable(comfort: pd.DataFrame) -> pd.Series:
     return pd.Series(True, index=comfort.index)
 
 
-def _spatial_autonomy(room: SpaceResult) -> Card | None:
+def _spatial_autonomy(room: RoomYear) -> Card | None:
     value = room_metric(room, "sda")
     if value is None:
         return None
@@ -116,7 +116,7 @@ def _spatial_autonomy(room: SpaceResult) -> Card | None:
                 value)  # fmt: skip
 
 
-def _sunlight(room: SpaceResult) -> Card | None:
+def _sunlight(room: RoomYear) -> Card | None:
     value = room_metric(room, "ase")
     if value is None:
         return None
@@ -129,7 +129,7 @@ def _sunlight(room: SpaceResult) -> Card | None:
                 value)  # fmt: skip
 
 
-def _autonomy(room: SpaceResult) -> Card | None:
+def _autonomy(room: RoomYear) -> Card | None:
     column = sensor_column(room, "da300", "da_300", "da")
     if column is None:
         return None
@@ -143,7 +143,7 @@ def _autonomy(room: SpaceResult) -> Card | None:
     return Card("Daylight autonomy", percent(mean), "%", words, meaning=meaning, meter=mean)
 
 
-def _provision(room: SpaceResult) -> Card | None:
+def _provision(room: RoomYear) -> Card | None:
     """The level of EN 17037, with the two illuminances that decide it."""
     metrics = room.daylight.room_metrics
     q = quantity("en17037_level")
@@ -165,7 +165,7 @@ def _provision(room: SpaceResult) -> Card | None:
     )
 
 
-def _glare(result: RunResult, room: SpaceResult) -> Card | None:
+def _glare(result: RunResult, room: RoomYear) -> Card | None:
     pictures = room.glare.pictures
     if not pictures:
         return None
@@ -179,7 +179,7 @@ def _glare(result: RunResult, room: SpaceResult) -> Card | None:
                 quantity("dgp").meaning, min(100 * dgp, 100))  # fmt: skip
 
 
-def _protection(room: SpaceResult) -> Card | None:
+def _protection(room: RoomYear) -> Card | None:
     """EN 17037's protection from glare, of the year's occupied hours."""
     if room.annual_glare is None or not occupied(room).any():
         return None
@@ -195,8 +195,8 @@ def _protection(room: SpaceResult) -> Card | None:
     return Card("Protection from glare", level.capitalize(), "", words, verdict, grade, meaning)
 
 
-def _warm_hours(room: SpaceResult) -> Card | None:
-    temperatures = room.thermal.temperatures
+def _warm_hours(room: RoomYear) -> Card | None:
+    temperatures = room.heat.temperatures
     if "operative_c" not in temperatures:
         return None
     used = occupied(room).to_numpy()
@@ -212,8 +212,8 @@ def _warm_hours(room: SpaceResult) -> Card | None:
     return Card("Warm hours", rounded(hours, 0), "h", words, meaning=meaning, meter=share)
 
 
-def _comfort(room: SpaceResult) -> Card | None:
-    comfort = room.thermal.comfort
+def _comfort(room: RoomYear) -> Card | None:
+    comfort = room.heat.comfort
     columns = comfort_columns(comfort)
     used = occupied(room)
     if not columns or not used.any():
@@ -236,8 +236,8 @@ def comfort_columns(comfort: pd.DataFrame) -> list[str]:
     return sorted(names, key=lambda name: float(comfort[name].mean()))
 
 
-def _peak(room: SpaceResult) -> Card | None:
-    temperatures = room.thermal.temperatures
+def _peak(room: RoomYear) -> Card | None:
+    temperatures = room.heat.temperatures
     if not {"air_c", "operative_c"} <= set(temperatures):
         return None
     air, operative = temperatures["air_c"], temperatures["operative_c"]

@@ -12,7 +12,7 @@ from scenes.report.headline import occupied
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded
 from scenes.report.tables import monthly_gains
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 STATE_COLOURS = ("#f0e7c8", "#c9b458", "#8f9d3d", "#4f7f4f", "#2c5f66", "#23395b")
 LOADS = {"heating_w": "part0", "cooling_w": "part1", "lighting_w": "part2"}
@@ -25,7 +25,7 @@ RULES = {
 }
 
 
-def state_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
+def state_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     """The shading state of every hour with the sun up; None where there is only one."""
     ran = room.operation
     if ran is None or len(ran.states) < 2:
@@ -47,7 +47,7 @@ def state_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
     )
 
 
-def loads_chart(room: SpaceResult) -> Chart | None:
+def loads_chart(room: RoomYear) -> Chart | None:
     """Heating, cooling and light by month, beside one another; None without any."""
     if room.operation is None:
         return None
@@ -83,7 +83,7 @@ def loads_chart(room: SpaceResult) -> Chart | None:
     )  # fmt: skip
 
 
-def glare_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
+def glare_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     """DGP of every hour of the year; None where it was not computed."""
     year = room.annual_glare
     if year is None:
@@ -99,7 +99,7 @@ def glare_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
                   digits=2)  # fmt: skip
 
 
-def dgp_in_use(room: SpaceResult) -> np.ndarray:
+def dgp_in_use(room: RoomYear) -> np.ndarray:
     """DGP of the occupied hours; of dark ones it is 0, for nothing dazzles then."""
     year: pd.DataFrame = room.annual_glare
     return year["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]

@@ -20,7 +20,7 @@ from scenes.report import (
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards
 from scenes.report.numbers import rounded, share
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class RoomPage:
     fenestration: tuple[tables.Table, ...]
 
 
-def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
+def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
     """Figures and tables of a room."""
-    monthly = tables.monthly_gains(room.thermal.gains)
+    monthly = tables.monthly_gains(room.heat.gains)
     return RoomPage(
         anchor=f"room-{number}",
         name=room.space.label,
@@ -82,13 +82,13 @@ def room_page(result: RunResult, room: SpaceResult, number: int) -> RoomPage:
         loads_table=None
         if room.operation is None
         else tables.values_table("Loads of the year", room.operation.summary),
-        comfort_table=tables.values_table("Comfort", room.thermal.comfort_summary),
+        comfort_table=tables.values_table("Comfort", room.heat.comfort_summary),
         fenestration=tuple(
             tables.values_table(
                 str(values.get("system", "The window with its shade")),
                 {key: value for key, value in values.items() if key != "system"},
             )
-            for values in room.thermal.fenestration
+            for values in room.heat.fenestration
         ),
     )
 
@@ -118,7 +118,7 @@ def heading(normal: NDArray[np.float64]) -> str:
     return compass(normal)
 
 
-def error_words(room: SpaceResult) -> str:
+def error_words(room: RoomYear) -> str:
     """The standard error of the room's illuminances in one sentence."""
     error = room.daylight.relative_error
     return (

@@ -9,7 +9,7 @@ import pandas as pd
 
 from scenes.report.names import Quantity, quantity
 from scenes.report.numbers import cell
-from scenes.results import LuminancePicture, RunResult, SpaceResult
+from scenes.results import LuminancePicture, RoomYear, RunResult
 
 DGP_LIMITS = ((0.35, "imperceptible"), (0.40, "perceptible"), (0.45, "disturbing"))
 
@@ -118,7 +118,7 @@ def named(q: Quantity, value: float | str | None) -> str:
     return cell(value, q.digits)
 
 
-def sensors_table(room: SpaceResult) -> Table:
+def sensors_table(room: RoomYear) -> Table:
     """Every sensor with its metrics and its standard error."""
     daylight = room.daylight
     frame = daylight.sensor_metrics

@@ -14,16 +14,16 @@ from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, 
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded
 from scenes.report.tables import step_hours
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 
 STACKED = ("transmitted_w", "absorbed_outer_w", "absorbed_inner_w")  # do not overlap
 CURVES = {"outdoor_c": "outdoor", "air_c": "air", "operative_c": "operative"}
 STRICT, COMFORT, WARM, COLD, UNKNOWN = "#3a9d5d", "#a9d8b4", "#d9622b", "#3b6fb6", "#a8a8a8"
 
 
-def temperature_carpet(result: RunResult, room: SpaceResult) -> Chart:
+def temperature_carpet(result: RunResult, room: RoomYear) -> Chart:
     """Operative temperature of every hour."""
-    values = room.thermal.temperatures["operative_c"].to_numpy()
+    values = room.heat.temperatures["operative_c"].to_numpy()
     low, high = round_limits(values, 8)
     scale = ColourScale(low, high, "Operative temperature", "°C", colours="cividis")
     return carpet(
@@ -32,13 +32,13 @@ def temperature_carpet(result: RunResult, room: SpaceResult) -> Chart:
     )  # fmt: skip
 
 
-def comfort_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
+def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     """Adaptive comfort of every occupied hour in classes."""
-    comfort = room.thermal.comfort
+    comfort = room.heat.comfort
     columns = comfort_columns(comfort)
     if not columns or "comfort_c" not in comfort:
         return None
-    operative = room.thermal.temperatures["operative_c"].to_numpy()
+    operative = room.heat.temperatures["operative_c"].to_numpy()
     neutral = comfort["comfort_c"].to_numpy()
     covered = applicable(comfort).to_numpy()
     within = comfort[columns[-1]].to_numpy(dtype=bool)
@@ -65,9 +65,9 @@ def comfort_carpet(result: RunResult, room: SpaceResult) -> Chart | None:
     )  # fmt: skip
 
 
-def duration_curve(room: SpaceResult) -> Chart:
+def duration_curve(room: RoomYear) -> Chart:
     """Hours of the year above each temperature."""
-    temperatures = room.thermal.temperatures
+    temperatures = room.heat.temperatures
     hours = len(temperatures) * step_hours(temperatures.index)
     curves = {name: temperatures[name].to_numpy() for name in CURVES if name in temperatures}
     y_range = round_limits(np.concatenate([*curves.values(), [WARM_C]]))
@@ -100,9 +100,9 @@ def duration_curve(room: SpaceResult) -> Chart:
     )
 
 
-def extreme_weeks(room: SpaceResult) -> tuple[Chart, ...]:
+def extreme_weeks(room: RoomYear) -> tuple[Chart, ...]:
     """The warmest and the coldest seven days indoors."""
-    temperatures = room.thermal.temperatures
+    temperatures = room.heat.temperatures
     daily = temperatures["operative_c"].resample("D").mean()
     if len(daily) < 8:
         return (week(room, temperatures.index[0].normalize(), "The period"),)
@@ -111,13 +111,13 @@ def extreme_weeks(room: SpaceResult) -> tuple[Chart, ...]:
     return week(room, warm, "The warmest week"), week(room, cold, "The coldest week")
 
 
-def week(room: SpaceResult, start: pd.Timestamp, title: str) -> Chart:
+def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
     """Seven days of temperatures, hour by hour."""
     stop = start + pd.Timedelta(days=7)
-    inside = (room.thermal.temperatures.index >= start) & (room.thermal.temperatures.index < stop)
-    part = room.thermal.temperatures[inside]
+    inside = (room.heat.temperatures.index >= start) & (room.heat.temperatures.index < stop)
+    part = room.heat.temperatures[inside]
     curves = {name: part[name].to_numpy() for name in CURVES if name in part}
-    comfort = room.thermal.comfort
+    comfort = room.heat.comfort
     if "comfort_c" in comfort:
         covered = applicable(comfort)[inside]
         if covered.any():

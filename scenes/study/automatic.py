@@ -14,11 +14,11 @@ from scenes.calibration.shipped import this_machines_costs
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.study.case import AUTO, Case, with_method
 from scenes.study.plan import Plan
-from scenes.study.study_file import StudyFile
+from scenes.study.study_file import Study
 from thermal.comfort import hours_between
 
 
-def settled(study: StudyFile, plan: Plan, calibration: Calibration | None = None) -> Plan:
+def settled(study: Study, plan: Plan, calibration: Calibration | None = None) -> Plan:
     """The plan with a method for every case; those of rooms with mirrors have their own.
 
     Args: calibration: this machine's by default, measured or scaled.

@@ -13,10 +13,10 @@ from scenes.job.files import check_names
 from scenes.job.inputs import read_system, read_weather
 from scenes.job.operation import check_states, read_operation
 from scenes.job.thermal_system import checked_system
-from scenes.study.study_file import StudyFile
+from scenes.study.study_file import Study
 
 
-def check_files(study: StudyFile) -> None:
+def check_files(study: Study) -> None:
     """Raise `DataError` for the first of a study's files that cannot be used, the quick ones first.
 
     What they hold is read again by the process that computes a case.

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.building import read_ifc
 from bim.model import Building, Space
-from bim.read_ifc import read_ifc
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
@@ -25,7 +25,7 @@ from scenes.job.inputs import System, read_system, read_weather
 from scenes.job.operation import read_operation
 from scenes.job.room import compute_room, skies_for
 from scenes.job.windows import everywhere
-from scenes.results import SpaceResult
+from scenes.results import RoomYear
 from scenes.study.case import Case, Source, program_version
 from scenes.study.store import CaseResult
 from thermal.comfort import hours_between
@@ -137,9 +137,9 @@ def glare_figures(
     return found
 
 
-def room_figures(room: SpaceResult) -> tuple[dict[str, float | str], dict[str, NDArray]]:
+def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDArray]]:
     """Daylight, temperatures and comfort as figures of the table and arrays of the report."""
-    daylight, heat = room.daylight, room.thermal
+    daylight, heat = room.daylight, room.heat
     figures: dict[str, float | str] = {k: float(v) for k, v in daylight.room_metrics.items()}
     figures["illuminance_error_mean"] = 100.0 * float(daylight.relative_error.mean())
     figures["illuminance_error_max"] = 100.0 * float(daylight.relative_error.max())

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from bim.ifc.building import read_ifc
 from bim.model import Building, Space
-from bim.read_ifc import read_ifc
 from scenes.heat.box import box_building
 from scenes.job.inputs import chosen_spaces
 from scenes.job.options import RoomOptions
 from scenes.study.case import AUTO, Case, Source, program_version
-from scenes.study.study_file import RoomTable, StudyFile
+from scenes.study.study_file import RoomTable, Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Plan:
     predicted: float | None = None  # time of the cases whose method `auto` chose [s]
 
 
-def plan_of(study: StudyFile) -> Plan:
+def plan_of(study: Study) -> Plan:
     """The grid of a study, ordered so that neighbours share most.
 
     Raises: `DataError` for a file that cannot be read or has no such room.
@@ -63,7 +63,7 @@ def plan_of(study: StudyFile) -> Plan:
 
 
 def _of_space(
-    study: StudyFile, room: dict, systems: list[dict], climates: list[dict]
+    study: Study, room: dict, systems: list[dict], climates: list[dict]
 ) -> Iterator[Case]:
     """Every case of one room."""
     for climate in climates:

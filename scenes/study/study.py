@@ -5,20 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from bim.model import Problem, Space
 from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.calibration.durations import spoken_time
 from scenes.report.glare_figures import compass
+from scenes.study.automatic import settled
 from scenes.study.case import Case
 from scenes.study.one_case import compute_case
 from scenes.study.plan import Plan, plan_of
 from scenes.study.schedule import Compute, computed
 from scenes.study.store import CaseResult, Store
-from scenes.study.study_file import StudyFile
+from scenes.study.study_file import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +66,15 @@ class StudyResult:
             found |= {(p.where, p.what): p for p in building.problems}
         return tuple(found.values())
 
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row a case, as `rows`."""
+        return pd.DataFrame(self.rows())
+
+    def _repr_html_(self) -> str:
+        """The table, for notebooks."""
+        return self.table._repr_html_()
+
     def rows(self) -> list[dict]:
         """One row a case: what it is, whether it was computed, and every figure of it."""
         columns = dict.fromkeys(name for r in self.results for name in r.figures)
@@ -76,8 +88,8 @@ class StudyResult:
 
 
 def run_study(
-    study: StudyFile,
-    store: Store,
+    study: Study,
+    store: Store | str | PathLike[str],
     *,
     plan: Plan | None = None,
     processes: int = 1,
@@ -91,12 +103,15 @@ def run_study(
     Finished cases are kept one by one: a run that is cut off goes on where it was.
 
     Args:
-        plan: of the study, with the methods that `auto` chose.
+        store: the folder of the finished cases.
+        plan: of the study, with the methods that `auto` chose; made here by default.
         processes, scheduler: see `scenes.study.schedule.computed`.
         told: called with each case that is ready, how many are, and of how many.
     """
     start = time.monotonic()
-    plan = plan or plan_of(study)
+    plan = plan or settled(study, plan_of(study))
+    if not isinstance(store, Store):
+        store = Store(Path(store), inputs=study.files)
     store.open()
     cases = {case.key: case for case in plan.cases}
     found = {key: result for key in cases if (result := store.load(key)) is not None}
@@ -120,7 +135,7 @@ def run_study(
 
 
 def write_study(
-    study: StudyFile, result: StudyResult, store: Store, report: Callable[[Path], object] | None
+    study: Study, result: StudyResult, store: Store, report: Callable[[Path], object] | None
 ) -> None:
     """Write table, manifest and report of a study in the place of earlier ones."""
     store.write(result.rows(), manifest(study, result.plan), report)
@@ -154,7 +169,7 @@ def _status(result: CaseResult) -> str:
     return "failed" if result.error else "done"
 
 
-def manifest(study: StudyFile, plan: Plan) -> dict:
+def manifest(study: Study, plan: Plan) -> dict:
     """What makes the same table again: the study, and the hashes of its files."""
     files = {}
     for case in plan.cases:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
@@ -88,7 +89,7 @@ def _options_table() -> type[BaseModel]:
 OptionsTable = _options_table()
 
 
-class StudyFile(_Table):
+class Study(_Table):
     """A whole study; paths are relative to the file."""
 
     title: str = ""
@@ -107,7 +108,7 @@ class StudyFile(_Table):
     quick: bool = False  # a first look: what the options do not say is chosen by `scenes.quick`
 
     @model_validator(mode="after")
-    def _no_twins(self) -> StudyFile:
+    def _no_twins(self) -> Study:
         for key in ("room", "system", "climate"):
             _unique(key, [entry.name for entry in getattr(self, key)])
         turned = [angle % 360.0 for angle in self.orientations_deg]
@@ -132,8 +133,8 @@ def _unique(key: str, values) -> None:
 
 
 def read_study(
-    path: Path, *, automatic: bool = False, quick: bool = False, **auto: str
-) -> StudyFile:
+    path: str | PathLike[str], *, automatic: bool = False, quick: bool = False, **auto: str
+) -> Study:
     """The study of a TOML file, its paths made absolute and every entry named.
 
     Args:
@@ -143,6 +144,7 @@ def read_study(
 
     Raises: `DataError` naming the file and the key.
     """
+    path = Path(path)
     table = read_table(path)
     _name_entries(table)
     if automatic:
@@ -151,7 +153,7 @@ def read_study(
         table["quick"] = True
     if auto:
         table["auto"] = table.get("auto", {}) | auto
-    study = validated(StudyFile, table, path)
+    study = validated(Study, table, path)
     if study.quick:
         chosen = picks(ROOM, study.options.model_fields_set)
         study = study.model_copy(update={"options": study.options.model_copy(update=chosen)})
@@ -169,7 +171,7 @@ def _name_entries(table: dict) -> None:
                 entry["name"] = named
 
 
-def _with_places(study: StudyFile, path: Path) -> StudyFile:
+def _with_places(study: Study, path: Path) -> Study:
     """The study with absolute paths of files that are there."""
 
     def there(name: Path, key: str) -> Path:

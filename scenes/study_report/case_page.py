@@ -15,7 +15,7 @@ from scenes.report import daylight_figures, tables, thermal_figures
 from scenes.report.names import quantity
 from scenes.report.numbers import rounded
 from scenes.report.room import error_words
-from scenes.results import DaylightResult, GlareResults, RunResult, SpaceResult, ThermalResult
+from scenes.results import DaylightResult, GlareResults, RoomYear, RunResult, ThermalResult
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult, facing
@@ -50,7 +50,7 @@ def case_page(study: StudyResult, number: int, case: Case, result: CaseResult) -
     """Figures and tables of a case that has a result."""
     building, _ = study.plan.rooms[case.scene]
     room = room_of(study, case, result)
-    times = room.thermal.temperatures.index
+    times = room.heat.temperatures.index
     run = RunResult(building, times, np.empty((0, 3)), (room,), (), {})
     median = result.arrays["median_illuminance"][:, None]
     by_hour = replace(room, daylight=replace(room.daylight, illuminance=median))
@@ -94,7 +94,7 @@ def method_words(case: Case) -> str:
     return f"{case.options.method}, {glare}"
 
 
-def room_of(study: StudyResult, case: Case, result: CaseResult) -> SpaceResult:
+def room_of(study: StudyResult, case: Case, result: CaseResult) -> RoomYear:
     """The kept part of a case's results as those of a room."""
     _, space = study.plan.rooms[case.scene]
     arrays = result.arrays
@@ -119,7 +119,7 @@ def room_of(study: StudyResult, case: Case, result: CaseResult) -> SpaceResult:
         numbers,
         (),
     )
-    return SpaceResult(space, daylight, GlareResults(None, ()), heat, {})
+    return RoomYear(space, daylight, GlareResults(None, ()), heat, {})
 
 
 def glare_map(times: pd.DatetimeIndex, case: Case, result: CaseResult) -> Chart:

@@ -10,7 +10,7 @@ from bim.model import Building, Space
 from scenes.figures.scale import ColourScale
 from scenes.report.model3d import Layer, Model3D, colour_bytes, model3d
 from scenes.report.names import quantity
-from scenes.results import RunResult, SpaceResult
+from scenes.results import RoomYear, RunResult
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
@@ -39,7 +39,7 @@ def study_model(study: StudyResult) -> Model3D:
             elements += [_moved(e, offset) for e in building.elements]
     name = next(iter(study.plan.rooms.values()))[0].name
     whole = Building(name, tuple(room.space for room in rooms), tuple(elements))
-    times = rooms[0].thermal.temperatures.index
+    times = rooms[0].heat.temperatures.index
     model = model3d(RunResult(whole, times, np.empty((0, 3)), tuple(rooms), (), {}))
     return replace(model, layers=_layers(study, list(first)))
 
@@ -63,7 +63,7 @@ def _moved(part, offset: np.ndarray):
     return replace(part, triangles=part.triangles + offset)
 
 
-def _moved_room(room: SpaceResult, offset: np.ndarray) -> SpaceResult:
+def _moved_room(room: RoomYear, offset: np.ndarray) -> RoomYear:
     space: Space = room.space
     space = replace(
         space,

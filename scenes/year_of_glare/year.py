@@ -13,14 +13,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.ifc.building import STAGES, read_ifc
 from bim.ifc.corrections import corrections_file
-from bim.read_ifc import STAGES, read_ifc
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import AnnualGlare, kept_glare
 from mitsuba_cfs.images.view import format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.glare import FIGURES, glare, pictures
+from mitsuba_cfs.methods.glare import FIGURES, hourly_glare, pictures
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
@@ -136,7 +136,9 @@ def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[
         traced = traced.seen_from(named.view, tracing)
         filled = PhaseSystems(traced, [[year.optics]] * len(traced.scene.groups))
         light = filled.light(year.sky)
-        found = found or glare(light, options.metric, keep=keep, progress=part(steps, 0.3, 1.0))
+        found = found or hourly_glare(
+            light, options.metric, keep=keep, progress=part(steps, 0.3, 1.0)
+        )
         table = pd.DataFrame(
             {name: getattr(found, name) for name in FIGURES}, index=times.rename("time")
         )

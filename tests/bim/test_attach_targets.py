@@ -7,9 +7,9 @@ import pytest
 
 from bim.fenestration import ShadingState
 from bim.ifc.attach import attach
+from bim.ifc.building import read_ifc
 from bim.ifc.fenestration_read import read_fenestration
 from bim.ifc.targets import Targets
-from bim.read_ifc import read_ifc
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import OFFICE

@@ -9,8 +9,8 @@ import ifcopenshell.api.spatial
 import ifcopenshell.api.type
 import pytest
 
+from bim.ifc.building import read_ifc
 from bim.ifc.corrections import Corrections, read_corrections
-from bim.read_ifc import read_ifc
 from mitsuba_cfs.errors import DataError
 from tests.bim.small_ifc import box_room
 

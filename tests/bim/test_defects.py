@@ -8,8 +8,8 @@ import ifcopenshell.api.root
 import numpy as np
 import pytest
 
+from bim.ifc.building import read_ifc
 from bim.model import Building
-from bim.read_ifc import read_ifc
 from bim.shell import enclosed_volume, open_edges
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WIDTH, SmallIfc, box_room
 

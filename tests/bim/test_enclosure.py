@@ -12,7 +12,7 @@ from bim.enclosure import (
     rooms_enclosed_by,
     touching_parts,
 )
-from bim.read_ifc import read_ifc
+from bim.ifc.building import read_ifc
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import solid_of, triangles_of
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WALLS, WIDTH, box_room

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from bim.read_ifc import read_ifc
+from bim.ifc.building import read_ifc
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_energyplus import write_epjson
 from bim.to_gltf import write_gltf

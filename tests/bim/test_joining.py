@@ -5,8 +5,8 @@ from __future__ import annotations
 import ifcopenshell.api.feature
 import pytest
 
+from bim.ifc.building import read_ifc
 from bim.ifc.corrections import Corrections
-from bim.read_ifc import read_ifc
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
 from scenes import cli

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bim.read_ifc import read_ifc
+from bim.ifc.building import read_ifc
 from bim.shell import enclosed_volume, open_edges
 from mitsuba_cfs.errors import DataError
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, GLASS_Y, HEIGHT, OPENING, WIDTH, box_room

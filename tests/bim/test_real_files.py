@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bim.read_ifc import read_ifc
+from bim.ifc.building import read_ifc
 from bim.shell import enclosed_volume, open_edges
 from bim.to_energyplus import write_epjson
 from bim.to_radiance import write_radiance

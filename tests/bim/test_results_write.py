@@ -7,8 +7,8 @@ import ifcopenshell.util.element
 import numpy as np
 import pytest
 
+from bim.ifc.building import read_ifc
 from bim.ifc.results_write import SET_NAME, write_results
-from bim.read_ifc import read_ifc
 from mitsuba_cfs.errors import DataError
 from tests.bim.small_ifc import box_room
 from tests.bim.test_fenestration_ifc import faults

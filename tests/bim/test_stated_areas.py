@@ -6,7 +6,7 @@ import ifcopenshell
 import ifcopenshell.api.pset
 import pytest
 
-from bim.read_ifc import read_ifc
+from bim.ifc.building import read_ifc
 from tests.bim.small_ifc import DEPTH, WALL, WIDTH, box_room
 from tests.bim.test_joining import THICK, two_rooms
 

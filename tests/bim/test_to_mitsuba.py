@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from bim.read_ifc import read_ifc
+from bim.ifc.building import read_ifc
 from bim.to_mitsuba import write_mitsuba
 from mitsuba_cfs.variants import activate
 from tests.bim.small_ifc import GLASS_AREA, box_room

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bim.ifc.building import read_ifc
 from bim.model import Element
 from bim.rays import hemisphere, ray_mesh
-from bim.read_ifc import read_ifc
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_radiance import identifier, write_radiance
 from tests.bim.small_ifc import box_room

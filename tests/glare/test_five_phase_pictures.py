@@ -161,7 +161,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     import mitsuba as mi
 
     from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.lit_room import AngularBeam, Room, Sky, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
     from mitsuba_cfs.trace.picture_paths import point_in_time_picture
     from tests.trace.test_point_in_time import diffuser as diffusing_system
     from tests.trace.test_point_in_time import klems
@@ -180,7 +180,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     pictures = five_phase(way, transmission, (sky + direct, direct), HIGH, lux, obstacle=obstacle)
     found = annual_glare(pictures)
     room, groups = rooms.test_room()
-    traced = Room(room, obstacle or rooms.NOTHING, groups, [system])
+    traced = LitRoom(room, obstacle or rooms.NOTHING, groups, [system])
     picture = point_in_time_picture(
         traced, Sky(sky, HIGH, lux[0] / SUN_SOLID_ANGLE), VIEW, samples=128
     )

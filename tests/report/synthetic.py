@@ -16,8 +16,8 @@ from scenes.results import (
     GlareResults,
     LuminancePicture,
     OperationResult,
+    RoomYear,
     RunResult,
-    SpaceResult,
     ThermalResult,
 )
 
@@ -82,7 +82,7 @@ def sun_directions(times: pd.DatetimeIndex) -> np.ndarray:
     return np.stack([-west, -south, up], axis=1)
 
 
-def space_result(space: Space, times, sun, size: int, pictures: int, seed: int) -> SpaceResult:
+def space_result(space: Space, times, sun, size: int, pictures: int, seed: int) -> RoomYear:
     """Everything for one room."""
     rng = np.random.default_rng(seed)
     cloud = np.repeat(rng.beta(0.8, 0.8, len(times) // 24), 24)  # clearness by day
@@ -94,7 +94,7 @@ def space_result(space: Space, times, sun, size: int, pictures: int, seed: int) 
     if seed:  # the second room has all there can be
         operation = operation_result(times, facing * cloud, daylight)
         year = annual_glare(times, sun, facing * cloud)
-    return SpaceResult(
+    return RoomYear(
         space,
         daylight,
         glare_results(space, hours, daylight.illuminance, size),

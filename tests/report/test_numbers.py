@@ -64,7 +64,7 @@ def test_unknown_names_become_labels_with_units() -> None:
 
 
 def test_months_add_up_to_the_year_at_any_step(room) -> None:
-    gains = room.thermal.gains
+    gains = room.heat.gains
     monthly = tables.monthly_gains(gains)
     np.testing.assert_allclose(monthly.sum(), gains.sum() / 1000, rtol=1e-12)
     quarters = gains.iloc[:480].resample("15min").ffill()
@@ -75,14 +75,14 @@ def test_months_add_up_to_the_year_at_any_step(room) -> None:
 
 
 def test_stack_of_gains_leaves_out_what_is_counted_already(room) -> None:
-    chart = gains_chart(tables.monthly_gains(room.thermal.gains))
+    chart = gains_chart(tables.monthly_gains(room.heat.gains))
     labels = [mark.label for mark in chart.marks]
     assert labels == ["Incident on the glass", "Transmitted", "Absorbed, outer layer",
                       "Absorbed, inner layer"]  # fmt: skip
 
 
 def test_duration_curve_crosses_at_the_counted_hours(room) -> None:
-    operative = room.thermal.temperatures["operative_c"]
+    operative = room.heat.temperatures["operative_c"]
     chart = duration_curve(room)
     series = dict(chart.readout.series)["Operative"]
     shown = np.array([float(text.removesuffix(" °C").replace("−", "-")) for text in series])
@@ -93,7 +93,7 @@ def test_duration_curve_crosses_at_the_counted_hours(room) -> None:
 
 
 def test_warmest_and_coldest_week_hold_the_planted_extremes(room) -> None:
-    temperatures = room.thermal.temperatures
+    temperatures = room.heat.temperatures
     temperatures.loc["2023-05-08":"2023-05-14", "operative_c"] += 30
     temperatures.loc["2023-10-02":"2023-10-08", "operative_c"] -= 40
     warm, cold = extreme_weeks(room)

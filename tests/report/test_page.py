@@ -66,8 +66,8 @@ def test_key_numbers_are_those_of_the_result(result, page) -> None:
     for number, room in enumerate(result.spaces, start=1):
         section = page[page.index(f'id="room-{number}"') :]
         section = section[: section.index("</section>")]
-        operative = room.thermal.temperatures["operative_c"]
-        occupied = room.thermal.comfort["occupied"]
+        operative = room.heat.temperatures["operative_c"]
+        occupied = room.heat.comfort["occupied"]
         worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
         cards = dict(
             re.findall(r'">([^<>]+)</abbr></h4>\s*<p class="value"><b>([^<]+)</b>', section)
@@ -79,7 +79,7 @@ def test_key_numbers_are_those_of_the_result(result, page) -> None:
         assert cards["Peak temperature"] == f"{operative.max():.1f}"
         warm = int(((operative > 26) & occupied).sum())
         assert cards["Warm hours"].replace("\u202f", "") == f"{warm}"
-        assert cards["Adaptive comfort"] == f"{room.thermal.comfort_summary['within_80']:.0f}"
+        assert cards["Adaptive comfort"] == f"{room.heat.comfort_summary['within_80']:.0f}"
 
 
 def test_hashes_versions_seed_problems_and_notes_are_shown(result, page) -> None:
@@ -102,17 +102,17 @@ def test_report_of_little(result) -> None:
     """One room without pictures, 20 days, few metrics, a bare manifest, dark all the time."""
     room, hours = result.spaces[0], slice(0, 480)
     thermal = replace(
-        room.thermal,
-        temperatures=room.thermal.temperatures.iloc[hours],
-        gains=room.thermal.gains.iloc[hours] * 0,
-        comfort=room.thermal.comfort.iloc[hours][["comfort_c", "within_80"]],
+        room.heat,
+        temperatures=room.heat.temperatures.iloc[hours],
+        gains=room.heat.gains.iloc[hours] * 0,
+        comfort=room.heat.comfort.iloc[hours][["comfort_c", "within_80"]],
     )
     metrics = pd.DataFrame({"x": [1.0], "y": [-2.0], "z": [0.8], "daylight_factor": [np.nan]})
     daylight = replace(
         room.daylight, points=room.daylight.points[:1], sensor_metrics=metrics, room_metrics={},
         illuminance=np.zeros((480, 1), np.float32), relative_error=np.zeros(1),
     )  # fmt: skip
-    few = replace(room, thermal=thermal, daylight=daylight, glare=GlareResults(room.glare.view, ()))
+    few = replace(room, heat=thermal, daylight=daylight, glare=GlareResults(room.glare.view, ()))
     small = replace(
         result, times=result.times[hours], sun=result.sun[hours], spaces=(few,), problems=(),
         notes=(), manifest={"inputs": {"weather": "a.epw"}},

@@ -65,12 +65,12 @@ def study(systems: int = 2, failed: bool = True) -> StudyResult:
                 g_value=None, climate="Lyon", weather=none, orientation_deg=0.0,
                 options=OPTIONS, operation=None, program="", glare="DGP",
             )  # fmt: skip
-            heat = room.thermal
+            heat = room.heat
             dim = replace(
                 room.daylight,
                 room_metrics=room.daylight.room_metrics | {"da300": 70.0 - 9 * number},
             )
-            figures, arrays = room_figures(replace(room, thermal=heat, daylight=dim))
+            figures, arrays = room_figures(replace(room, heat=heat, daylight=dim))
             used = arrays["comfort/occupied"]
             dgp = 0.3 + 0.2 * np.random.default_rng(number).random(int(used.sum()))
             figures |= glare_figures(dgp, AnyWeather(), (8, 18)) | {"seconds": 1.0 + number}

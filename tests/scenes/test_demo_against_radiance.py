@@ -56,7 +56,7 @@ def radiance_illuminance(space, building, folder: Path) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["A", "B"])
 def test_year_of_illuminance(name, tmp_path):
-    from bim.read_ifc import read_ifc
+    from bim.ifc.building import read_ifc
     from mitsuba_cfs import variants
     from scenes.job.inputs import read_system, read_weather
     from scenes.job.options import RoomOptions

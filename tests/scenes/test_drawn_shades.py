@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bim.read_ifc import read_ifc
+from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER

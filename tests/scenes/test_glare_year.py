@@ -66,7 +66,7 @@ def test_views_are_rated_and_written_and_a_second_run_takes_them_up(year, tmp_pa
     def never(*_arguments, **_options):
         raise AssertionError("rated again")
 
-    monkeypatch.setattr(module, "glare", never)
+    monkeypatch.setattr(module, "hourly_glare", never)
     quick = replace(year, options=replace(year.options, worst=0))
     again = list(module.rate_views(quick, kept))
     assert np.array_equal(again[0].ratings.dgp.to_numpy(), towards)
@@ -107,7 +107,7 @@ def test_directions_turn_counter_clockwise():
     ],
 )
 def test_views_that_mean_nothing_are_refused(view, message):
-    from bim.read_ifc import read_ifc
+    from bim.ifc.building import read_ifc
     from scenes.job.inputs import chosen_spaces
     from scenes.year_of_glare.views import chosen_views
 

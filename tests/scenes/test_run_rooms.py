@@ -216,11 +216,11 @@ def test_states_switch_light_and_heat_together(
         np.testing.assert_allclose(
             switched.daylight.illuminance[hour], one.daylight.illuminance[hour], rtol=1e-5
         )
-        gains = switched.thermal.gains.iloc[hour], one.thermal.gains.iloc[hour]
+        gains = switched.heat.gains.iloc[hour], one.heat.gains.iloc[hour]
         assert gains[0].to_numpy() == pytest.approx(gains[1].to_numpy(), rel=1e-6)
     ran = switched.operation
     assert ran.hours["shading_state"].tolist()[:24] == [0] * 12 + [1] * 12
-    air = switched.thermal.temperatures["air_c"]
+    air = switched.heat.temperatures["air_c"]
     assert air.min() > 19.5 and air.max() < 26.5
     assert ran.summary["heating_kwh"] > 0 and ran.summary["lighting_kwh"] > 0
 
@@ -423,5 +423,5 @@ def test_operation_is_that_of_a_thermal_study(variant, tmp_path, weather) -> Non
     np.testing.assert_array_equal(ran.hours["shading_state"], year.hours["shading_state"])
     for name in ("heating_kwh", "cooling_kwh"):
         assert ran.summary[name] == pytest.approx(year.summary[name], rel=1e-5)
-    air = found.thermal.temperatures["air_c"].to_numpy()
+    air = found.heat.temperatures["air_c"].to_numpy()
     np.testing.assert_allclose(air, year.hours["air_c"], atol=1e-4)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bim.ifc.building import read_ifc
 from bim.model import Construction, MaterialLayer
-from bim.read_ifc import read_ifc
 from bim.to_thermal import coupled_rooms, door_links, shared_constructions, thermal_room
 from tests.thermal.rooms import PLASTER, box, climate, sun
 from thermal.balance import BalanceOptions, simulate_zones

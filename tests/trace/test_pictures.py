@@ -23,11 +23,11 @@ DARK = np.zeros(146)
 
 
 def picture(systems, sky, scene, view=VIEW, **options):
-    from mitsuba_cfs.trace.lit_room import Room
+    from mitsuba_cfs.trace.lit_room import LitRoom
     from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 
     interior, groups, exterior = scene
-    return point_in_time_picture(Room(interior, exterior, groups, systems), sky, view, **options)
+    return point_in_time_picture(LitRoom(interior, exterior, groups, systems), sky, view, **options)
 
 
 def eye_illuminance(values, view=VIEW) -> float:
@@ -51,7 +51,7 @@ def random_tree_system(seed: int) -> TensorTreeBsdf:
 @pytest.mark.parametrize("kind", ["glass", "mirror", "diffuser"])
 def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, Room, Sky, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
     from mitsuba_cfs.trace.point_in_time import point_in_time
 
     half = AngularBeam(np.full(16, 0.3))
@@ -63,7 +63,7 @@ def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.obstruction()), Sky(SKY, SUN, SUN_LUMINANCE)
     found = eye_illuminance(picture([system], sky, scene, samples=32))
-    room = Room(*scene[::2], groups, [system])
+    room = LitRoom(*scene[::2], groups, [system])
     sensor = point_in_time(
         room, sky, [EYE], [VIEW.direction], samples=65536, stopping=Stopping(batches=8)
     )
@@ -128,11 +128,11 @@ def test_noise_of_few_paths_makes_no_glare_sources():
 
 def test_a_colour_picture_has_the_bands_luminance():
     from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS, luminance
-    from mitsuba_cfs.trace.lit_room import Room, Sky
+    from mitsuba_cfs.trace.lit_room import LitRoom, Sky
     from mitsuba_cfs.trace.picture_paths import colour_picture
 
     interior, groups = rooms.test_room()
-    room = Room(interior, rooms.NOTHING, groups, [glass(0.7)])
+    room = LitRoom(interior, rooms.NOTHING, groups, [glass(0.7)])
     view = fisheye(EYE, (0.0, -1.0, 0.0), 60)
     white = Sky(SKY / EFFICACY, SUN, SUN_LUMINANCE / EFFICACY)
     red = Sky(2 * SKY / EFFICACY, SUN, 2 * SUN_LUMINANCE / EFFICACY)

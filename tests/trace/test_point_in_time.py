@@ -23,11 +23,11 @@ NO_SUN = [0, 0, -1]
 
 def traced(systems, sky, *, scene=None, **options):
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import Room
+    from mitsuba_cfs.trace.lit_room import LitRoom
     from mitsuba_cfs.trace.point_in_time import point_in_time
 
     interior, groups, exterior = scene or (*rooms.test_room(), rooms.NOTHING)
-    room = Room(interior, exterior, groups, systems)
+    room = LitRoom(interior, exterior, groups, systems)
     stopping = Stopping(batches=8)
     return point_in_time(room, sky, POINTS, UP, samples=32768, stopping=stopping, **options)
 
@@ -131,11 +131,11 @@ def test_an_obstacle_before_one_of_two_windows_does_not_bias_the_paths():
 
 def test_picture_shows_sky_ground_and_the_suns_disc():
     from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
-    from mitsuba_cfs.trace.lit_room import Room, Sky
+    from mitsuba_cfs.trace.lit_room import LitRoom, Sky
     from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 
     interior, groups = rooms.test_room()
-    room = Room(interior, rooms.NOTHING, groups, [glass(0.5)])
+    room = LitRoom(interior, rooms.NOTHING, groups, [glass(0.5)])
     view = fisheye((1.8, 2.5, 1.2), (0, -1, 0), 128)
     sun = np.array([0.0, -1.0, 0.3]) / np.hypot(1, 0.3)
     picture = point_in_time_picture(room, Sky(SKY, sun, SUN_LUMINANCE), view, samples=256)
@@ -166,13 +166,13 @@ def test_daylight_coefficients_of_a_diffuser_are_the_three_phase_matrix():
     from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
     from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import Room, Sky
+    from mitsuba_cfs.trace.lit_room import LitRoom, Sky
     from mitsuba_cfs.trace.view_matrix import view_matrix
 
     interior, groups = rooms.test_room()
     exterior = rooms.NOTHING  # something near lights parts of the window: V T D knows their mean
     system = diffuser(0.5)
-    room = Room(interior, exterior, groups, [system])
+    room = LitRoom(interior, exterior, groups, [system])
     found = daylight_coefficients(
         room, POINTS, UP, subdivision=1, samples=32768, stopping=Stopping(batches=8)
     )

@@ -47,11 +47,11 @@ class Scene:
     """The room, its blind and its sky, for both programs."""
 
     def __init__(self, folder: Path) -> None:
-        from mitsuba_cfs.trace.lit_room import Room, Sky
+        from mitsuba_cfs.trace.lit_room import LitRoom, Sky
 
         fenestration = Fenestration("blind", folder)
         moment = moments(read_epw(WEATHER))[MOMENT]
-        self.room = Room(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
+        self.room = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         self.sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
         self.folder = folder
         Radiance(folder, fenestration).set_sky(moment)

@@ -30,7 +30,7 @@ from scenes.evidence.validation.reference_room import (
     MASSIVE_THIN,
     ORIENTATIONS,
 )
-from scenes.heat.study import RoomYear, run_study
+from scenes.heat.study import ThermalYear, run_study
 from scenes.heat.study_file import StudyFile
 from thermal.zone import Layer
 
@@ -70,7 +70,7 @@ def study(weather: Path, bsdf: Path, facing_deg: float, samples: int) -> StudyFi
     )  # fmt: skip
 
 
-def shares(year: RoomYear) -> dict[str, float]:
+def shares(year: ThermalYear) -> dict[str, float]:
     """Percent of the hours from 8 to 18 that are comfortable; degree hours beyond the 80 % band."""
     hours = 365 * (HOURS[1] - HOURS[0])
     summary = year.summary

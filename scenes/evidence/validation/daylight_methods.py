@@ -38,7 +38,7 @@ from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.lit_room import Room, Sky, System
+from mitsuba_cfs.trace.lit_room import LitRoom, Sky, System
 from mitsuba_cfs.trace.point_in_time import point_in_time
 from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 from mitsuba_cfs.trace.view_matrix import view_matrix
@@ -110,7 +110,7 @@ def by_fine_matrix(scene: Scene, tilt_deg: float | None, sky: AnnualSky) -> NDAr
 
 def by_coefficients(scene: Scene, system: System, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
-    room = Room(scene.interior, empty(), scene.groups, [system])
+    room = LitRoom(scene.interior, empty(), scene.groups, [system])
     coefficients = daylight_coefficients(
         room, scene.points, scene.up, subdivision=SUBDIVISION, samples=COEFFICIENT_PATHS
     )
@@ -121,7 +121,7 @@ def by_paths(
     scene: Scene, exterior: Surfaces, system: System, sky: AnnualSky, samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] by point-in-time paths, and its standard error."""
-    room = Room(scene.interior, exterior, scene.groups, [system])
+    room = LitRoom(scene.interior, exterior, scene.groups, [system])
     runs = []
     for h in range(len(sky.lit)):
         luminance = sky.illuminance[h] / SUN_SOLID_ANGLE

@@ -38,7 +38,7 @@ from mitsuba_cfs.images.view import View, fisheye, format_view
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather, read_epw
-from mitsuba_cfs.trace.lit_room import AngularBeam, Room, Sky, System
+from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
 from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 from mitsuba_cfs.trace.systems import lit_system
 from scenes.cost import room
@@ -197,7 +197,7 @@ def outcomes(
     for name in systems:
         fenestration = Fenestration(name, folder)
         peer = Radiance(folder, fenestration)
-        lit = Room(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
+        lit = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         for moment in chosen:
             start = time.perf_counter()
             sky = Sky(moment.patches, moment.sun, moment.sun_luminance)

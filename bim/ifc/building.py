@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ AGREES = 0.02  # drawn and stated quantities may differ by this share before it 
 
 
 def read_ifc(
-    path: str | Path,
+    path: str | PathLike[str],
     *,
     corrections: Corrections | None = None,
     join: Sequence[str] = (),
@@ -82,7 +83,7 @@ def read_ifc(
     tell("surroundings", 1.0)
     return Building(
         source.name, tuple(spaces), outside, tuple(dict.fromkeys([*problems, *more])),
-        source.latitude_deg, source.longitude_deg, source.elevation,
+        source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
     )  # fmt: skip
 
 

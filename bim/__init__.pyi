@@ -1,0 +1,31 @@
+"""The names of `import bim`, and the modules that they come from."""
+
+from .fenestration import ShadingState as ShadingState
+from .ifc.building import read_ifc as read_ifc
+from .ifc.corrections import Corrections as Corrections, read_corrections as read_corrections
+from .ifc.fenestration_read import read_fenestration as read_fenestration
+from .ifc.results_write import write_results as write_results
+from .model import (
+    Building as Building,
+    Construction as Construction,
+    Element as Element,
+    Face as Face,
+    MaterialLayer as MaterialLayer,
+    Problem as Problem,
+    Room as Room,
+    Space as Space,
+    Window as Window,
+)
+from .sensors import sensor_grid as sensor_grid, view_point as view_point
+from .shell import open_edges as open_edges
+from .shoebox import WindowRectangle as WindowRectangle, shoebox as shoebox
+from .to_energyplus import write_epjson as write_epjson
+from .to_gltf import write_gltf as write_gltf
+from .to_mitsuba import write_mitsuba as write_mitsuba
+from .to_radiance import write_radiance as write_radiance
+from .to_thermal import ThermalRoom as ThermalRoom, thermal_room as thermal_room
+from .to_tracer import (
+    exterior_surfaces as exterior_surfaces,
+    interior_surfaces as interior_surfaces,
+    window_groups as window_groups,
+)

@@ -1,0 +1,58 @@
+"""The names of `import mitsuba_cfs`, and the modules that they come from."""
+
+from . import variants as variants
+from .bsdf.blinds import venetian_blind as venetian_blind
+from .bsdf.bsdf_file import BsdfFile as BsdfFile
+from .bsdf.checks import check_bsdf as check_bsdf
+from .bsdf.evaluate import bsdf_values as bsdf_values, direct_hemispherical as direct_hemispherical
+from .bsdf.generate import (
+    GeneratedBsdf as GeneratedBsdf,
+    generate_klems as generate_klems,
+    generate_tensor_tree as generate_tensor_tree,
+)
+from .bsdf.glazing import (
+    Glazing as Glazing,
+    Pane as Pane,
+    specular_klems as specular_klems,
+)
+from .bsdf.klems import KLEMS_FULL as KLEMS_FULL, KlemsBasis as KlemsBasis, KlemsBsdf as KlemsBsdf
+from .bsdf.layers import LayeredSystem as LayeredSystem, combine_layers as combine_layers
+from .bsdf.periodic import PeriodicLayer as PeriodicLayer, SlatMaterial as SlatMaterial
+from .bsdf.plugin import klems_plugin as klems_plugin
+from .bsdf.resample import klems_of as klems_of
+from .bsdf.tensor_plugin import tensor_tree_plugin as tensor_tree_plugin
+from .bsdf.tensor_tree import TensorTreeBsdf as TensorTreeBsdf
+from .bsdf.xml import read_bsdf_xml as read_bsdf_xml
+from .bsdf.xml_write import write_bsdf_xml as write_bsdf_xml
+from .errors import CfsError as CfsError, DataError as DataError, VariantError as VariantError
+from .glare.annual import AnnualGlare as AnnualGlare
+from .glare.classes import glare_class as glare_class, protection_level as protection_level
+from .glare.evaluation import (
+    GlareOptions as GlareOptions,
+    GlareResult as GlareResult,
+    evaluate as evaluate,
+)
+from .images.hdr import Picture as Picture, read_hdr as read_hdr, write_hdr as write_hdr
+from .images.view import View as View, fisheye as fisheye, parse_view as parse_view
+from .matrices.cache import MatrixCache as MatrixCache
+from .matrices.mtx_io import read_matrix as read_matrix, write_matrix as write_matrix
+from .methods.by_name import traced_scene as traced_scene, with_systems as with_systems
+from .methods.glare import hourly_glare as hourly_glare, pictures as pictures
+from .methods.optics import BsdfOptics as BsdfOptics
+from .methods.path_light import PathLight as PathLight, PathSystems as PathSystems
+from .methods.phase_light import PhaseLight as PhaseLight, PhaseSystems as PhaseSystems
+from .methods.phase_scene import PhaseScene as PhaseScene
+from .methods.sampling import Sampling as Sampling
+from .methods.scene import DaylightScene as DaylightScene
+from .metrics.room import RoomMetrics as RoomMetrics, room_metrics as room_metrics
+from .sky.annual import AnnualSky as AnnualSky, annual_sky as annual_sky
+from .sky.cie import cie_patches as cie_patches
+from .sky.matrix import sky_matrix as sky_matrix
+from .sky.patches import ReinhartSky as ReinhartSky
+from .sky.sun import sun_directions as sun_directions
+from .sky.wea import read_wea as read_wea
+from .sky.weather import Weather as Weather, read_epw as read_epw
+from .surfaces import Surfaces as Surfaces, Window as Window, WindowGroup as WindowGroup
+from .trace.daylight_matrix import daylight_matrix as daylight_matrix
+from .trace.estimate import Estimate as Estimate, Stopping as Stopping
+from .trace.view_matrix import view_matrix as view_matrix

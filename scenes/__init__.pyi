@@ -1,0 +1,18 @@
+"""The names of `import scenes`, and the modules that they come from."""
+
+from .job.building import read_building as read_building
+from .job.inputs import System as System, read_system as read_system, read_weather as read_weather
+from .job.operation import Operation as Operation, read_operation as read_operation
+from .job.options import RoomOptions as RoomOptions
+from .results import (
+    DaylightResult as DaylightResult,
+    GlareResults as GlareResults,
+    LuminancePicture as LuminancePicture,
+    OperationResult as OperationResult,
+    RoomYear as RoomYear,
+    ThermalResult as ThermalResult,
+)
+from .simulation import SimulatedYear as SimulatedYear, simulate as simulate
+from .study.store import CaseResult as CaseResult
+from .study.study import StudyResult as StudyResult, run_study as run_study
+from .study.study_file import Study as Study, read_study as read_study

@@ -1,0 +1,124 @@
+"""The year of a room for people who write Python: one call, and a result that shows itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from html import escape
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bim.model import Room
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.weather import Weather
+from scenes import plots
+from scenes import quick as quick_run
+from scenes.job.files import JobFiles
+from scenes.job.inputs import System
+from scenes.job.operation import Operation
+from scenes.job.options import JobOptions
+from scenes.job.outputs import write_results
+from scenes.job.run import job_inputs, run_inputs
+from scenes.job.thermal_system import checked_system
+from scenes.report import write_report
+from scenes.report.headline import cards
+from scenes.result_folder import ResultFolder
+from scenes.results import RoomYear, RunResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedYear(RoomYear):
+    """A room's year that can write its files and show itself."""
+
+    run: RunResult  # that it is the one room of; without it
+
+    def write(self, folder: str | PathLike[str], *, report: bool = True) -> None:
+        """Write the files of `cfs run` in the place of its earlier ones.
+
+        Raises: `DataError` where the folder holds anything else, or cannot be written to.
+        """
+        inputs = (Path(entry["path"]) for entry in self.run.manifest["inputs"].values())
+        place = ResultFolder(Path(folder), "run", inputs=inputs, field="folder")
+        write_results(self._whole_run(), place, write_report if report else None)
+
+    def plot_illuminance(self, axes: Axes | None = None) -> Axes:
+        """The work plane's mean illuminance by day and hour."""
+        return plots.illuminance(self, axes)
+
+    def plot_glare(self, axes: Axes | None = None) -> Axes:
+        """DGP of every hour where it was rated, else of the pictures."""
+        return plots.glare(self, axes)
+
+    def plot_temperatures(self, axes: Axes | None = None) -> Axes:
+        """Operative and outdoor temperature of the year, and what ASHRAE 55 finds comfortable."""
+        return plots.temperatures(self, axes)
+
+    def _repr_html_(self) -> str:
+        """The headline figures of the report as a table, for notebooks."""
+        run = self._whole_run()
+        rows = "".join(
+            f"<tr><th style='text-align:left'>{escape(card.label)}</th>"
+            f"<td>{escape(f'{card.value} {card.unit}'.strip())}</td></tr>"
+            for card in cards(run, self)
+        )
+        name = escape(f"{self.space.label}, {run.manifest['system']}, {run.method}")
+        return f"<table><caption>{name}</caption>{rows}</table>"
+
+    def _whole_run(self) -> RunResult:
+        return replace(self.run, spaces=(self,))
+
+
+def simulate(
+    room: Room,
+    system: System | None,
+    weather: Weather,
+    *,
+    operation: Operation | None = None,
+    quick: bool = False,
+    cache: bool = True,
+    progress: Progress = silent,
+    **options: object,
+) -> SimulatedYear:
+    """Daylight, glare, temperatures and comfort of a room's year, as `cfs run` computes them.
+
+    The same inputs, options and seed give the same numbers as there.
+
+    Args:
+        room: of a building, `read_building("house.ifc").room("Office")`.
+        system: in all windows; None: what the building's file holds for each.
+        weather: of the year, `read_weather("city.epw")`.
+        operation: shading control, gains, set points, `read_operation("office.toml")`; without it
+            the first state holds all year and the room floats freely.
+        quick: few rays and one small picture, for a first look, as `--quick`.
+        cache: keep traced matrices in the user's cache and find them again.
+        progress: called with each stage and how much of it is done.
+        options: the fields of `RoomOptions`, such as `method`, `seed`, `annual_glare`.
+
+    Raises: `DataError` for a room that cannot be computed, a window without a system.
+    """
+    building = room.building
+    if system is None and building.file is None:
+        raise DataError("a building that is not from a file needs a system", element="simulate")
+    if system is not None:
+        checked_system(system, system.file)
+    if quick:
+        options = quick_run.picks(quick_run.ROOM, options) | options
+    chosen = JobOptions(
+        building=building.file,
+        weather=weather.file,
+        system=None if system is None else system.file,
+        operation=None if operation is None else operation.file,
+        spaces=(room.space.guid,),
+        cache=cache,
+        quick=quick,
+        **options,
+    )
+    inputs = job_inputs(building, chosen.spaces, JobFiles(weather, system, operation))
+    run = run_inputs(inputs, chosen, progress)
+    (year,) = run.spaces
+    own = {name: getattr(year, name) for name in RoomYear.__dataclass_fields__}
+    return SimulatedYear(**own, run=replace(run, spaces=()))
