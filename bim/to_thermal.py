@@ -40,7 +40,7 @@ class ThermalRoom:
 
 def thermal_room(
     space: Space,
-    fenestration: Fenestration,
+    fenestration: Fenestration | None,
     *,
     infiltration_ach: float = 0.5,
     gains: Gains | None = None,
@@ -50,6 +50,8 @@ def thermal_room(
     """The zone of a room; faces alike in direction, neighbour and construction become one surface.
 
     Windows keep their order.  Frames are surfaces like others.
+
+    Args: fenestration: of every window; None for a room without any.
     """
     groups: dict[tuple, list[int]] = {}
     for i, face in enumerate(space.faces):
@@ -224,7 +226,9 @@ def _outdoor_point(face: Face) -> NDArray[np.float64]:
     return middle + face.normal * (face.construction.thickness + OFF_THE_WALL)
 
 
-def _windows(space: Space, fenestration: Fenestration, ground_level: float) -> list[WindowElement]:
+def _windows(
+    space: Space, fenestration: Fenestration | None, ground_level: float
+) -> list[WindowElement]:
     labels = _unique([window.name or window.guid for window in space.windows])
     windows = []
     for window, label in zip(space.windows, labels, strict=True):

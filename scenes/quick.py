@@ -22,7 +22,14 @@ ROOM = {  # of `scenes.job.options.RoomOptions`: `cfs run` and `cfs study`
     "heat_step_s": 3600.0,
 }
 VIEWS = {"size": 200, "samples": 8, "worst": 1}  # of `scenes.year_of_glare.options.YearOptions`
-HEAT = {"patch_samples": 1_024, "sensor_samples": 2_048}  # of `[trace]` in `cfs thermal`
+# of `[trace]` in `cfs thermal`: what its light takes of a room's
+HEAT = {
+    name: ROOM[name]
+    for name in (
+        "picture_size", "picture_samples", "sensor_spacing", "sensor_samples", "patch_samples",
+        "sun_points", "path_samples",
+    )
+}  # fmt: skip
 PV = {"samples": 512}  # of `scenes.photovoltaics.study.run_pv`
 
 

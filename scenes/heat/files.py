@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.study_file import StudyFile
 from scenes.job.files import check_names
-from scenes.job.inputs import System, read_system, read_weather
-from scenes.job.thermal_system import ThermalSystem, checked_system
+from scenes.job.inputs import System, read_weather
+from scenes.job.operation import read_state
+from scenes.job.thermal_system import checked_system
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +18,6 @@ class HeatFiles:
 
     weather: Weather
     systems: tuple[System, ...]  # by shading state
-    thermals: tuple[ThermalSystem, ...]
 
 
 def read_files(study: StudyFile) -> HeatFiles:
@@ -31,9 +31,7 @@ def read_files(study: StudyFile) -> HeatFiles:
 
         box_building(study.box)
     weather = read_weather(study.weather)
-    systems = tuple(read_system(s.bsdf, u_value=s.u_value, g_value=s.g_value) for s in study.system)
-    thermals = tuple(
-        checked_system(one, table.bsdf, table)
-        for one, table in zip(systems, study.system, strict=True)
-    )
-    return HeatFiles(weather, systems, thermals)
+    systems = tuple(read_state(table, table.bsdf) for table in study.system)
+    for one, table in zip(systems, study.system, strict=True):
+        checked_system(one, table.bsdf)
+    return HeatFiles(weather, systems)

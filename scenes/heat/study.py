@@ -3,56 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from bim.ifc.building import read_ifc
 from bim.model import Building, Space
-from bim.to_thermal import (
-    ThermalRoom,
-    coupled_rooms,
-    door_links,
-    shared_constructions,
-    thermal_room,
-)
+from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
-from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, item, part
-from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
-from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.progress import Progress, item
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.box import box_building
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
-from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_solar
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.drawn_shades import traced_building
-from scenes.job.holes import hole_notes
-from scenes.job.inputs import System, chosen_spaces, named_spaces
-from scenes.job.thermal import COMPILING, climate
-from scenes.job.thermal_system import ThermalSystem
+from scenes.job.inputs import chosen_spaces, named_spaces
+from scenes.job.room import Room, skies_for
+from scenes.job.thermal_system import thermal_system
 from scenes.job.windows import everywhere
-from thermal.balance import ZoneResult, simulate_zones
-from thermal.climate import Solar
-from thermal.control import (
-    always,
-    by_cut_off,
-    by_glare,
-    by_irradiance,
-    by_schedule,
-    switched,
-)
-from thermal.gains import dimmed_share, split_gains
-from thermal.kernel import advance
-from thermal.records import must_compile
-from thermal.zone import WindowElement, Zone, work_hours
-
-FloatArray = NDArray[np.float64]
+from scenes.job.zone import RoomZone, balances, coupled
+from thermal.balance import ZoneResult
+from thermal.zone import Zone
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +41,6 @@ class ThermalYear:
     months: pd.DataFrame  # discomfort in the occupied hours, by band and month
 
 
-@dataclass(frozen=True, slots=True)
-class ReadyRoom:
-    """A room traced and controlled: all that its heat balance needs."""
-
-    space: Space
-    zone: Zone
-    solar: Solar
-    state: NDArray[np.int64]  # [H] shading state
-    daylight: FloatArray | None  # [H] mean on the work plane [lx]
-    radiant: RadiantRoom | None
-
-
 def run_study(
     study: StudyFile, progress: Progress, files: HeatFiles | None = None
 ) -> tuple[list[ThermalYear], tuple[str, ...]]:
@@ -86,66 +49,75 @@ def run_study(
     Args: files: what `read_files` has read of the study; read now without.
     """
     files = files or read_files(study)
-    weather, systems, thermals = files.weather, files.systems, files.thermals
+    weather, systems = files.weather, files.systems
     building, spaces = rooms_of(study)
-    shades = {guid: s for space in spaces for guid, s in everywhere(space, *systems).items()}
-    building = traced_building(building, shades)
-    zones = [thermal_room(space, thermals[0].fenestration) for space in spaces]
-    notes = dict.fromkeys(note for t in (weather, *systems, *thermals) for note in t.notes)
-    if study.couple:
-        zones, unpaired = coupled_rooms(spaces, zones)
-        notes |= dict.fromkeys(unpaired)
+    in_windows = {guid: s for space in spaces for guid, s in everywhere(space, *systems).items()}
+    building = traced_building(building, in_windows)
+    noted = (weather, *systems, *map(thermal_system, systems))
+    notes = dict.fromkeys(note for t in noted for note in t.notes)
     variants.activate()
-    skies = _skies(weather, study)
-    ready = []
-    for i, (space, zone) in enumerate(zip(spaces, zones, strict=True)):
-        steps = item(progress, "room", i + 1, len(spaces), zone.zone.name)
-        room = ready_room(study, building, space, zone, systems, thermals, weather, skies, steps)
-        ready.append(room)
+    options, trace = study.options, study.trace
+    skies, cache = skies_for(weather, options), MatrixCache.of_user()
+    rooms, radiants = [], []
+    for i, space in enumerate(spaces):
+        steps = item(progress, "room", i + 1, len(spaces), space.label)
+        room = Room(
+            building, space, in_windows, weather, options,
+            operation=study, skies=skies, cache=cache, progress=steps,
+        )  # fmt: skip
         if space.windows:
-            notes |= dict.fromkeys(hole_notes(space, cache=MatrixCache.of_user()))
-        if room.radiant is None and study.trace.view_factors:
-            notes[f"{zone.zone.name}: is not closed, its longwave goes through a mean star."] = None
-    results = balances(study, ready, weather, progress)
-    years = [
-        ThermalYear(
-            room.zone.name,
-            room.space.floor_area,
-            hourly_table(result, room.state, room.daylight, weather, study.comfort),
-            *year_summary(result, weather, study),
-        )
-        for room, result in zip(ready, results, strict=True)
-    ]
+            notes |= dict.fromkeys(f"{one.what}: {one.consequence}" for one in room.holes())
+        zone, radiant = room.zone, None
+        if trace.view_factors:
+            radiant = radiant_room(space, zone.room, samples=trace.patch_samples, seed=trace.seed)
+        rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
+        radiants.append(radiant)
+        steps("heat", 1.0)
+    rooms, results, unpaired = year_of_rooms(study, rooms, weather, progress)
+    notes |= dict.fromkeys(unpaired)
+    years = []
+    for room, result, radiant in zip(rooms, results, radiants, strict=True):
+        if radiant is None and trace.view_factors:
+            notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
+        years.append(_year(study, room, _felt(study, room.zone, result, radiant), weather))
     return years, tuple(notes)
 
 
-def balances(
-    study: StudyFile, rooms: list[ReadyRoom], weather: Weather, progress: Progress
-) -> list[ZoneResult]:
-    """The rooms' years: together where the study couples them, else one by one."""
-    outdoors, step_s = climate(weather), 60.0 * study.step_minutes
-    if must_compile(advance):
-        progress(COMPILING, 0.0)
+def year_of_rooms(
+    study: StudyFile, rooms: Sequence[RoomZone], weather: Weather, progress: Progress
+) -> tuple[Sequence[RoomZone], list[ZoneResult], tuple[str, ...]]:
+    """The rooms' years: together where the study couples them, else one by one.
+
+    Returns: the rooms as they were taken, their years, what had to be assumed.
+    """
+    step_s, unpaired = study.options.heat_step_s, ()
     if study.couple:
         progress("heat balance", 0.0)
-        links = door_links([r.space for r in rooms], study.air.door_m3_s)
-        found = list(
-            simulate_zones(
-                [r.zone for r in rooms], outdoors, [r.solar for r in rooms], step_s=step_s,
-                air_links=links,
-            )
-        )  # fmt: skip
+        rooms, links, unpaired = coupled(rooms, study.air.door_m3_s)
+        found = balances(rooms, weather, step_s, air_links=links, progress=progress)
     else:
         found = []
         for number, room in enumerate(rooms):
             progress("heat balance", number / len(rooms))
-            found += simulate_zones([room.zone], outdoors, [room.solar], step_s=step_s)
+            found += balances([room], weather, step_s, progress=progress)
     progress("heat balance", 1.0)
+    return rooms, found, unpaired
+
+
+def _felt(
+    study: StudyFile, zone: Zone, result: ZoneResult, radiant: RadiantRoom | None
+) -> ZoneResult:
     person = study.comfort
-    return [
-        felt(result, room.radiant, person.mean_radiant, _floor(room.zone), person.air_speed)
-        for room, result in zip(rooms, found, strict=True)
-    ]
+    return felt(result, radiant, person.mean_radiant, _floor(zone), person.air_speed)
+
+
+def _year(study: StudyFile, room: RoomZone, result: ZoneResult, weather: Weather) -> ThermalYear:
+    return ThermalYear(
+        result.name,
+        room.space.floor_area,
+        hourly_table(result, room.state, room.daylight, weather, study.comfort),
+        *year_summary(result, weather, study),
+    )
 
 
 def _floor(zone: Zone) -> int:
@@ -163,98 +135,3 @@ def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
         spaces = named_spaces(building, study.spaces, study.building)
         return building, shared_constructions(spaces)
     return building, chosen_spaces(building, study.spaces, study.building)
-
-
-def _skies(weather: Weather, study: StudyFile) -> AnnualSky:
-    subdivision = study.trace.sky_subdivision
-    return annual_sky(weather, subdivision, sun=False, solar=True)
-
-
-def ready_room(
-    study: StudyFile,
-    building: Building,
-    space: Space,
-    room: ThermalRoom,
-    systems: Sequence[System],
-    thermals: Sequence[ThermalSystem],
-    weather: Weather,
-    skies: AnnualSky,
-    progress: Progress,
-) -> ReadyRoom:
-    """Trace a room in all its shading states, choose the state of every hour."""
-    trace = study.trace
-    omega = systems[0].solar.basis_in.projected_solid_angles()
-    light = room_light(building, space, room, skies, omega, trace, progress)
-    surfaces = len(room.zone.surfaces)
-    suns = []
-    for j, (system, thermal) in enumerate(zip(systems, thermals, strict=True)):
-        steps = part(progress, j / len(systems), (j + 1) / len(systems), "gains")
-        suns.append(state_solar(light, system, thermal, skies, surfaces, trace, steps))
-    plane, eye = None, None
-    lamps = study.gains.lighting_w_m2 > 0
-    if space.windows and (study.control.rule == "glare" or lamps):
-        plane, eye = illuminances(building, space, systems, skies, trace, progress)
-    state = _states(study, space, light, weather, eye)
-    daylight = None if plane is None else plane[state, np.arange(len(state))]
-    radiant = None
-    if trace.view_factors:
-        radiant = radiant_room(space, room, samples=trace.patch_samples, seed=trace.seed)
-    zone = _zone(study, room, space, thermals, len(state), daylight)
-    if radiant is not None:
-        zone = replace(zone, view_factors=radiant.among)
-    return ReadyRoom(space, zone, switched(suns, state), state, daylight, radiant)
-
-
-def _states(
-    study: StudyFile, space: Space, light: RoomLight, weather: Weather, eye: FloatArray | None
-) -> NDArray[np.int64]:
-    """The shading state of every hour [H]."""
-    control, hours = study.control, len(weather.times)
-    if not space.windows:
-        return always(0, hours)
-    if control.rule == "schedule":
-        return by_schedule(control.schedule, hours)
-    brightest = light.irradiance.max(axis=1)
-    if control.rule == "irradiance":
-        closed = control.state or len(study.system) - 1
-        return by_irradiance(brightest, control.close_above, control.open_below, closed=closed)
-    if control.rule == "glare":
-        return by_glare(eye, control.limit_lx)
-    if control.rule == "cut-off":
-        frame = window_frame(space.windows[0].normal)
-        local = sun_directions(weather) @ frame.T
-        beam = weather.direct_normal * np.maximum(local[:, 2], 0.0)
-        tilts = np.radians(control.slat_tilts_deg)
-        return by_cut_off(local, beam, tilts, control.slat_width, control.slat_spacing)
-    return always(control.state, hours)
-
-
-def _zone(
-    study: StudyFile,
-    room: ThermalRoom,
-    space: Space,
-    thermals: Sequence[ThermalSystem],
-    hours: int,
-    daylight: FloatArray | None,
-) -> Zone:
-    """The room's zone with the study's states, gains, air and set points."""
-    gains, air, loads = study.gains, study.air, study.loads
-    present = work_hours(*gains.occupied, hours=hours)
-    power = gains.equipment_w_m2 * space.floor_area + gains.persons * gains.person_w
-    lamps = gains.lighting_w_m2 * space.floor_area * present
-    if daylight is not None:
-        lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
-    states = tuple(t.fenestration for t in thermals)
-    windows = tuple(
-        WindowElement(w.name, w.area, w.normal, states, w.glazing_height, height=w.height)
-        for w in room.zone.windows
-    )
-    return Zone(
-        room.zone.name,
-        room.zone.volume,
-        room.zone.surfaces,
-        windows,
-        infiltration_ach=air.infiltration_ach + air.night_ach * work_hours(*air.night, hours=hours),
-        gains=split_gains(power * present, gains.radiant_share, (lamps, gains.radiant_share)),
-        loads=loads.ideal(),
-    )

@@ -70,7 +70,7 @@ def _check_sun(options: JobOptions, weather: Weather) -> None:
 def _check_operation(operation: Operation, system: System | None) -> None:
     """What does not need the windows: its systems' data, and its control's states."""
     for one, path in zip(operation.systems, operation.files, strict=True):
-        checked_system(one, path, operation.table_of(one))
+        checked_system(one, path)
     if operation.systems:
         check_states(operation, len(operation.systems))
     elif system is not None:

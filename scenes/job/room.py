@@ -20,31 +20,36 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from bim.to_thermal import ThermalRoom, thermal_room
+from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.phases import window_radiance
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.surfaces import Surfaces
 from scenes.job.annual import glare_by_state, glare_of_year, worst_hours
+from scenes.job.control import shading_states
 from scenes.job.daylight import room_daylight, room_scene
 from scenes.job.glare import default_hours, room_glare
 from scenes.job.holes import hole_problems
-from scenes.job.inputs import System
-from scenes.job.operation import Operation, operated, shading_states
+from scenes.job.operation import Operation
+from scenes.job.operation_tables import OperationTables
 from scenes.job.options import RoomOptions
 from scenes.job.picture_hours import wanted_hours
-from scenes.job.thermal import room_thermal
-from scenes.job.thermal_system import ThermalSystem, state_of, thermal_system
+from scenes.job.solar import RoomSun
+from scenes.job.thermal import fenestration_table, thermal_result
+from scenes.job.thermal_system import ThermalSystem, thermal_system
 from scenes.job.windows import States, room_windows
+from scenes.job.zone import RoomZone, balances, internal_gains, operated, with_states
 from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYear, ThermalResult
 from thermal.balance import ZoneResult
-from thermal.zone import Zone
 
+FloatArray = NDArray[np.float64]
 T = TypeVar("T")
 WORST = 4  # pictures of an annual glare without hours asked for
 
@@ -86,14 +91,16 @@ def compute_room(
 
     Raises: `ValueError` for a room that cannot be computed (no work plane, no system for a window).
     """
-    if operation is not None:
-        options = replace(options, occupied=operation.tables.gains.occupied)
-    else:
+    if operation is None:
         systems = {guid: states[:1] for guid, states in systems.items()}
-    skies = skies or skies_for(weather, options)
-    room = _Room(building, space, systems, weather, options, operation, skies, cache, progress)
+    room = Room(
+        building, space, systems, weather, options,
+        operation=None if operation is None else operation.tables,
+        skies=skies, cache=cache, progress=progress,
+    )  # fmt: skip
+    options, skies = room.options, room.skies
     hours = wanted_hours(options.picture_hours, weather.midpoints, skies.lit)
-    daylight = room.timed("daylight", room.daylight)
+    daylight = room.timed("daylight", lambda: room.daylight)
     holes = room.timed("holes", room.holes)
     year, rated = None, GlareResults(room.scene.view, ())
     if options.annual_glare:
@@ -101,13 +108,16 @@ def compute_room(
     if pictures:
         rated = room.timed("glare", lambda: room.glare(hours, year))
     dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
-    heat, balance = room.timed("thermal", lambda: room.thermal(daylight))
+    heat, balance = room.timed("thermal", room.thermal)
     ran = None if operation is None else room.operation_result(balance)
     return RoomYear(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes)
 
 
-class _Room:
-    """A room on its way: each step keeps what the later ones need."""
+class Room:
+    """A room on its way: each step is computed when it is first asked for, and serves all others.
+
+    `cfs run` and `cfs study` ask for all of them (`compute_room`), `cfs thermal` for `zone`.
+    """
 
     def __init__(
         self,
@@ -116,17 +126,20 @@ class _Room:
         systems: Mapping[str, States],
         weather: Weather,
         options: RoomOptions,
-        operation: Operation | None,
-        skies: AnnualSky,
-        cache: MatrixCache | None,
-        progress: Progress,
+        *,
+        operation: OperationTables | None = None,
+        skies: AnnualSky | None = None,
+        cache: MatrixCache | None = None,
+        progress: Progress = silent,
     ) -> None:
+        """See `compute_room`."""
+        if operation is not None:
+            options = replace(options, occupied=operation.gains.occupied)
         self.building, self.space, self.weather, self.options = building, space, weather, options
-        self.operation, self.skies, self.cache, self.progress = operation, skies, cache, progress
+        self.operation, self.cache, self.progress = operation, cache, progress
+        self.skies = skies_for(weather, options) if skies is None else skies
         self.windows = room_windows(space, systems)
-        self.scene = room_scene(building, space, self.windows, options)
         self.seconds: dict[str, float] = {}
-        self.lamps = np.zeros(skies.hours)  # [H] power [W]
 
     def timed(self, stage: str, work: Callable[[], T]) -> T:
         """What the work gives; its time is noted."""
@@ -134,6 +147,11 @@ class _Room:
         result = work()
         self.seconds[stage] = round(time.monotonic() - start, 2)
         return result
+
+    @cached_property
+    def scene(self) -> DaylightScene:
+        """Triangles, window groups, sensors and view in the visible band."""
+        return room_scene(self.building, self.space, self.windows, self.options)
 
     @cached_property
     def traced(self) -> PhaseScene:
@@ -165,17 +183,15 @@ class _Room:
     @cached_property
     def state(self) -> NDArray[np.int64]:
         """The shading state of every hour [H]."""
-        if self.operation is None:
+        if self.operation is None or not self.space.windows:
             return np.zeros(self.skies.hours, dtype=np.int64)
-        omega = KLEMS_FULL.projected_solid_angles()[:, None]
-        incident = window_radiance(self.traced.daylight.values, self.skies.solar) * omega
         return shading_states(
-            self.operation.tables.control,
+            self.operation.control,
             self.space,
             self.weather,
-            self.light.filled.states,
-            irradiance=self.skies.whole_year(incident.sum(axis=1)).T,
-            eye=self.skies.whole_year(self.eye()),
+            self.windows.states,
+            irradiance=lambda: self.sun.irradiance,
+            eye=lambda: self.skies.whole_year(self.eye()),
             dgp=lambda: glare_by_state(self.light, self.progress),
         )
 
@@ -184,6 +200,7 @@ class _Room:
         """The shading state of every lit hour [L]."""
         return self.state[self.skies.lit]
 
+    @cached_property
     def daylight(self) -> DaylightResult:
         """Illuminance of the work plane and its metrics."""
         self.progress("daylight", 0.0)
@@ -226,26 +243,70 @@ class _Room:
             hours = default_hours(self.weather.midpoints, self.skies.lit, eye, count)
         return room_glare(self.pictured, self.scene.view, self.lit_state, hours, self.progress)
 
-    def thermal(self, daylight: DaylightResult) -> tuple[ThermalResult, ZoneResult]:
-        """Temperatures and comfort."""
+    @cached_property
+    def outdoors(self) -> PhaseScene:
+        """D of the solar band: the visible one's where the outdoors reflects both bands alike."""
+        exterior = exterior_surfaces(self.building, self.space, "solar")
+        if "scene" in self.__dict__ and np.array_equal(
+            exterior.reflectance, self.scene.exterior.reflectance
+        ):
+            return self.traced
+        scene = DaylightScene(Surfaces.none(), exterior, self.windows.groups)
+        steps = part(self.progress, 0.0, 0.8, "heat")
+        return PhaseScene(scene, self.options.sampling, cache=self.cache, progress=steps)
+
+    @cached_property
+    def sun(self) -> RoomSun:
+        """The sun outside and what the room does with it."""
         self.progress("heat", 0.0)
-        operate = None
+        steps = part(self.progress, 0.0, 0.8, "heat")
+        interior = interior_surfaces(self.space, "solar")
+        return RoomSun(self.outdoors, interior, self.surfaces, self.skies, steps)
+
+    @cached_property
+    def thermals(self) -> list[list[ThermalSystem]]:
+        """Thermal data of the windows' systems by group and state [G][J]."""
+        return [[thermal_system(system) for system in states] for states in self.windows.systems]
+
+    @cached_property
+    def surfaces(self) -> ThermalRoom:
+        """The room's surfaces and windows as a zone, with the gains and the air of the options."""
+        group, heats = self.windows.group, self.thermals
+        first = heats[group[0]][0].fenestration if len(group) else None
+        gains = internal_gains(self.space, self.skies.hours, self.options)
+        air = self.options.infiltration_ach
+        room = thermal_room(self.space, first, infiltration_ach=air, gains=gains)
+        return replace(room, zone=with_states(room.zone, [heats[g] for g in group]))
+
+    @cached_property
+    def plane(self) -> FloatArray | None:
+        """Mean illuminance of the work plane [H] [lx]; None where neither lamps nor the control
+        ask for light."""
+        tables = self.operation
+        if tables is None or not self.space.windows:
+            return None
+        if tables.control.rule != "glare" and not tables.gains.lighting_w_m2:
+            return None
+        return self.daylight.illuminance.mean(axis=1, dtype=float)
+
+    @cached_property
+    def zone(self) -> RoomZone:
+        """The room as the heat balance takes it."""
+        room, lamps, hours = self.surfaces, np.zeros(self.skies.hours), self.skies.hours
         if self.operation is not None:
-            operate = lambda zone: self._operated(zone, daylight)  # noqa: E731
-        return room_thermal(
-            self.building, self.space, self.windows, self.traced, self.state, self.skies,
-            self.weather, self.options, self.progress,
-            thermal_of=self._thermal_of, operate=operate,
-        )  # fmt: skip
+            area = self.space.floor_area
+            zone, lamps = operated(room.zone, self.operation, area, hours, self.plane)
+            room = replace(room, zone=zone)
+        solar, gains = self.sun.switched(self.windows, self.thermals, self.state)
+        return RoomZone(self.space, room, solar, gains, self.state, lamps, self.plane)
 
-    def _operated(self, zone: Zone, daylight: DaylightResult) -> Zone:
-        mean = daylight.illuminance.mean(axis=1, dtype=float)
-        zone, self.lamps = operated(zone, self.operation.tables, self.space.floor_area, mean)
-        return zone
-
-    def _thermal_of(self, system: System) -> ThermalSystem:
-        table = None if self.operation is None else self.operation.table_of(system)
-        return thermal_system(system) if table is None else state_of(system, table)
+    def thermal(self) -> tuple[ThermalResult, ZoneResult]:
+        """Temperatures and comfort, and the balance they come from."""
+        step_s = self.options.heat_step_s
+        (balance,) = balances([self.zone], self.weather, step_s, progress=self.progress)
+        self.progress("heat", 1.0)
+        table = fenestration_table(self.windows, self.thermals)
+        return thermal_result(self.zone, balance, self.weather, self.options, table), balance
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""
@@ -255,17 +316,17 @@ class _Room:
                 "shading_state": self.state,
                 "heating_w": balance.heating,
                 "cooling_w": balance.cooling,
-                "lighting_w": self.lamps,
+                "lighting_w": self.zone.lamps,
             },
             index=self.weather.midpoints,
         ).rename_axis("time")
         summary = {
             "heating_kwh": balance.heating.sum() / 1e3,
             "cooling_kwh": balance.cooling.sum() / 1e3,
-            "lighting_kwh": self.lamps.sum() / 1e3,
+            "lighting_kwh": self.zone.lamps.sum() / 1e3,
             "peak_heating_w": balance.heating.max(),
             "peak_cooling_w": balance.cooling.max(),
         }
         names = tuple(system.name for system in most)
         summary = {key: float(value) for key, value in summary.items()}
-        return OperationResult(names, hours, summary, self.operation.tables.control.rule)
+        return OperationResult(names, hours, summary, self.operation.control.rule)

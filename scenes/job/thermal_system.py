@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.errors import DataError
-from scenes.heat.study_file import SystemTable
 from scenes.job.inputs import System
 from thermal.blackbox import (
     Fenestration,
@@ -72,19 +71,14 @@ def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
     return float(weight @ solar.direct_hemispherical(block) / weight.sum())
 
 
-def state_of(system: System, table: SystemTable) -> ThermalSystem:
-    """A shading state's thermal data with the closure that its table asks for, else its own."""
-    return thermal_system(replace(system, closure=table.closure() or system.closure))
-
-
-def checked_system(system: System, path: Path, table: SystemTable | None = None) -> ThermalSystem:
-    """The thermal data of a system, with the closure of its table where there is one.
+def checked_system(system: System, path: Path) -> ThermalSystem:
+    """The thermal data of a system.
 
     Args: path: the file that U and g are wrong in, for the message.
 
     Raises: `DataError` where U, g and the BSDF do not go together.
     """
     try:
-        return thermal_system(system) if table is None else state_of(system, table)
+        return thermal_system(system)
     except ThermalInputError as error:
         raise DataError(error.message, file=path, element=error.item) from error

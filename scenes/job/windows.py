@@ -29,8 +29,8 @@ class RoomWindows:
 
     @property
     def states(self) -> int:
-        """J, how many states there are: of the group that has most."""
-        return max(len(states) for states in self.systems)
+        """J, how many states there are: of the group that has most; 1 of a room without windows."""
+        return max((len(states) for states in self.systems), default=1)
 
     def optics(self) -> list[list[BsdfOptics]]:
         """Each group's systems by state [G][J], as the methods take them."""
@@ -83,5 +83,6 @@ def _groups(space: Space, groups: list[WindowGroup]) -> NDArray[np.int64]:
                 if any(np.array_equal(w.triangles, window.triangles) for w in group.windows)
             )
             for window in space.windows
-        ]
+        ],
+        dtype=np.int64,
     )

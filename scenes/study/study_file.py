@@ -18,8 +18,9 @@ from pydantic import (
 
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.durations import seconds_of, share_of
-from scenes.heat.study_file import BoxTable, Hours
+from scenes.heat.study_file import BoxTable
 from scenes.job.operation import read_operation
+from scenes.job.operation_tables import Hours
 from scenes.job.options import RoomOptions
 from scenes.quick import ROOM, picks
 from scenes.toml_file import read_table, validated

@@ -21,7 +21,7 @@ from scenes.job.attached import g_by_patch
 from scenes.job.inputs import read_system
 from scenes.job.options import JobOptions
 from scenes.job.run import read_inputs, used_systems
-from scenes.job.thermal import thermal_system
+from scenes.job.thermal_system import thermal_system
 
 QUICK = [
     "--quick", "--picture-size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",

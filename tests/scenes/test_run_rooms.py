@@ -21,8 +21,9 @@ from mitsuba_cfs.sky.weather import Weather, read_epw
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.job.alike import as_room, same_light, same_systems
 from scenes.job.annual import worst_hours
+from scenes.job.control import shading_states
 from scenes.job.inputs import System, read_system
-from scenes.job.operation import check_states, read_operation, shading_states
+from scenes.job.operation import check_states, read_operation
 from scenes.job.options import JobOptions, RoomOptions
 from scenes.job.room import compute_room, skies_for
 from scenes.job.windows import everywhere, room_windows
@@ -260,8 +261,9 @@ def test_rules_of_the_control(tmp_path, weather) -> None:
     def states(text: str, dgp=None):
         control = read_operation(operation_file(tmp_path, text)).tables.control
         return shading_states(
-            control, ROOM, weather, 3, irradiance=bright, eye=eye, dgp=dgp or pytest.fail
-        )
+            control, ROOM, weather, 3,
+            irradiance=lambda: bright, eye=lambda: eye, dgp=dgp or pytest.fail,
+        )  # fmt: skip
 
     by_sun = states('[control]\nrule = "irradiance"\nclose_above = 300')
     assert np.flatnonzero(by_sun).tolist() == [100] and by_sun[100] == 2
@@ -359,69 +361,3 @@ def test_a_tensor_tree_is_taken_for_its_klems_matrix(real_data) -> None:
     klems = system.visible
     share = klems.direct_hemispherical(klems.transmission_front)[[0, 20, 60]]
     assert share == pytest.approx(expected, abs=0.02)  # the patch's mean against its middle
-
-
-STUDY = """
-weather = "{weather}"
-[box]
-width = 3
-depth = 4
-height = 2.8
-[[box.window]]
-x = 0.5
-sill = 0.9
-width = 2
-height = 1.5
-[trace]
-view_factors = false
-patch_samples = 512
-sensor_samples = 1024
-"""
-TABLES = """
-[[system]]
-bsdf = "open.xml"
-u_value = 1.3
-[[system]]
-bsdf = "shut.xml"
-u_value = 1.1
-u_model = "linear"
-[control]
-rule = "irradiance"
-close_above = 150
-[gains]
-lighting_w_m2 = 10
-persons = 2
-[air]
-infiltration_ach = 0.4
-night_ach = 2.0
-[loads]
-heating_c = 20
-cooling_c = 26
-"""
-
-
-def test_operation_is_that_of_a_thermal_study(variant, tmp_path, weather) -> None:
-    """The same tables through `cfs thermal`: the same states, loads and temperatures."""
-    from scenes.heat.study import rooms_of, run_study
-    from scenes.heat.study_file import read_study
-
-    operation = read_operation(operation_file(tmp_path, TABLES))
-    file = tmp_path / "study.toml"
-    file.write_text(STUDY.format(weather=WEATHER.as_posix()) + TABLES)
-    study = read_study(file)
-    (year,), _ = run_study(study, silent)
-    building, (space,) = rooms_of(study)
-    options = replace(
-        SMALL, method="three-phase", sensor_spacing=1.0, sensor_samples=1024, patch_samples=512
-    )
-    systems = everywhere(space, *operation.systems)
-    found = compute_room(
-        building, space, systems, weather, options, operation=operation, pictures=False
-    )
-    ran = found.operation
-    assert 0 < ran.hours["shading_state"].mean() < 1
-    np.testing.assert_array_equal(ran.hours["shading_state"], year.hours["shading_state"])
-    for name in ("heating_kwh", "cooling_kwh"):
-        assert ran.summary[name] == pytest.approx(year.summary[name], rel=1e-5)
-    air = found.heat.temperatures["air_c"].to_numpy()
-    np.testing.assert_allclose(air, year.hours["air_c"], atol=1e-4)
