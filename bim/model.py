@@ -224,7 +224,7 @@ class Building:
         try:
             return Room(self, self.space(name_or_guid))
         except (KeyError, ValueError) as error:
-            raise DataError(str(error.args[0]), file=self.file, field="space") from error
+            raise DataError(str(error.args[0]), file=self.file, field="space") from None
 
 
 @dataclass(frozen=True, slots=True)

@@ -232,8 +232,9 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Place:
     def opened(path: object) -> None:
         raise AssertionError(f"the building {path} was read before the mistake was named")
 
+    real = bim.ifc.project.open_ifc  # which the loop replaces too, at its turn
     for module in list(sys.modules.values()):  # wherever it has been imported to
-        if getattr(module, "open_ifc", None) is bim.ifc.project.open_ifc:
+        if getattr(module, "open_ifc", None) is real:
             monkeypatch.setattr(module, "open_ifc", opened)
     monkeypatch.setattr(bim.ifc.project, "open_ifc", opened)
     monkeypatch.setattr(bim.ifc.project.ifcopenshell, "open", opened)
