@@ -252,13 +252,16 @@ class Room:
         ):
             return self.traced
         scene = DaylightScene(Surfaces.none(), exterior, self.windows.groups)
-        steps = part(self.progress, 0.0, 0.8, "heat")
-        return PhaseScene(scene, self.options.sampling, cache=self.cache, progress=steps)
+        steps = part(self.progress, 0.0, 1.0, "sun")
+        found = PhaseScene(scene, self.options.sampling, cache=self.cache, progress=steps)
+        if scene.groups:
+            _ = found.daylight
+            steps("sun", 1.0)
+        return found
 
     @cached_property
     def sun(self) -> RoomSun:
         """The sun outside and what the room does with it."""
-        self.progress("heat", 0.0)
         steps = part(self.progress, 0.0, 0.8, "heat")
         interior = interior_surfaces(self.space, "solar")
         return RoomSun(self.outdoors, interior, self.surfaces, self.skies, steps)
@@ -293,12 +296,14 @@ class Room:
     def zone(self) -> RoomZone:
         """The room as the heat balance takes it."""
         room, lamps, hours = self.surfaces, np.zeros(self.skies.hours), self.skies.hours
+        sun, state, plane = self.sun, self.state, self.plane  # stages of their own before this one
+        self.progress("heat", 0.0)
         if self.operation is not None:
             area = self.space.floor_area
-            zone, lamps = operated(room.zone, self.operation, area, hours, self.plane)
+            zone, lamps = operated(room.zone, self.operation, area, hours, plane)
             room = replace(room, zone=zone)
-        solar, gains = self.sun.switched(self.windows, self.thermals, self.state)
-        return RoomZone(self.space, room, solar, gains, self.state, lamps, self.plane)
+        solar, gains = sun.switched(self.windows, self.thermals, state)
+        return RoomZone(self.space, room, solar, gains, state, lamps, plane)
 
     def thermal(self) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort, and the balance they come from."""
