@@ -15,8 +15,12 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mitsuba_cfs.errors import DataError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 try:
     import fcntl
@@ -96,7 +100,7 @@ def write_bytes(path: str | PathLike[str], data: bytes) -> None:
         part.write_bytes(data)
 
 
-def write_table(table, path: str | PathLike[str], **options: object) -> None:
+def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: object) -> None:
     """Write a pandas table as its suffix says, `.parquet` or text; options of its writer."""
     with replacing(path) as part:
         write = table.to_parquet if part.suffix == ".parquet" else table.to_csv

@@ -10,6 +10,7 @@ Source: Radiance `rpict` manual (view options) and the projection formulas of it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -85,7 +86,7 @@ def _unit(vector: ArrayLike, name: str) -> NDArray[np.float64]:
     return np.array([x * scale, y * scale, z * scale])
 
 
-def fisheye(position: ArrayLike, direction: ArrayLike, size: int = 800, **changes) -> View:
+def fisheye(position: ArrayLike, direction: ArrayLike, size: int = 800, **changes: Any) -> View:
     """The 180 degree angular fisheye (`-vta -vh 180 -vv 180`), upright, that glare is rated in."""
     plain = View("angular", position, direction, (0, 0, 1), 180, 180, size, size)
     return replace(plain, **changes)
@@ -143,23 +144,27 @@ def _half_sizes(view: View) -> tuple[float, float]:
     return np.radians(view.horizontal_deg) / 2, np.radians(view.vertical_deg) / 2
 
 
-def _perspective(view: View, x: NDArray, y: NDArray):
+# Direction x, y, z of the points of a picture, whether they are in the view, width and height
+Projected = tuple[Any, Any, Any, Any, tuple[float, float]]
+
+
+def _perspective(view: View, x: NDArray, y: NDArray) -> Projected:
     half_x, half_y = _half_sizes(view)
     scales = (2 * np.tan(half_x), 2 * np.tan(half_y))
     return x, y, 1.0, True, scales
 
 
-def _parallel(view: View, x: NDArray, y: NDArray):
+def _parallel(view: View, x: NDArray, y: NDArray) -> Projected:
     return 0.0, 0.0, 1.0, True, (1.0, 1.0)
 
 
-def _cylindrical(view: View, x: NDArray, y: NDArray):
+def _cylindrical(view: View, x: NDArray, y: NDArray) -> Projected:
     azimuth, (_, half_y) = x * np.radians(view.horizontal_deg), _half_sizes(view)
     scales = (1.0, 2 * np.tan(half_y))
     return np.sin(azimuth), y, np.cos(azimuth), True, scales
 
 
-def _hemispherical(view: View, x: NDArray, y: NDArray):
+def _hemispherical(view: View, x: NDArray, y: NDArray) -> Projected:
     # The largest number below 1 for the sine of a right angle, as in Radiance's vector arithmetic:
     # corners of pixels on the rim (3-4-5 triangles) then exist, and rays agree to the last bit.
     below = np.nextafter(1.0, 0.0)
@@ -168,7 +173,7 @@ def _hemispherical(view: View, x: NDArray, y: NDArray):
     return x, y, np.sqrt(np.maximum(1.0 - square, 0.0)), square <= 1.0, (across, along)
 
 
-def _angular(view: View, x: NDArray, y: NDArray):
+def _angular(view: View, x: NDArray, y: NDArray) -> Projected:
     x = x * ((1.0 / 180.0) * view.horizontal_deg)
     y = y * ((1.0 / 180.0) * view.vertical_deg)
     square = x * x + y * y
@@ -180,7 +185,7 @@ def _angular(view: View, x: NDArray, y: NDArray):
     return x * scale, y * scale, forwards, square <= 1.0, (1.0, 1.0)
 
 
-def _planispheric(view: View, x: NDArray, y: NDArray):
+def _planispheric(view: View, x: NDArray, y: NDArray) -> Projected:
     half_x, half_y = _half_sizes(view)
     x, y = x * 2 * np.tan(half_x / 2), y * 2 * np.tan(half_y / 2)
     square = x * x + y * y
