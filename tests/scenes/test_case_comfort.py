@@ -38,7 +38,10 @@ def judged(year, weather) -> float:
     """
     hours = np.arange(8760) % 24
     used = (hours >= case.HOURS[0]) & (hours < case.HOURS[1])
-    operative = year.hours["operative_c"].to_numpy()[used]
+    # 10 and 40 degC bound what it takes; nobody is comfortable there or beyond
+    operative = np.clip(year.hours["operative_c"].to_numpy()[used], 10, 40)
     mean = running_mean(read_epw(weather).dry_bulb_c)[used]
+    holds = (mean >= 10) & (mean <= 33.5)  # outside, the model does not hold: not comfortable
+    operative, mean = operative[holds], mean[holds]
     said = adaptive_ashrae(tdb=operative, tr=operative, t_running_mean=mean, v=0.1)
-    return 100 * float(np.mean(said.acceptability_90))
+    return 100 * np.count_nonzero(said.acceptability_90) / np.count_nonzero(used)
