@@ -4,6 +4,7 @@
 - Each package of the code has a page of its public modules, found by looking: nothing is listed
   by hand.
 - A link that leads out of docs/ in the repository leads to a copy of that file in the site.
+- A page that loads anything from another address ends the build.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import re
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
 
@@ -22,6 +24,10 @@ NOT_PUBLIC = ("scenes/evidence", "scenes/commands")  # not in the wheel; said by
 PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "CONTRIBUTING.md",
          "CHANGELOG.md": "CHANGELOG.md"}  # fmt: skip
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#|/)([^)#\s]+)")  # relative: no scheme, no anchor alone
+
+LOADED = re.compile(
+    r"<(?:script|link|img|iframe)\b[^>]*?(?:src|href)=[\"']?(?:https?:)?//[^\"' >]+"
+)
 
 
 def api_pages() -> dict[str, list[str]]:
@@ -85,6 +91,13 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         return posixpath.relpath(target, posixpath.dirname(here) or ".")
 
     return LINK.sub(led, markdown)
+
+
+def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
+    """Refuse what is loaded from elsewhere: the site is read without a network."""
+    if loaded := LOADED.search(output):
+        raise PluginError(f"{page.file.src_uri}: loads from outside: {loaded[0]}")
+    return output
 
 
 def _in_repository(page: str, link: str) -> str:

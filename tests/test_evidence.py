@@ -66,3 +66,11 @@ def test_what_is_exempt_is_there():
     for name, heads in NO_EVIDENCE.items():
         page = (DOCS / name).read_text("utf-8")
         assert heads == "all" or heads <= {head for head, _ in tables(page)}, name
+
+
+def test_the_glossary_counts_klems_patches_as_the_code_does():
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER
+
+    full, half, quarter = (basis.size for basis in (KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER))
+    said = f"{full} x {full} (full), {half} (half) or {quarter} (quarter) patches"
+    assert said in (DOCS / "glossary.md").read_text("utf-8")
