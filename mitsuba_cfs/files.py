@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mitsuba_cfs.errors import DataError
 
@@ -98,6 +98,18 @@ def write_bytes(path: str | PathLike[str], data: bytes) -> None:
     """Write a file; it is the old one or the new one at any time."""
     with replacing(path) as part:
         part.write_bytes(data)
+
+
+@contextmanager
+def opened_arrays(path: str | PathLike[str]) -> Iterator[Any]:
+    """A NumPy archive of arrays by name; closed also where it is damaged.
+
+    `np.load` of a path leaves the file open where it is no whole archive.
+    """
+    import numpy as np
+
+    with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as data:
+        yield data
 
 
 def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: object) -> None:
