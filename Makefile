@@ -7,13 +7,14 @@ WORKERS ?= 2
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 INPUTS := pyproject.toml constraints.txt .ci/set-up
 
-.PHONY: help demo test test-all lint format clean
+.PHONY: help demo test test-all lint format docs clean
 
 help:
 	@echo "make demo      run the whole job on the office that the repository ships"
 	@echo "make test      lint and the quick tests"
-	@echo "make test-all  lint and all tests, the slow ones too"
-	@echo "make lint      check style; make format repairs what it can"
+	@echo "make test-all  lint, all tests, the slow ones too, with coverage, and the documentation"
+	@echo "make lint      check style and types; make format repairs what it can"
+	@echo "make docs      the documentation as a site, in site/index.html"
 	@echo "make clean     remove what these made, the virtual environment too"
 
 demo: $(VENV)/.run
@@ -22,12 +23,16 @@ demo: $(VENV)/.run
 test: lint
 	$(PYTEST) -m "not slow"
 
-test-all: lint
-	$(PYTEST)
+test-all: lint docs
+	$(PYTEST) --cov --cov-report=term
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m mypy
+
+docs: $(VENV)/.dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .
@@ -38,9 +43,9 @@ $(VENV)/.run: $(INPUTS)
 	@touch $@
 
 $(VENV)/.dev: $(INPUTS)
-	@bash .ci/set-up '.[dev,peers,distributed]'
+	@bash .ci/set-up '.[dev,peers,distributed,docs]'
 	@touch $@ $(VENV)/.run
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache out cfs-demo
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .coverage site out cfs-demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -14,13 +14,20 @@ class Named(Protocol):
     """What is found by its names: a room of a building, a space of a file."""
 
     @property
-    def guid(self) -> str: ...
+    def guid(self) -> str:
+        """The GlobalId."""
+
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The number or short name."""
+
     @property
-    def long_name(self) -> str: ...
+    def long_name(self) -> str:
+        """The name in full."""
+
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """What a user calls it: both."""
 
 
 T = TypeVar("T", bound=Named)

@@ -155,7 +155,7 @@ def _side_planes(
     inward, up = -out, np.array([0.0, 0.0, 1.0])
     far_right, far_left = right * width + inward * depth, inward * depth
 
-    def side(origin: NDArray[np.float64], u, v) -> Plane:
+    def side(origin: NDArray[np.float64], u: NDArray[np.float64], v: NDArray[np.float64]) -> Plane:
         return Plane(origin, np.stack([u, v, np.cross(u, v)]))
 
     zero = np.zeros(3)

@@ -218,7 +218,7 @@ def _spans(
 def _open_or_ground(
     point: NDArray[np.float64], normal: NDArray[np.float64], around: Surroundings
 ) -> str:
-    """ "ground" below ground level, "outside" where rays escape, else "unknown"."""
+    """Beyond a point: "ground" below its level, "outside" where rays escape, else "unknown"."""
     if point[2] < around.ground_level - 0.1 or (
         normal[2] < -0.7 and point[2] < around.ground_level + DEEPEST_WALL
     ):

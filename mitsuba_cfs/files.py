@@ -15,8 +15,12 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from mitsuba_cfs.errors import DataError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 try:
     import fcntl
@@ -96,7 +100,19 @@ def write_bytes(path: str | PathLike[str], data: bytes) -> None:
         part.write_bytes(data)
 
 
-def write_table(table, path: str | PathLike[str], **options: object) -> None:
+@contextmanager
+def opened_arrays(path: str | PathLike[str]) -> Iterator[Any]:
+    """A NumPy archive of arrays by name; closed also where it is damaged.
+
+    `np.load` of a path leaves the file open where it is no whole archive.
+    """
+    import numpy as np
+
+    with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as data:
+        yield data
+
+
+def write_table(table: pd.DataFrame, path: str | PathLike[str], **options: object) -> None:
     """Write a pandas table as its suffix says, `.parquet` or text; options of its writer."""
     with replacing(path) as part:
         write = table.to_parquet if part.suffix == ".parquet" else table.to_csv

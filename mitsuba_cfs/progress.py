@@ -21,6 +21,10 @@ class Stage(str):
     """
 
     __slots__ = ("noun", "number", "total", "whole")
+    noun: str
+    number: int
+    total: int
+    whole: bool
 
     def __new__(
         cls, label: str, noun: str, number: int, total: int, *, whole: bool = False

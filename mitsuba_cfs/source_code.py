@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -84,6 +84,7 @@ def _imported(tree: ast.AST, root: Path) -> Iterator[str]:
 def _computing(node: ast.AST) -> Iterator[ast.AST]:
     """The nodes of a module without what stands under `if TYPE_CHECKING`."""
     yield node
+    children: Iterable[ast.AST]
     if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
         children = node.orelse
     else:

@@ -185,7 +185,10 @@ class ResultFolder:
 
     def _put_in_place(self, part: Path) -> None:
         """Move the finished files in; the mark is the last, and a cut is taken up from `part`."""
-        old, done = set(self._mark.files), Mark.read(part)
+        done = Mark.read(part)
+        if self._mark is None or done is None:
+            raise RuntimeError("no mark of the earlier results, or of the finished part")
+        old = set(self._mark.files)
         moved = sorted(name for name in done.files if os.path.lexists(part / name))
         for name in moved:
             if name not in old and _taken(self._place, name):

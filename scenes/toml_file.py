@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -36,7 +36,7 @@ def validated(model: type[T], table: dict[str, Any], path: Path) -> T:
         raise DataError(_said(first, model) + more, file=path, field=field or None) from error
 
 
-def _said(fault: dict[str, Any], model: type[BaseModel]) -> str:
+def _said(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
     """A fault in words: those of pydantic, but for keys that there are not."""
     if fault["type"] == "missing":
         return "is missing"

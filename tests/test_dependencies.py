@@ -14,7 +14,11 @@ import pytest
 REPOSITORY = Path(__file__).parent.parent
 PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
 PEERS = {"pyradiance", "pyenergyplus-lbnl", "pywincalc"}
-RUN_BY_NAME = {"ruff", "pytest-xdist"}  # the Makefile's
+# The Makefile's and mkdocs.yml's
+RUN_BY_NAME = {
+    "ruff", "mypy", "pytest-cov", "pytest-xdist",
+    "mkdocs", "mkdocs-material", "mkdocstrings-python",
+}  # fmt: skip
 # Loaded by another package, where our source has this attribute
 LOADED_BY = {"pyarrow": "to_parquet"}  # pandas
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]

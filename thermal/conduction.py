@@ -37,7 +37,7 @@ class WallGrid:
         g, c = self.conductance, self.capacity[1:-1] / step_s
         matrix = np.diag(c + g[:-1] + g[1:])
         matrix -= np.diag(g[1:-1], 1) + np.diag(g[1:-1], -1)
-        return np.linalg.inv(matrix)
+        return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
 def wall_grid(layers: Sequence[Layer], *, cell: float = CELL) -> WallGrid:

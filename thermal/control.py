@@ -7,6 +7,7 @@ together: `switched` picks the sun, and hands the state to the heat balance.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,5 +117,5 @@ def switched(states: Sequence[Solar], chosen: ArrayLike) -> Solar:
         return np.stack(arrays)[at, np.arange(rows)]
 
     names = ("absorbed_outer", "absorbed_inner", "inside", "facade", "window_inside")
-    parts = {name: pick(name) for name in (*names, "window_facade")}
+    parts: dict[str, Any] = {name: pick(name) for name in (*names, "window_facade")}
     return Solar(**parts, state=np.repeat(choice[:, None], windows, axis=1))

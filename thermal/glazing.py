@@ -84,8 +84,8 @@ def gap_conductances(gaps: Sequence[Gap], position: str = "vertical") -> NDArray
     conductance = np.zeros(len(gaps))
     for _ in range(50):
         differences = TOTAL_DIFFERENCE * share
-        fresh = [g.conductance(d, position) for g, d in zip(gaps, differences, strict=True)]
-        fresh = np.array(fresh)
+        pairs = zip(gaps, differences, strict=True)
+        fresh = np.array([gap.conductance(d, position) for gap, d in pairs])
         if np.max(np.abs(fresh - conductance), initial=0.0) < 1e-9:
             break
         conductance = fresh

@@ -1,5 +1,8 @@
-"""Fenestration data out of an IFC model: the property sets that `fenestration_write` writes, and
-BSDF files that a document or library reference of the window or its type names."""
+"""Fenestration data out of an IFC model.
+
+The property sets that `fenestration_write` writes, and BSDF files that a document or library
+reference of the window or its type names.
+"""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""Bidirectional scattering of fenestration systems: files, values, tracing, making, plugins."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,7 +44,7 @@ def venetian_blind(
     )
 
 
-def vertical_louvre(material: SlatMaterial, **options) -> PeriodicLayer:
+def vertical_louvre(material: SlatMaterial, **options: Any) -> PeriodicLayer:
     """Upright slats, as `venetian_blind` turned; positive tilt moves the exterior edge right."""
     flat = venetian_blind(material, **options)
     triangles = flat.triangles[..., [1, 0, 2]] * [-1, 1, 1]

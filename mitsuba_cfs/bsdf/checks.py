@@ -111,8 +111,10 @@ def _check_reciprocity(band: str, bsdf: Bsdf) -> list[Finding]:
 
 
 def reciprocity_error(bsdf: Bsdf, there: str, back: str) -> float | None:
-    """Mean absolute difference of f(i -> o) and f(o -> i), weighted by projected solid angles,
-    as a share of the mean; None where it cannot be told."""
+    """Mean absolute difference of f(i -> o) and f(o -> i) as a share of the mean.
+
+    Weighted by projected solid angles; None where it cannot be told.
+    """
     forth, reverse = getattr(bsdf, there), getattr(bsdf, back)
     if bsdf.is_dummy(forth) or bsdf.is_dummy(reverse):
         return None

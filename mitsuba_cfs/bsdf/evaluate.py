@@ -64,7 +64,9 @@ def outgoing_disk(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     return directions[..., :2] * [-1.0, 1.0]
 
 
-def tree_position(tree: TensorTree, incident, outgoing) -> NDArray[np.float64]:
+def tree_position(
+    tree: TensorTree, incident: NDArray[np.float64], outgoing: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Position [N, rank] in the tree's hypercube of pairs of directions [N, 3]."""
     if tree.rank == 4:
         squares = disk_to_square(incident_disk(incident)), disk_to_square(outgoing_disk(outgoing))
@@ -82,7 +84,9 @@ def _isotropic_position(incident: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.minimum(0.5 - 0.5 * np.hypot(incident[:, 0], incident[:, 1]), ISOTROPIC_EDGE)
 
 
-def _block_values(bsdf: Bsdf, block: str, incident, outgoing) -> NDArray[np.float64]:
+def _block_values(
+    bsdf: Bsdf, block: str, incident: NDArray[np.float64], outgoing: NDArray[np.float64]
+) -> NDArray[np.float64]:
     if isinstance(bsdf, KlemsBsdf):
         full = bsdf.filled()
         theta = np.arccos(np.clip(np.abs(outgoing[:, 2]), 0, 1))
@@ -91,7 +95,9 @@ def _block_values(bsdf: Bsdf, block: str, incident, outgoing) -> NDArray[np.floa
     return _tree_values(bsdf, block, incident, outgoing)
 
 
-def _tree_values(bsdf: TensorTreeBsdf, block: str, incident, outgoing) -> NDArray[np.float64]:
+def _tree_values(
+    bsdf: TensorTreeBsdf, block: str, incident: NDArray[np.float64], outgoing: NDArray[np.float64]
+) -> NDArray[np.float64]:
     tree, turned = bsdf.lookup(block)
     if tree is None:
         return np.zeros(len(incident))
@@ -100,6 +106,6 @@ def _tree_values(bsdf: TensorTreeBsdf, block: str, incident, outgoing) -> NDArra
     return tree.values[tree.leaf(tree_position(tree, incident, outgoing))]
 
 
-def _patches(full: KlemsBsdf, incident) -> NDArray[np.int64]:
+def _patches(full: KlemsBsdf, incident: NDArray[np.float64]) -> NDArray[np.int64]:
     theta = np.arccos(np.clip(np.abs(incident[:, 2]), 0, 1))
     return full.basis_in.index(theta, incident_azimuth(incident))

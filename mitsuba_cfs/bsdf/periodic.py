@@ -58,7 +58,9 @@ class SlatMaterial:
         return np.array(self.transmittance or (0.0,) * self.channels)
 
 
-def plastic(name: str, *colour: float, specular: float = 0.0, roughness: float = 0.0):
+def plastic(
+    name: str, *colour: float, specular: float = 0.0, roughness: float = 0.0
+) -> SlatMaterial:
     """The material of Radiance's `plastic`, one colour [C] for both sides."""
     diffuse = tuple((1 - specular) * value for value in colour)
     return SlatMaterial(name, diffuse, diffuse, specular=specular, roughness=roughness)
@@ -121,7 +123,9 @@ class PeriodicLayer:
         return copies, np.tile(self.material, len(shifts))
 
 
-def clear_pane(index: float, thickness: float, period: tuple[float, float], *, channels: int = 1):
+def clear_pane(
+    index: float, thickness: float, period: tuple[float, float], *, channels: int = 1
+) -> PeriodicLayer:
     """A pane of clear glass on a cell of any size: its two faces."""
     width, height = period
     outside = np.array([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]], dtype=float)
@@ -166,7 +170,9 @@ def write_radiance(
         file.writelines(_radiance_lines(layer, triangles * [-1, 1, -1], material))
 
 
-def _radiance_lines(layer: PeriodicLayer, triangles, material) -> Iterator[str]:
+def _radiance_lines(
+    layer: PeriodicLayer, triangles: NDArray[np.float64], material: NDArray[np.int64]
+) -> Iterator[str]:
     for index, sheet in enumerate(layer.materials):
         alike = sheet.reflectance_front == sheet.reflectance_back
         if sheet.transmittance or sheet.index or not alike:

@@ -112,7 +112,7 @@ def split_by_zone(
     x, y = np.divmod(lit, luminance.shape[1])
     at_eye = light * geometry.projected.ravel()[lit]
 
-    def total(weights):
+    def total(weights: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.bincount(mine, weights, minlength=len(pairs))
 
     flux = total(omega * light)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -112,7 +113,7 @@ def evaluate(
     view: View | GlareView,
     *,
     options: GlareOptions | None = None,
-    **changes,
+    **changes: Any,
 ) -> GlareResult:
     """Glare of a picture.
 
@@ -182,7 +183,7 @@ def evaluate(
 
 
 def enhanced_simplified_dgp(
-    illuminance: float, direct: ArrayLike, view: View | GlareView, **changes
+    illuminance: float, direct: ArrayLike, view: View | GlareView, **changes: Any
 ) -> float:
     """eDGP: DGP with the illuminance of one calculation and the sources of a direct-only picture.
 

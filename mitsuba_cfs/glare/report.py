@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from mitsuba_cfs.glare import areas, indices
@@ -188,5 +190,5 @@ def _luminances(area: areas.AreaStatistics) -> tuple[float, ...]:
     )
 
 
-def _six(values) -> str:
+def _six(values: Iterable[float]) -> str:
     return " ".join(f"{value:f}" for value in values)

@@ -13,7 +13,7 @@ whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,7 +38,7 @@ def direct_only(matrices: Matrices) -> Matrices:
 
 
 def enhanced_simplified_dgp(
-    direct: Pictures, illuminance: ArrayLike, **options
+    direct: Pictures, illuminance: ArrayLike, **options: Any
 ) -> NDArray[np.float64]:
     """eDGP [H]: sources of direct-only pictures, illuminance [H] of its own calculation [lx].
 

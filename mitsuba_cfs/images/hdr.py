@@ -90,7 +90,7 @@ def read_hdr(path: str | PathLike[str]) -> Picture:
     return Picture(pixels, view, exposure, header, _colours(header, path))
 
 
-def _header(data: bytes, path) -> tuple[tuple[str, ...], str, int]:
+def _header(data: bytes, path: str | PathLike[str]) -> tuple[tuple[str, ...], str, int]:
     """Header lines, the resolution line, and where the pixels start."""
     if not data.startswith(b"#?"):
         raise DataError("not a Radiance picture: it does not start with #?RADIANCE", file=path)
@@ -103,8 +103,10 @@ def _header(data: bytes, path) -> tuple[tuple[str, ...], str, int]:
     return tuple(line.rstrip("\r") for line in lines), resolution, newline + 1
 
 
-def _orientation(resolution: str, path) -> tuple[tuple[int, int], tuple[int, int], bool]:
-    """Steps along lines and pixels that set the picture upright, the stored shape, X first?"""
+def _orientation(
+    resolution: str, path: str | PathLike[str]
+) -> tuple[tuple[int, int], tuple[int, int], bool]:
+    """Steps along lines and pixels that set a picture upright, its stored shape, if X is first."""
     words = resolution.split()
     axes = [word[-1:] for word in words[::2]]
     try:
@@ -122,7 +124,9 @@ def _orientation(resolution: str, path) -> tuple[tuple[int, int], tuple[int, int
     return (upright[words[0]], upright[words[2]]), shape, axes[0] == "X"
 
 
-def _exposure(header: tuple[str, ...], path) -> tuple[float, NDArray[np.float64]]:
+def _exposure(
+    header: tuple[str, ...], path: str | PathLike[str]
+) -> tuple[float, NDArray[np.float64]]:
     """Product of EXPOSURE= lines, and of COLORCORR= lines [3]."""
     exposure, correction = 1.0, np.ones(3)
     for line in header:
@@ -154,7 +158,7 @@ def _view(header: tuple[str, ...], width: int, height: int) -> View | None:
         return None
 
 
-def _colours(header: tuple[str, ...], path) -> str:
+def _colours(header: tuple[str, ...], path: str | PathLike[str]) -> str:
     formats = [line[7:].strip() for line in header if line.startswith("FORMAT=")]
     if formats and formats[-1] not in FORMATS:
         raise DataError(f"unknown pixel format {formats[-1]!r}", file=path, field="FORMAT")

@@ -10,6 +10,7 @@ Source: Radiance `rpict` manual (view options) and the projection formulas of it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,7 +70,8 @@ def _triple(vector: ArrayLike, name: str) -> Triple:
     vector = np.asarray(vector, dtype=float)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
         raise ValueError(f"the view's {name} is not three numbers")
-    return tuple(map(float, vector))
+    x, y, z = map(float, vector)
+    return x, y, z
 
 
 def _unit(vector: ArrayLike, name: str) -> NDArray[np.float64]:
@@ -85,9 +87,10 @@ def _unit(vector: ArrayLike, name: str) -> NDArray[np.float64]:
     return np.array([x * scale, y * scale, z * scale])
 
 
-def fisheye(position: ArrayLike, direction: ArrayLike, size: int = 800, **changes) -> View:
+def fisheye(position: ArrayLike, direction: ArrayLike, size: int = 800, **changes: Any) -> View:
     """The 180 degree angular fisheye (`-vta -vh 180 -vv 180`), upright, that glare is rated in."""
-    plain = View("angular", position, direction, (0, 0, 1), 180, 180, size, size)
+    eye, towards = _triple(position, "position"), _triple(direction, "direction")
+    plain = View("angular", eye, towards, (0, 0, 1), 180, 180, size, size)
     return replace(plain, **changes)
 
 
@@ -113,7 +116,7 @@ def frame(view: View) -> NDArray[np.float64]:
     return np.stack([right, np.cross(right, forward), forward])
 
 
-def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray, NDArray]:
+def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:
     """Unit vectors [..., 3] seen at image coordinates x, y [...] in 0..1, and where there is one.
 
     Returns:
@@ -143,23 +146,27 @@ def _half_sizes(view: View) -> tuple[float, float]:
     return np.radians(view.horizontal_deg) / 2, np.radians(view.vertical_deg) / 2
 
 
-def _perspective(view: View, x: NDArray, y: NDArray):
+# Direction x, y, z of the points of a picture, whether they are in the view, width and height
+Projected = tuple[Any, Any, Any, Any, tuple[float, float]]
+
+
+def _perspective(view: View, x: NDArray[Any], y: NDArray[Any]) -> Projected:
     half_x, half_y = _half_sizes(view)
     scales = (2 * np.tan(half_x), 2 * np.tan(half_y))
     return x, y, 1.0, True, scales
 
 
-def _parallel(view: View, x: NDArray, y: NDArray):
+def _parallel(view: View, x: NDArray[Any], y: NDArray[Any]) -> Projected:
     return 0.0, 0.0, 1.0, True, (1.0, 1.0)
 
 
-def _cylindrical(view: View, x: NDArray, y: NDArray):
+def _cylindrical(view: View, x: NDArray[Any], y: NDArray[Any]) -> Projected:
     azimuth, (_, half_y) = x * np.radians(view.horizontal_deg), _half_sizes(view)
     scales = (1.0, 2 * np.tan(half_y))
     return np.sin(azimuth), y, np.cos(azimuth), True, scales
 
 
-def _hemispherical(view: View, x: NDArray, y: NDArray):
+def _hemispherical(view: View, x: NDArray[Any], y: NDArray[Any]) -> Projected:
     # The largest number below 1 for the sine of a right angle, as in Radiance's vector arithmetic:
     # corners of pixels on the rim (3-4-5 triangles) then exist, and rays agree to the last bit.
     below = np.nextafter(1.0, 0.0)
@@ -168,7 +175,7 @@ def _hemispherical(view: View, x: NDArray, y: NDArray):
     return x, y, np.sqrt(np.maximum(1.0 - square, 0.0)), square <= 1.0, (across, along)
 
 
-def _angular(view: View, x: NDArray, y: NDArray):
+def _angular(view: View, x: NDArray[Any], y: NDArray[Any]) -> Projected:
     x = x * ((1.0 / 180.0) * view.horizontal_deg)
     y = y * ((1.0 / 180.0) * view.vertical_deg)
     square = x * x + y * y
@@ -180,7 +187,7 @@ def _angular(view: View, x: NDArray, y: NDArray):
     return x * scale, y * scale, forwards, square <= 1.0, (1.0, 1.0)
 
 
-def _planispheric(view: View, x: NDArray, y: NDArray):
+def _planispheric(view: View, x: NDArray[Any], y: NDArray[Any]) -> Projected:
     half_x, half_y = _half_sizes(view)
     x, y = x * 2 * np.tan(half_x / 2), y * 2 * np.tan(half_y / 2)
     square = x * x + y * y
@@ -230,7 +237,7 @@ def pixel_solid_angles(view: View) -> NDArray[np.float64]:
     return np.concatenate([left, left[:, : view.width // 2][:, ::-1]], axis=1)
 
 
-def _solid_angles(view: View, x: NDArray, y: NDArray) -> NDArray[np.float64]:
+def _solid_angles(view: View, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.float64]:
     """Solid angles between lines x [n] from left to right and y [m] from top to bottom."""
     corners, exists = rays(view, x[None, :], y[:, None])
     along = _unit_or_zero(_cross(corners[:, :-1], corners[:, 1:]))  # [m, n-1, 3] rightwards
@@ -244,14 +251,14 @@ def _solid_angles(view: View, x: NDArray, y: NDArray) -> NDArray[np.float64]:
     return np.where(whole & (omega > 0), omega, 0.0)
 
 
-def _cross(one: NDArray, other: NDArray) -> NDArray:
+def _cross(one: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
     """Cross product [..., 3]: half the time of NumPy's for long arrays."""
     a, b, c = one[..., 0], one[..., 1], one[..., 2]
     d, e, f = other[..., 0], other[..., 1], other[..., 2]
     return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
 
 
-def _unit_or_zero(vectors: NDArray) -> NDArray:
+def _unit_or_zero(vectors: NDArray[Any]) -> NDArray[Any]:
     length = np.sqrt(np.einsum("...k,...k->...", vectors, vectors))[..., None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
@@ -267,9 +274,10 @@ _SIZES = {
 _VECTORS = {"p": "position", "d": "direction", "u": "up"}
 
 
-def view_changes(text: str) -> dict:
+def view_changes(text: str) -> dict[str, Any]:
     """The fields of `View` that a line in Radiance's view syntax sets; unknown words are left."""
-    words, found, at = text.split(), {}, 0
+    words, at = text.split(), 0
+    found: dict[str, Any] = {}
     while at < len(words):
         word, at = words[at], at + 1
         if not word.startswith("-v") or len(word) < 3:
@@ -284,7 +292,7 @@ def view_changes(text: str) -> dict:
     return found
 
 
-def _numbers(words: list[str], at: int, count: int) -> Triple | None:
+def _numbers(words: list[str], at: int, count: int) -> tuple[float, ...] | None:
     try:
         numbers = tuple(float(word) for word in words[at : at + count])
     except ValueError:

@@ -1,0 +1,1 @@
+"""Files of matrices, their cache on disk, and bases of high resolution."""

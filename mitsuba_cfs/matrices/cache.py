@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import replacing
+from mitsuba_cfs.files import opened_arrays, replacing
 from mitsuba_cfs.source_code import code_version
 
 VARIABLE = "CFS_CACHE"  # environment variable with the folder
@@ -106,7 +106,7 @@ class CacheEntry:
     def load(self) -> State | None:
         """What is there; None where there is nothing, or nothing readable."""
         try:
-            with np.load(self.path, allow_pickle=False) as data:
+            with opened_arrays(self.path) as data:
                 state = State(
                     int(data["count"]),
                     data["mean"].astype(float),

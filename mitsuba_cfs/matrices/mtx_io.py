@@ -9,13 +9,15 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
-from typing import BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import replacing
+
+T = TypeVar("T", int, float)
 
 FORMATS = {"ascii": None, "float": np.float32, "double": np.float64}
 LUMINANCE_WEIGHTS = (0.265, 0.670, 0.065)  # R, G, B of Radiance; 179 lm/W makes it luminance
@@ -162,17 +164,17 @@ def _read_header(file: BinaryIO, path: str | PathLike[str]) -> MatrixHeader:
     )
 
 
-def _positive(text: str | int, kind: type, path: str | PathLike[str], field: str) -> float | int:
+def _positive(text: str | int, kind: type[T], path: str | PathLike[str], field: str) -> T:
     try:
         value = kind(text)
     except ValueError:
-        value = 0
+        value = kind(0)
     if not 0 < value < float("inf"):
         raise DataError(f"expected a positive number, got {text!r}", file=path, field=field)
     return value
 
 
-def _values(data: bytes, header: MatrixHeader, path: str | PathLike[str]) -> NDArray:
+def _values(data: bytes, header: MatrixHeader, path: str | PathLike[str]) -> NDArray[Any]:
     if header.format == "ascii":
         try:
             return np.array(data.split(), dtype=float)

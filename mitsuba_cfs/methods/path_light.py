@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +90,7 @@ class PathLight:
         return float(self._sensors(place, direction, hour, state).values[0])
 
     def picture(
-        self, hour: int, state: Sequence[int] | None = None, **options
+        self, hour: int, state: Sequence[int] | None = None, **options: Any
     ) -> NDArray[np.float32]:
         """Luminance picture [ny, nx] of one hour [cd/m2].
 

@@ -34,8 +34,7 @@ class DaylightScene:
             )
 
     def sensors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Positions and directions [S + 1, 3] of the sensors, the eye as the last; [S, 3] without
-        a view."""
+        """Positions and directions [S + 1, 3] of sensors, the eye last; [S, 3] without a view."""
         if self.view is None:
             return self.points, self.normals
         eye, direction = (

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import replacing
+from mitsuba_cfs.files import opened_arrays, replacing
 from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
@@ -44,7 +44,7 @@ def kept_view(
 
 
 def _read(path: Path, view: View) -> ViewMatrices:
-    with np.load(path, allow_pickle=False) as data:
+    with opened_arrays(path) as data:
         row, share = data["row"], data["share"]
         parts = (PictureMatrix(data[name], row, share) for name in ("indirect", "lit"))
         seen = tuple(data[f"seen_{name}"] for name in ("data", "indices", "indptr"))

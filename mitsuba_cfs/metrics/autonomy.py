@@ -76,7 +76,7 @@ def sensor_weights(areas: ArrayLike | None, count: int) -> FloatArray:
     return areas / areas.sum()
 
 
-def scheduled(illuminance: ArrayLike, hours: ArrayLike) -> NDArray:
+def scheduled(illuminance: ArrayLike, hours: ArrayLike) -> NDArray[np.float64]:
     """Illuminance [h, S] of the scheduled time steps, checked: finite and not negative."""
     values, hours = np.asarray(illuminance), np.asarray(hours)
     if values.ndim != 2 or hours.shape != (len(values),) or hours.dtype != bool:

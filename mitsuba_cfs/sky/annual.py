@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,8 +24,10 @@ class AnnualSky:
     sun: NDArray[np.floating] | None = None  # [P, L] the sun alone, spread over patches [cd/m2]
     solar: NDArray[np.floating] | None = None  # [P, L] radiance, the sun among it [W/m2/sr]
 
-    def without_sun(self, hours: ArrayLike = slice(None)) -> NDArray[np.floating]:
+    def without_sun(self, hours: Any = slice(None)) -> NDArray[np.floating]:
         """Luminance [P, n] of sky and ground without the sun, of some of the hours L [cd/m2]."""
+        if self.sun is None:
+            raise ValueError("the sky was made without the sun alone: annual_sky(sun=True)")
         return np.maximum(self.whole[:, hours] - self.sun[:, hours], 0.0)
 
     def part(self, hours: ArrayLike) -> AnnualSky:
@@ -40,7 +43,7 @@ class AnnualSky:
             solar=None if self.solar is None else self.solar[:, hours],
         )
 
-    def whole_year(self, values: NDArray) -> NDArray:
+    def whole_year(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values [..., L] as values [..., H] of all hours of the year, the others 0."""
         full = np.zeros((*values.shape[:-1], self.hours), dtype=values.dtype)
         full[..., self.lit] = values
@@ -66,7 +69,7 @@ def annual_sky(
         rotation_deg: see `mitsuba_cfs.sky.matrix.sky_matrix`.
     """
     lit = np.flatnonzero(sun_up(weather)) if hours is None else np.asarray(hours, dtype=np.int64)
-    options = {"rotation_deg": rotation_deg, "hours": lit, "dtype": np.float32}
+    options: dict[str, Any] = {"rotation_deg": rotation_deg, "hours": lit, "dtype": np.float32}
 
     def matrix(band: str, parts: str) -> NDArray[np.float32]:
         return sky_matrix(weather, subdivision, band, parts, **options)

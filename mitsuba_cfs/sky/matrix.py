@@ -88,9 +88,10 @@ def sky_series(
     )
     dark = direct + diffuse <= DARK
     if band == "visible" and measured_illuminance:
-        direct, diffuse = weather.direct_normal_illuminance, weather.diffuse_horizontal_illuminance
-        if direct is None or diffuse is None:
+        measured = weather.direct_normal_illuminance, weather.diffuse_horizontal_illuminance
+        if measured[0] is None or measured[1] is None:
             raise ValueError(f"the weather of {weather.site} has no illuminance")
+        direct, diffuse = measured[0], measured[1]
     elif band == "visible":
         direct, diffuse = direct * model.direct_efficacy, diffuse * model.diffuse_efficacy
     return SkySeries(towards, model, np.where(dark, 0.0, diffuse), np.where(dark, 0.0, direct))
@@ -121,7 +122,7 @@ def sky_matrix(
     hours: ArrayLike | None = None,
     dtype: type = np.float64,
     progress: Progress = silent,
-) -> NDArray:
+) -> NDArray[np.floating]:
     """Perez sky on Reinhart patches [P, H]: luminance [cd/m2], or radiance [W/m2/sr] if `solar`.
 
     The illuminance (irradiance) of a plane is the sum over patches of value, solid angle and
@@ -155,7 +156,7 @@ def sky_matrix(
     chosen = sun_module.is_up(series.sun) if sun_up_only else np.ones(len(series.sun), dtype=bool)
     hours = np.flatnonzero(chosen) if hours is None else np.asarray(hours, dtype=np.int64)
     lit = np.flatnonzero((series.diffuse_horizontal + series.direct_normal)[hours] > 0)
-    result = np.zeros((sky.size, len(hours)), dtype=dtype)
+    result: NDArray[np.floating] = np.zeros((sky.size, len(hours)), dtype=dtype)
     size = max(1, CHUNK_BYTES // (8 * sky.size))
     for start in range(0, len(lit), size):
         columns = lit[start : start + size]

@@ -1,5 +1,6 @@
-"""What the user may choose about sun and sky, and the defaults; apart from what computes them, so
-that a command's options are known before anything is loaded.
+"""What the user may choose about sun and sky, and the defaults.
+
+Apart from what computes them, so that a command's options are known before anything is loaded.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from mitsuba_cfs.sky.weather import Weather
 
 FloatArray = NDArray[np.float64]
 
+Days = tuple[FloatArray, FloatArray, FloatArray]  # radiation, declination, solar hour
 CLEAR_SHARE = 0.3  # of the days, the clearest: their radiation lies evenly about noon
 NOTED_H = 0.4  # offset of its centre from noon; 27 sound files have 0.13 at most
 REFUSED_H = 1.5
@@ -44,10 +45,10 @@ def checked_sun(weather: Weather, file: str | PathLike[str]) -> Weather:
     return replace(weather, notes=(*weather.notes, *notes))
 
 
-def whole_days(weather: Weather) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Radiation, declination and solar hour [days, steps] of the days that are there from midnight
-    to midnight and have light; None where they are few.
+def whole_days(weather: Weather) -> Days | None:
+    """Radiation, declination and solar hour [days, steps] of whole days; None where they are few.
 
+    Whole are days that are there from midnight to midnight and have light.
     The radiation is the global horizontal, or where there is none the direct normal and diffuse
     together: no sun position must enter it.
     """
@@ -66,7 +67,7 @@ def whole_days(weather: Weather) -> tuple[FloatArray, FloatArray, FloatArray] | 
     return radiation[rows], declination[rows], time[rows] - 12.0
 
 
-def _clock(weather: Weather, days, file: str | PathLike[str]) -> list[str]:
+def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
     """What is wrong with zone or longitude by the hour about which clear days are even."""
     late = noon_offset(weather.latitude_deg, *days)
     if abs(late) < NOTED_H or (abs(late) < REFUSED_H and len(days[0]) < MANY_DAYS):
@@ -132,7 +133,7 @@ def _far_zone(weather: Weather) -> list[str]:
     ]
 
 
-def _seasons(weather: Weather, days, file: str | PathLike[str]) -> list[str]:
+def _seasons(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
     """What is wrong with the latitude by how the length of the days goes with the season."""
     radiation, declination, _ = days
     if len(radiation) < 300 or abs(weather.latitude_deg) < JUDGED_LATITUDE_DEG:
@@ -153,7 +154,7 @@ def _seasons(weather: Weather, days, file: str | PathLike[str]) -> list[str]:
     ]
 
 
-def _amount(weather: Weather, days, file: str | PathLike[str]) -> list[str]:
+def _amount(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
     """What is wrong with the unit of the radiation by what comes of that outside the atmosphere."""
     if weather.global_horizontal is None or len(days[0]) < MANY_DAYS:
         return []

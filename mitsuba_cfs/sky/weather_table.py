@@ -138,9 +138,11 @@ def epw_location(head: list[str], path: FilePath) -> Location:
             f"expected 10 fields, got {len(parts)}", file=path, element="line 1", field="LOCATION"
         )
     names = ("latitude", "longitude", "time zone", "elevation")
-    numbers = [number(parts[6 + i], path, 1, name) for i, name in enumerate(names)]
+    latitude, longitude, zone, elevation = (
+        number(parts[6 + i], path, 1, name) for i, name in enumerate(names)
+    )
     name = ", ".join(part for part in (parts[1], parts[3]) if part not in ("", "-"))
-    return location(path, name, tuple(numbers))
+    return location(path, name, (latitude, longitude, zone, elevation))
 
 
 def epw_ground(

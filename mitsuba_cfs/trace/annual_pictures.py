@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -64,7 +65,7 @@ def view_matrices(
     folder: Path | None = None,
     window_reflectance: ArrayLike | None = None,
     progress: Progress = silent,
-    **options,
+    **options: Any,
 ) -> ViewMatrices:
     """The matrices of a picture's pixels, in memory or, where they are too large, on disk.
 

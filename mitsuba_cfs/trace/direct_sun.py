@@ -275,8 +275,7 @@ def _through(
     towards: mi.Vector3f,
     key: mi.UInt32,
 ) -> list[mi.Float]:
-    """Mean over the disc of cos(sensor) tau(sun) through each group, where the sun stands free
-    [S * Q]."""
+    """Mean over the visible disc of cos(sensor) tau(sun) through each group [S * Q]."""
     total = [dr.zeros(mi.Float, dr.width(place) * dr.width(towards)) for _ in scattering]
     sensor, sun = _pairs(dr.width(place), dr.width(towards))
     start = dr.gather(mi.Point3f, place, sensor)

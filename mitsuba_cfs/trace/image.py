@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -28,7 +29,7 @@ def luminance_pictures(
     window_luminance: ArrayLike,
     *,
     samples: int = 32,
-    **options,
+    **options: Any,
 ) -> NDArray[np.float32]:
     """Pictures [H, ny, nx]: luminance of each pixel for every hour's window luminance.
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -84,7 +85,7 @@ def point_in_time_picture(
 
 
 def colour_picture(
-    rooms: Sequence[LitRoom], skies: Sequence[Sky], view: View, **options
+    rooms: Sequence[LitRoom], skies: Sequence[Sky], view: View, **options: Any
 ) -> NDArray[np.float32]:
     """Radiance picture [ny, nx, 3] [W/m2/sr] of red, green and blue.
 
@@ -101,7 +102,9 @@ def colour_picture(
     return np.stack(bands, axis=-1)
 
 
-def _add_shared(picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence, windows: int):
+def _add_shared(
+    picture: NDArray, tiles: Tiles, pairs: Sequence, rows: Sequence, windows: int
+) -> None:
     """Add to each pixel the smoothed light of the faces that it shows."""
     key, total, count = (np.concatenate(part) for part in zip(*rows, strict=True))
     if not len(key):

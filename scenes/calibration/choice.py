@@ -2,6 +2,7 @@
 
 - Specular surfaces in the room are outside of what eDGP and sDGP assume, and the phase methods'
   direct sun does not know their reflections: full DGP by point-in-time paths, whatever it takes.
+  (Its rule.  Our tracer knows no mirrors in a room either, and the reason says so.)
 - The three-phase method only where nothing finer than a Klems matrix that blurs the sun is known.
 - Otherwise what is near enough and quick enough; of these the nearest, of equals the quickest, with
   full DGP where it costs no more.  With the dissertation's costs many time steps lead to the
@@ -63,7 +64,8 @@ def choose(demand: Demand, calibration: Calibration) -> Choice:
     seconds = {pair: calibration.seconds(*pair, demand.work) for pair in calibration.pairs()}
     if demand.specular:
         return _choice(SPECULAR, seconds, demand, "a surface of the room mirrors, which eDGP, sDGP "
-                       "and the phase methods do not cover: full pictures by paths")  # fmt: skip
+                       "and the phase methods do not cover: full pictures by paths (the mirror "
+                       "itself is not traced: every surface of a room is diffuse)")  # fmt: skip
     known = {pair: s for pair, s in seconds.items() if demand.fine or pair[0] in BLURRED}
     data = "" if demand.fine else "a system has only a Klems matrix that blurs the sun; "
     near = {pair for pair in known if ERRORS[pair] <= demand.dgp_error}

@@ -104,7 +104,7 @@ def calibration_file() -> Path:
 
 
 def machine_name() -> str:
-    """This machine: processor and number of cores."""
+    """Processor and number of cores of this machine."""
     name = platform.processor() or platform.machine()
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

@@ -26,8 +26,9 @@ def default_hours(
     eye_illuminance: NDArray[np.float32],
     count: int,
 ) -> list[int]:
-    """The hour of the year that is brightest at the eye, and with it up to `count` of the equinox
-    and the solstices at 9, 12 and 15 o'clock, as far as the sun is up.
+    """The year's brightest hour at the eye, and with it hours of the equinox and the solstices.
+
+    In all up to `count`; these at 9, 12 and 15 o'clock, as far as the sun is up.
 
     Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
     """

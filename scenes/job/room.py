@@ -283,8 +283,7 @@ class Room:
 
     @cached_property
     def plane(self) -> FloatArray | None:
-        """Mean illuminance of the work plane [H] [lx]; None where neither lamps nor the control
-        ask for light."""
+        """Mean illuminance of the work plane [H] [lx]; None where neither lamps nor control ask."""
         tables = self.operation
         if tables is None or not self.space.windows:
             return None

@@ -119,8 +119,9 @@ def _rated_hours(weather: Weather, occupied: tuple[int, int]) -> NDArray[np.int6
 def glare_figures(
     dgp: NDArray[np.float64], weather: Weather, occupied: tuple[int, int]
 ) -> dict[str, float | str]:
-    """Hours by class, the worst, what 5 % of the hours exceed; occupied hours in the dark count as
-    imperceptible.
+    """Hours by class, the worst, what 5 % of the hours exceed.
+
+    Occupied hours in the dark count as imperceptible.
 
     Args: dgp: [h] of the occupied hours with the sun up.
     """

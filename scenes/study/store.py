@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.files import write_bytes, write_table, write_text
+from mitsuba_cfs.files import opened_arrays, write_bytes, write_table, write_text
 from mitsuba_cfs.matrices.cache import UNREADABLE
 from scenes.result_folder import ResultFolder
 
@@ -36,7 +36,7 @@ class CaseResult:
     @classmethod
     def read(cls, path: Path) -> CaseResult:
         """The result of a file that `to_bytes` made."""
-        with np.load(path, allow_pickle=False) as data:
+        with opened_arrays(path) as data:
             arrays = {name: data[name] for name in data.files}
         record = json.loads(arrays.pop("record").tobytes())
         return cls(record["key"], record["figures"], arrays)

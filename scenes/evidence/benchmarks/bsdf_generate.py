@@ -84,8 +84,10 @@ def genbsdf(samples: int, options: tuple[str, ...], *, levels: int = 0) -> Bsdf:
 
 
 def relative_values(bsdf: KlemsBsdf) -> NDArray[np.float64]:
-    """Each block's values [4, K K] over the reference's mean, so weighted that their mean square
-    is that over the directions, even in projected solid angle."""
+    """Each block's values [4, K K] over the reference's mean.
+
+    So weighted that their mean square is that over the directions, even in projected solid angle.
+    """
     area = KLEMS_FULL.projected_solid_angles() / np.pi
     weight = area[:, None] * area
     blocks = []

@@ -1,6 +1,6 @@
-"""The dissertation's Table 2 remade: phase methods against explicit slats, hour by hour.
+r"""The dissertation's Table 2 remade: phase methods against explicit slats, hour by hour.
 
-    python -m scenes.evidence.validation.daylight_methods \\
+    python -m scenes.evidence.validation.daylight_methods \
         --weather CITY.epw [--every 10] [--json FILE]
 
 Room of Table 1 (3.65 x 4.60 x 3.00 m, to the south-west), six sensors in its middle line; double

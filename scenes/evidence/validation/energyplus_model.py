@@ -198,6 +198,7 @@ def _material(
 
 
 def pane(tau: float, front: float, back: float, emissivity: float) -> dict[str, Any]:
+    """EnergyPlus' material of a pane of 6 mm."""
     return {
         "optical_data_type": "SpectralAverage",
         "thickness": 0.006,
@@ -374,8 +375,7 @@ def run_energyplus(
             "start, wall = time.process_time(), time.perf_counter()\n"
             "code = api.runtime.run_energyplus(state, sys.argv[1:])\n"
             "took = f'{time.perf_counter() - wall} {time.process_time() - start}'\n"
-            f"pathlib.Path(sys.argv[4], {TIME_FILE!r}).write_text(took)\n"
-            "sys.exit(code)\n"
+            f"pathlib.Path(sys.argv[4], {TIME_FILE!r}).write_text(took)\nsys.exit(code)\n"
         )
         arguments = ["-w", str(epw), "-d", str(place), str(place / "in.epJSON")]
         command = [sys.executable, "-c", code, *arguments]

@@ -1,6 +1,6 @@
-"""The dissertation's Tables 4, 7 and 10 remade: DGP, eDGP, sDGP of three methods against slats.
+r"""The dissertation's Tables 4, 7 and 10 remade: DGP, eDGP, sDGP of three methods against slats.
 
-    python -m scenes.evidence.validation.glare_methods \\
+    python -m scenes.evidence.validation.glare_methods \
         --weather CITY.epw --json FILE [--system "5 degrees"]
     python -m scenes.evidence.validation.glare_methods --table FILE
 

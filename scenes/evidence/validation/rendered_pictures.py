@@ -1,6 +1,6 @@
-"""The same room rendered by Radiance and by this project: vertical illuminance and DGP.
+r"""The same room rendered by Radiance and by this project: vertical illuminance and DGP.
 
-    python -m scenes.evidence.validation.rendered_pictures \\
+    python -m scenes.evidence.validation.rendered_pictures \
         [--systems glass blind tree] [--json FILE]
 
 Room of the dissertation's Table 1 seen from 2 m behind its south window, at twelve positions of the

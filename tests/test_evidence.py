@@ -1,0 +1,76 @@
+"""Every table of evidence says who judges, what both sides share, and what it cannot show."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.conftest import REPOSITORY
+
+DOCS = REPOSITORY / "docs"
+SAID = ("- Judge:", "- Shared:", "- Cannot show:")
+# Heads of tables that claim nothing: what there is, what is asked for, what is written
+NO_EVIDENCE = {
+    "bim.md": "all", "glossary.md": "all", "quickstart.md": "all",
+    "validation.md": {"| subject | judged by | page |"},
+    "daylight.md": {"| function | gives |"},
+    "glare.md": {
+        "| index | of | source |", "| option | default | |",
+        "| part of a five-phase picture | resolution |",
+    },
+    "thermal.md": {"| closure | absorptances from | layer resistance | films of the layers |"},
+    "studies.md": {"| in the folder | what |"},
+    "pv.md": {"| key | what |"},
+}  # fmt: skip
+ONCE = {"benchmarks.md"}  # pages that say it once, for all of their tables
+
+
+def tables(page: str) -> list[tuple[str, str]]:
+    """Head of each table, and the text between it and the table or heading before it."""
+    found, text, inside = [], [], False
+    for line in page.splitlines():
+        if line.startswith("#"):
+            text = []
+        if line.startswith("|"):
+            if not inside:
+                found.append((line, "\n".join(text)))
+            text = []
+        inside = line.startswith("|")
+        if not inside:
+            text.append(line)
+    return found
+
+
+def silent(name: str, page: str) -> list[str]:
+    """Heads of tables that do not say what they are."""
+    exempt = NO_EVIDENCE.get(name, set())
+    above = page if name in ONCE else ""
+    return [
+        head for head, text in tables(page)
+        if exempt != "all" and head not in exempt
+        and not all(word in text or word in above for word in SAID)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in DOCS.glob("*.md")))
+def test_each_table_says_what_it_is(name):
+    assert not silent(name, (DOCS / name).read_text("utf-8"))
+
+
+@pytest.mark.parametrize("said", SAID)
+def test_a_silent_table_is_found(said):
+    page = (DOCS / "validation.md").read_text("utf-8")
+    assert len(silent("validation.md", page.replace(said, "- ", 1))) == 1
+
+
+def test_what_is_exempt_is_there():
+    for name, heads in NO_EVIDENCE.items():
+        page = (DOCS / name).read_text("utf-8")
+        assert heads == "all" or heads <= {head for head, _ in tables(page)}, name
+
+
+def test_the_glossary_counts_klems_patches_as_the_code_does():
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER
+
+    full, half, quarter = (basis.size for basis in (KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER))
+    said = f"{full} x {full} (full), {half} (half) or {quarter} (quarter) patches"
+    assert said in (DOCS / "glossary.md").read_text("utf-8")
