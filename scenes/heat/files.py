@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.study_file import StudyFile
 from scenes.job.files import check_names
-from scenes.job.inputs import System, read_system, read_weather
+from scenes.job.inputs import Given, System, read_system, read_weather
 from scenes.job.thermal_system import ThermalSystem, checked_system
 
 
@@ -18,6 +18,7 @@ class HeatFiles:
     weather: Weather
     systems: tuple[System, ...]  # by shading state
     thermals: tuple[ThermalSystem, ...]
+    given: Given  # the same as what the study file gives for all windows
 
 
 def read_files(study: StudyFile) -> HeatFiles:
@@ -31,9 +32,12 @@ def read_files(study: StudyFile) -> HeatFiles:
 
         box_building(study.box)
     weather = read_weather(study.weather)
-    systems = tuple(read_system(s.bsdf, u_value=s.u_value, g_value=s.g_value) for s in study.system)
+    systems = tuple(
+        read_system(s.bsdf, u_value=s.u_value, g_value=s.g_value, by="[[system]] of the study,")
+        for s in study.system
+    )
     thermals = tuple(
         checked_system(one, table.bsdf, table)
         for one, table in zip(systems, study.system, strict=True)
     )
-    return HeatFiles(weather, systems, thermals)
+    return HeatFiles(weather, systems, thermals, Given(systems, ask="a [[system]]"))

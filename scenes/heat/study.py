@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,10 +20,12 @@ from bim.to_thermal import (
 )
 from mitsuba_cfs import variants
 from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, item, part
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration import fill_windows, source_notes, window_sources
 from scenes.heat.box import box_building
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
@@ -31,10 +33,9 @@ from scenes.heat.room_sun import RoomLight, illuminances, room_light, state_sola
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.drawn_shades import traced_building
-from scenes.job.inputs import System, chosen_spaces, named_spaces
+from scenes.job.inputs import States, System, chosen_spaces, named_spaces
 from scenes.job.thermal import COMPILING, climate
-from scenes.job.thermal_system import ThermalSystem
-from scenes.job.windows import everywhere
+from scenes.job.thermal_system import ThermalSystem, checked_system
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Solar
 from thermal.control import (
@@ -84,19 +85,27 @@ def run_study(
     Args: files: what `read_files` has read of the study; read now without.
     """
     files = files or read_files(study)
-    weather, systems, thermals = files.weather, files.systems, files.thermals
+    weather = files.weather
     building, spaces = rooms_of(study)
-    shades = {guid: s for space in spaces for guid, s in everywhere(space, *systems).items()}
-    building = traced_building(building, shades)
-    zones = [thermal_room(space, thermals[0].fenestration) for space in spaces]
-    notes = dict.fromkeys(note for t in (weather, *systems, *thermals) for note in t.notes)
+    windows = [window for space in spaces for window in space.windows]
+    filled = fill_windows(windows, files.given, study.building)
+    sources = window_sources(windows, filled)
+    building = traced_building(building, filled)
+    states = [_room_states(study, space, filled, files) for space in spaces]
+    zones = [
+        thermal_room(space, thermals[0].fenestration)
+        for space, (_, thermals) in zip(spaces, states, strict=True)
+    ]
+    known = [one for systems, thermals in states for one in (*systems, *thermals)]
+    notes = dict.fromkeys([*source_notes(sources), *weather.notes])
+    notes |= dict.fromkeys(note for one in known for note in one.notes)
     if study.couple:
         zones, unpaired = coupled_rooms(spaces, zones)
         notes |= dict.fromkeys(unpaired)
     variants.activate()
     skies = _skies(weather, study)
     ready = []
-    for i, (space, zone) in enumerate(zip(spaces, zones, strict=True)):
+    for i, (space, zone, (systems, thermals)) in enumerate(zip(spaces, zones, states, strict=True)):
         steps = item(progress, "room", i + 1, len(spaces), zone.zone.name)
         room = ready_room(study, building, space, zone, systems, thermals, weather, skies, steps)
         ready.append(room)
@@ -113,6 +122,24 @@ def run_study(
         for room, result in zip(ready, results, strict=True)
     ]
     return years, tuple(notes)
+
+
+def _room_states(
+    study: StudyFile, space: Space, filled: Mapping[str, States], files: HeatFiles
+) -> tuple[States, tuple[ThermalSystem, ...]]:
+    """The systems by state of all windows of a room, and their thermal data."""
+    if files.systems:
+        return files.systems, files.thermals
+    # a room without windows has those of another, which nothing asks for
+    states = filled[space.windows[0].guid] if space.windows else next(iter(filled.values()))
+    if any(filled[window.guid] is not states for window in space.windows):
+        message = "its windows have different systems attached, which `cfs run` takes: give one"
+        raise DataError(message, file=study.building, element=f"space {space.label}")
+    try:
+        study.check_states(len(states))
+    except ValueError as error:
+        raise DataError(str(error), file=study.building, element=f"space {space.label}") from error
+    return states, tuple(checked_system(system, study.building) for system in states)
 
 
 def balances(
@@ -190,7 +217,7 @@ def ready_room(
     lamps = study.gains.lighting_w_m2 > 0
     if space.windows and (study.control.rule == "glare" or lamps):
         plane, eye = illuminances(building, space, systems, skies, trace, progress)
-    state = _states(study, space, light, weather, eye)
+    state = _states(study, space, light, weather, eye, len(systems))
     daylight = None if plane is None else plane[state, np.arange(len(state))]
     radiant = None
     if trace.view_factors:
@@ -202,7 +229,12 @@ def ready_room(
 
 
 def _states(
-    study: StudyFile, space: Space, light: RoomLight, weather: Weather, eye: FloatArray | None
+    study: StudyFile,
+    space: Space,
+    light: RoomLight,
+    weather: Weather,
+    eye: FloatArray | None,
+    states: int,
 ) -> NDArray[np.int64]:
     """The shading state of every hour [H]."""
     control, hours = study.control, len(weather.times)
@@ -212,7 +244,7 @@ def _states(
         return by_schedule(control.schedule, hours)
     brightest = light.irradiance.max(axis=1)
     if control.rule == "irradiance":
-        closed = control.state or len(study.system) - 1
+        closed = control.state or states - 1
         return by_irradiance(brightest, control.close_above, control.open_below, closed=closed)
     if control.rule == "glare":
         return by_glare(eye, control.limit_lx)

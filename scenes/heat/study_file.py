@@ -198,7 +198,7 @@ class StudyFile(_Table):
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     couple: bool = False  # heat flows through the walls between the rooms
     box: BoxTable | None = None
-    system: Annotated[tuple[SystemTable, ...], Field(min_length=1)]
+    system: tuple[SystemTable, ...] = ()  # states; none: what the building's file holds
     control: ControlTable = ControlTable()
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
@@ -211,18 +211,25 @@ class StudyFile(_Table):
     def _fits(self) -> StudyFile:
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `[box]`")
-        states, rule = len(self.system), self.control.rule
+        if self.system:
+            self.check_states(len(self.system))
+        elif self.box is not None:
+            raise ValueError("system: is missing; a box holds no fenestration data")
+        warm, cool = self.loads.heating_c, self.loads.cooling_c
+        if warm is not None and cool is not None and warm > cool:
+            raise ValueError("loads: the set points heating_c lies above cooling_c")
+        return self
+
+    def check_states(self, states: int) -> None:
+        """Raise `ValueError` where the control names states that the windows do not have."""
+        rule = self.control.rule
         wanted = self.control.schedule if rule == "schedule" else (self.control.state,)
         if rule == "schedule" and len(wanted) != 24:
             raise ValueError(f"control.schedule: expected 24 states, got {len(wanted)}")
         if any(not 0 <= s < states for s in wanted):
             raise ValueError(f"control: a state outside 0 to {states - 1} ([[system]] tables)")
-        warm, cool = self.loads.heating_c, self.loads.cooling_c
-        if warm is not None and cool is not None and warm > cool:
-            raise ValueError("loads: the set points heating_c lies above cooling_c")
         if rule == "cut-off" and len(self.control.slat_tilts_deg) != states:
             raise ValueError("control.slat_tilts_deg: expected one for each [[system]]")
-        return self
 
 
 def read_study(path: Path, *, quick: bool = False) -> StudyFile:

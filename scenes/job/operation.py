@@ -84,7 +84,8 @@ def read_operation(path: Path) -> Operation:
         place = path.parent / one.bsdf
         if not place.is_file():
             raise DataError(f"no such file: {one.bsdf}", file=path, field=f"system.{number}.bsdf")
-        system = read_system(place, u_value=one.u_value, g_value=one.g_value)
+        by = f"[[system]] of {path.name},"
+        system = read_system(place, u_value=one.u_value, g_value=one.g_value, by=by)
         if any(system.name == other.name for other in systems):
             system = replace(system, name=place.stem)
         systems.append(system)
