@@ -38,6 +38,8 @@ class Filling:
     visible_transmittance: float | None = None
     type_name: str = ""
     frame_reflectance: float | None = None
+    solar_transmittance: float | None = None
+    panes: int | None = None
 
     @property
     def is_door(self) -> bool:

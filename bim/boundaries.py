@@ -176,6 +176,7 @@ def _window(parts: Sequence[tuple[Piece, NDArray[np.float64]]]) -> Window:
     return Window(
         filling.guid, filling.name, triangles, filling.host, float(attachment.region.area),
         filling.u_value, filling.g_value, filling.visible_transmittance, filling.type_name,
+        filling.solar_transmittance, filling.panes,
     )  # fmt: skip
 
 

@@ -40,6 +40,7 @@ class ShadingState:
     closure: Closure | None = None  # of the thermal model
     shading_position: str | None = None  # "none", "external", "internal", "integrated"
     file: Path | None = None  # of the BSDF, where the model names it only
+    of_type: str | None = None  # name of the window type that holds it; None: the window itself
 
     @property
     def holds_data(self) -> bool:

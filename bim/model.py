@@ -115,6 +115,8 @@ class Window:
     g_value: float | None = None  # as the file states it
     visible_transmittance: float | None = None  # as the file states it
     type_name: str = ""
+    solar_transmittance: float | None = None  # as the file states it
+    panes: int | None = None  # of the glazing, as the file states it
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
     area: float = field(init=False)  # of the glass [m2]
 

@@ -7,7 +7,7 @@ which stands for the frame.  Faces towards other rooms are adiabatic: a room can
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 
 import numpy as np
@@ -24,6 +24,7 @@ THINNEST = 0.003  # thinner layers have no mass worth a conduction transfer func
 BOUNDARY = {"outside": "Outdoors", "ground": "Ground"}  # all others: adiabatic
 SURFACE_TYPE = {"floor": "Floor", "ceiling": "Ceiling", "roof": "Roof"}
 DEFAULT_U, DEFAULT_G = 1.3, 0.6  # double glazing with low emissivity [W/(m2 K)], [-]
+UAndG = tuple[float | None, float | None]  # of a window; None: not known
 
 
 def write_epjson(
@@ -33,15 +34,19 @@ def write_epjson(
     spaces: Sequence[Space] | None = None,
     u_value: float | None = None,
     g_value: float | None = None,
+    known: Mapping[str, UAndG] | None = None,
     air_changes: float = 0.5,
 ) -> None:
     """Write the rooms (by default all) as free-floating zones with hourly air temperatures.
 
-    Args: u_value, g_value: of every window; by default those that the file states.
+    Args:
+        u_value, g_value: of every window; by default those that are known or the file states.
+        known: U and g of windows, by GUID, before what the file states.
     """
     model = _frame(building)
+    given = (u_value, g_value)
     for number, space in enumerate(building.spaces if spaces is None else spaces):
-        _zone(model, f"Z{number} {_name(space.label)}", space, u_value, g_value, air_changes)
+        _zone(model, f"Z{number} {_name(space.label)}", space, given, known or {}, air_changes)
     write_text(path, json.dumps(model, indent=1))
 
 
@@ -83,8 +88,8 @@ def _zone(
     model: dict,
     zone: str,
     space: Space,
-    u_value: float | None,
-    g_value: float | None,
+    given: UAndG,
+    known: Mapping[str, UAndG],
     air_changes: float,
 ) -> None:
     model["Zone"][zone] = {"volume": space.volume, "floor_area": max(space.floor_area, 0.01)}
@@ -100,9 +105,11 @@ def _zone(
         for part, ring in enumerate(_rings(face)):
             _surface(model, f"{zone} F{index}.{part}", zone, face, ring)
     for index, window in enumerate(space.windows):
+        u, g = known.get(window.guid, (None, None))
         _window(
-            model, f"{zone} W{index}", zone, window, u_value or window.u_value or DEFAULT_U,
-            g_value or window.g_value or DEFAULT_G,
+            model, f"{zone} W{index}", zone, window,
+            given[0] or u or window.u_value or DEFAULT_U,
+            given[1] or g or window.g_value or DEFAULT_G,
         )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,8 +11,12 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from bim.model import Building, Space
+from bim.model import Building, Space, Window
 from bim.sensors import view_point
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
+from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.files import replacing, write_bytes
 
 FIELD_OF_VIEW_DEG = 90.0
@@ -21,15 +25,23 @@ GLASS_INDEX = 1.52  # refractive index of the plain panes that the glass is draw
 
 
 def write_mitsuba(
-    space: Space, building: Building, folder: str | PathLike[str], *, band: str = "visible"
+    space: Space,
+    building: Building,
+    folder: str | PathLike[str],
+    *,
+    band: str = "visible",
+    bsdfs: Mapping[str, BsdfFile] | None = None,
 ) -> Path:
     """Write `scene.xml` and its meshes into a folder; the path of the XML.
 
-    The room's faces by kind and reflectance, its windows as plain panes (shape `glass_*`: put a
-    `klems_bsdf` or `tensor_tree_bsdf` in their place), what stands outdoors, a sky of radiance 1
-    all round, and a camera in the middle of the room that looks at its biggest window.
+    The room's faces by kind and reflectance, its windows (shape `glass_*`) with their BSDF or,
+    where none is known, as plain panes, what stands outdoors, a sky of radiance 1 all round, and a
+    camera in the middle of the room that looks at its biggest window.
 
-    Args: band: reflectances of "visible" or "solar".
+    Args:
+        band: reflectances of "visible" or "solar".
+        bsdfs: of windows, by GUID; then the scene is loaded after `mitsuba_cfs.bsdf.plugin` and
+            `mitsuba_cfs.bsdf.tensor_plugin` are imported, which define these plugins.
     """
     folder = Path(folder)
     (folder / "meshes").mkdir(parents=True, exist_ok=True)
@@ -56,13 +68,29 @@ def write_mitsuba(
         ElementTree.SubElement(diffuse, "spectrum", name="reflectance", value=value)
     for number, window in enumerate(space.windows):
         shape = _mesh(scene, folder, f"glass_{number}", [window.triangles])
-        pane = ElementTree.SubElement(shape, "bsdf", type="thindielectric")
-        ElementTree.SubElement(pane, "float", name="int_ior", value=str(GLASS_INDEX))
+        known = (bsdfs or {}).get(window.guid)
+        if known is None:
+            pane = ElementTree.SubElement(shape, "bsdf", type="thindielectric")
+            ElementTree.SubElement(pane, "float", name="int_ior", value=str(GLASS_INDEX))
+        else:
+            write_bsdf_xml(known, folder / f"glass_{number}.xml")
+            _known(shape, known, f"glass_{number}.xml", window)
     ElementTree.indent(scene)
     path = folder / "scene.xml"
     with replacing(path) as part:
         ElementTree.ElementTree(scene).write(part, encoding="utf-8", xml_declaration=True)
     return path
+
+
+def _known(shape: ElementTree.Element, bsdf: BsdfFile, file: str, window: Window) -> None:
+    """The BSDF plugin of a window, whose up is the world's, or north in a level window."""
+    is_tree = isinstance(bsdf.band("Visible"), TensorTreeBsdf)
+    kind = "tensor_tree_bsdf" if is_tree else "klems_bsdf"
+    plugin = ElementTree.SubElement(shape, "bsdf", type=kind)
+    ElementTree.SubElement(plugin, "string", name="filename", value=file)
+    up = window_frame(window.normal)[1]
+    ElementTree.SubElement(plugin, "vector", name="up", value=_numbers(up))
+    ElementTree.SubElement(plugin, "boolean", name="peak", value="true")
 
 
 def _camera(scene: ElementTree.Element, space: Space) -> None:

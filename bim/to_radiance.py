@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 from bim.model import Building, Element, Face, Space
 from bim.sensors import sensor_grid, view_point
 from bim.to_tracer import window_groups
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.files import write_text
+from mitsuba_cfs.surfaces import WindowGroup
 
 SKY = """# receivers of daylight: the ground, then the sky in Reinhart's patches
 #@rfluxmtx h=u u=Y
@@ -47,6 +50,7 @@ class RadianceFiles:
     room: Path  # opaque boundary of the room
     outdoors: Path  # what stands outdoors
     windows: dict[str, Path]  # group name -> glass with its rfluxmtx comment, normals into the room
+    bsdfs: dict[str, Path]  # group name -> BSDF XML, the T of `dctimestep`, where it is known
     sky: Path  # ground and sky as rfluxmtx receivers
     sensors: Path  # x y z dx dy dz on each line
     view: Path  # fisheye view file
@@ -62,6 +66,7 @@ def write_radiance(
     spacing: float = 0.5,
     height: float = 0.8,
     margin: float = 0.5,
+    filled: Sequence[tuple[WindowGroup, BsdfFile | None]] | None = None,
 ) -> RadianceFiles:
     """Write the room, what stands outdoors, its window groups, sensors and a view into a folder.
 
@@ -74,6 +79,7 @@ def write_radiance(
         band: reflectances of "visible" or "solar".
         sky_division: Reinhart division MF of sky.rad, 1 for Tregenza's 145 patches.
         spacing, height, margin: of the sensor grid [m], see `sensor_grid`.
+        filled: the window groups with their BSDF, where it is known; by default the orientations.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -83,13 +89,14 @@ def write_radiance(
     materials = _write(folder / "materials.rad", (_plastic(value) for value in sorted(values)))
     room = _write(folder / "room.rad", _parts(space.faces, band, inwards=True))
     scene = _write(folder / "outdoors.rad", _parts(outdoors, band, inwards=False))
-    windows = {
-        group.name: _write(
-            folder / f"windows_{identifier(group.name)}.rad",
-            _window_group(identifier(group.name), [w.triangles for w in group.windows]),
-        )
-        for group in window_groups(space)
-    }
+    windows, bsdfs = {}, {}
+    for group, bsdf in [(g, None) for g in window_groups(space)] if filled is None else filled:
+        name = identifier(group.name)
+        glass = _window_group(name, [w.triangles for w in group.windows])
+        windows[group.name] = _write(folder / f"windows_{name}.rad", glass)
+        if bsdf is not None:
+            bsdfs[group.name] = folder / f"windows_{name}.xml"
+            write_bsdf_xml(bsdf, bsdfs[group.name])
     sky = _write(folder / "sky.rad", [SKY.format(division=sky_division)])
     points, directions = sensor_grid(space, spacing, height, margin)
     rows = np.concatenate([points, directions], axis=1)
@@ -99,7 +106,7 @@ def write_radiance(
         f"rvu -vta -vp {_numbers(position)} -vd {_numbers(direction)} -vu 0 0 1 -vh 180 -vv 180"
     )
     view = _write(folder / "view.vf", [fisheye + "\n"])
-    return RadianceFiles(materials, room, scene, windows, sky, sensors, view)
+    return RadianceFiles(materials, room, scene, windows, bsdfs, sky, sensors, view)
 
 
 def identifier(name: str) -> str:

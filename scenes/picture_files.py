@@ -12,7 +12,7 @@ from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.files import check_names
-from scenes.job.inputs import System, read_system, read_weather
+from scenes.job.inputs import Given, given_light, read_weather
 from scenes.picture_options import PictureOptions
 from scenes.room_views import NamedView, given_views
 
@@ -24,7 +24,7 @@ class PictureFiles:
     weather: Weather
     hour: int  # of the year
     view: NamedView | None  # None: the room's middle, to its biggest window
-    system: System
+    given: Given  # what fills the windows, by flag
 
 
 def read_files(options: PictureOptions) -> PictureFiles:
@@ -38,7 +38,7 @@ def read_files(options: PictureOptions) -> PictureFiles:
     view = None if options.view is None else given_view(options.view)
     weather = read_weather(options.weather)
     hour = hour_of(weather, options.at)
-    return PictureFiles(weather, hour, view, read_system(options.system))
+    return PictureFiles(weather, hour, view, given_light(options.system))
 
 
 def hour_of(weather: Weather, at: str) -> int:

@@ -14,7 +14,7 @@ class PictureOptions:
 
     building: Path
     weather: Path
-    system: Path
+    system: Path | None  # of every window; None: what the building's file holds
     at: str  # month, day and clock time, `06-21 12:00`
     space: str | None = None  # name or GUID; None: the first room that has a window
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"

@@ -15,7 +15,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
 from scenes import quick as quick_run
 from scenes.job.files import JobFiles
-from scenes.job.inputs import System
+from scenes.job.inputs import Given, System
 from scenes.job.operation import Operation
 from scenes.job.options import JobOptions
 from scenes.job.outputs import write_results
@@ -117,7 +117,10 @@ def simulate(
         quick=quick,
         **options,
     )
-    inputs = job_inputs(building, chosen.spaces, JobFiles(weather, system, operation))
+    states = () if operation is None else operation.systems
+    states = states if system is None else (system,)
+    files = JobFiles(weather, system, operation, Given(states))
+    inputs = job_inputs(building, chosen.spaces, files)
     run = run_inputs(inputs, chosen, progress)
     (year,) = run.spaces
     own = {name: getattr(year, name) for name in RoomYear.__dataclass_fields__}

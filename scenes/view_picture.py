@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from bim.ifc.building import STAGES, read_ifc
 from bim.sensors import view_point
-from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
+from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs import variants
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent, summed
 from mitsuba_cfs.sky.annual import annual_sky
+from scenes.fenestration import fill_windows, source_notes, window_sources
 from scenes.job.drawn_shades import traced_building
 from scenes.job.holes import hole_notes
 from scenes.job.inputs import chosen_spaces
-from scenes.job.windows import everywhere
+from scenes.job.windows import room_windows
 from scenes.picture_files import PictureFiles, read_files
 from scenes.picture_options import SUFFIXES, PictureOptions
 from scenes.pictures import write_falsecolour, write_tone_mapped
@@ -40,7 +40,7 @@ class RoomPicture:
     view: View
     room: str
     time: pd.Timestamp  # middle of the hour
-    notes: tuple[str, ...]  # of system and weather
+    notes: tuple[str, ...]  # of systems and weather
 
 
 def room_picture(
@@ -51,7 +51,7 @@ def room_picture(
     Args: files: what `read_files` has read of the options; read now without.
     """
     files = files or read_files(options)
-    system, weather, hour = files.system, files.weather, files.hour
+    weather, hour = files.weather, files.hour
     reading = summed(part(progress, 0.0, 0.4), "inputs", STAGES)
     building = read_ifc(options.building, join=options.join, progress=reading)
     names = () if options.space is None else (options.space,)
@@ -60,23 +60,27 @@ def room_picture(
     if files.view is not None:
         check_eye(files.view, space)
         view = fitted(files.view.view, options.size)
-    building = traced_building(building, everywhere(space, system))
+    filled = fill_windows(space.windows, files.given, options.building)
+    filled = {guid: states[:1] for guid, states in filled.items()}
+    windows = room_windows(space, filled)
+    building = traced_building(building, filled)
     variants.activate()
     scene = DaylightScene(
         interior_surfaces(space, "visible"),
         exterior_surfaces(building, space, "visible"),
-        window_groups(space),
+        windows.groups,
         view=view,
     )
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
-    systems = [[BsdfOptics(system.visible, system.fine)]] * len(scene.groups)
-    light = PathSystems(scene, systems, sampling).light(
+    light = PathSystems(scene, windows.optics(), sampling).light(
         annual_sky(weather, sampling.subdivision, hours=[hour])
     )
     luminance = light.picture(0, progress=part(progress, 0.4, 1.0, "picture"))
     return RoomPicture(
         luminance, view, space.label, weather.midpoints[hour],
-        (*system.notes, *weather.notes, *hole_notes(space, cache=MatrixCache.of_user())),
+        (*source_notes(window_sources(space.windows, filled)),
+         *dict.fromkeys(note for (system,) in filled.values() for note in system.notes),
+         *weather.notes, *hole_notes(space, cache=MatrixCache.of_user())),
     )  # fmt: skip
 
 

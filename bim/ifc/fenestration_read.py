@@ -66,14 +66,19 @@ def read_states(
             with contextlib.suppress(Exception):  # a damaged type has no data either
                 element_type = ifcopenshell.util.element.get_type(element)
             for source in (element_type, element):
+                of_type = None
+                if source is not None and source is element_type:
+                    of_type = source.Name or ""
                 for pset in _own_sets(source):
                     if pset.id() not in cache:
                         cache[pset.id()] = _state(pset, file, element.GlobalId)
-                    states[cache[pset.id()].name] = cache[pset.id()]
+                    known = replace(cache[pset.id()], of_type=of_type)
+                    states[known.name] = known
                 for path in _referenced(source, Path(folder)):
                     known = states.get("", ShadingState())
                     if not known.bands:
-                        states[""] = replace(known, bands=read_bsdf_xml(path).bands, file=path)
+                        bands = read_bsdf_xml(path).bands
+                        states[""] = replace(known, bands=bands, file=path, of_type=of_type)
             if states:
                 found[element.GlobalId] = tuple(states.values())
     return found

@@ -92,6 +92,7 @@ def _filling(element, shape: Shape, body: Shape | None, host, scale: float) -> F
     with contextlib.suppress(Exception):  # a damaged type must not stop the geometry
         element_type = ifcopenshell.util.element.get_type(element)
     opaque = [look for look in shape.looks if not look.is_glass]
+    panes = _number(psets, "GlassLayers")
     return Filling(
         guid=element.GlobalId,
         name=element.Name or element.GlobalId,
@@ -102,11 +103,13 @@ def _filling(element, shape: Shape, body: Shape | None, host, scale: float) -> F
         host=None if host is None else host.GlobalId,
         frame_width=_frame_width(element, element_type, scale),
         glazed_fraction=_number(psets, "GlazingAreaFraction"),
-        u_value=_number(psets, "ThermalTransmittance"),
+        u_value=_number(psets, "ThermalTransmittance", "ThermalTransmittanceWinter"),
         g_value=_number(psets, "SolarHeatGainTransmittance", "TotalSolarTransmittance"),
         visible_transmittance=_number(psets, "VisibleLightTransmittance"),
         type_name=(element_type.Name or "") if element_type is not None else "",
         frame_reflectance=opaque[0].reflectance if opaque else None,
+        solar_transmittance=_number(psets, "SolarTransmittance"),
+        panes=None if panes is None else round(panes),
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import mitsuba as mi
+
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.colour import COLOUR_BANDS
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
@@ -11,8 +13,11 @@ PREFIXES = ("", "cie_x_", "cie_z_")  # of the tensors of a plugin's grey, X and 
 
 
 def read_band(props, kind: type[Bsdf]) -> tuple[Bsdf, tuple[Bsdf, Bsdf] | None]:
-    """The band `band` (Visible) of the file `filename`, and the X and Z that go with Visible."""
-    path, band = props["filename"], props.get("band", "Visible")
+    """The band `band` (Visible) of the file `filename`, and the X and Z that go with Visible.
+
+    Like a mesh's, the name starts at the folder of the scene file, or at the current one.
+    """
+    path, band = str(mi.file_resolver().resolve(props["filename"])), props.get("band", "Visible")
     bands = read_bsdf_xml(path).bands
     bsdf = bands.get(band)
     if not isinstance(bsdf, kind):

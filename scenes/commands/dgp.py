@@ -7,21 +7,23 @@ from pathlib import Path
 import click
 
 from scenes import quick
-from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.parameters import IFC_FILE
 from scenes.commands.quick_option import given, quick_option
-from scenes.commands.room_options import join_option
-from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.commands.room_options import (
+    join_option,
+    room_files,
+    system_option,
+    weather_option,
+)
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
 
-_DEFAULT = YearOptions(Path(), Path(), Path())
+_DEFAULT = YearOptions(Path(), Path())
 
 
 @click.command()
 @click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
-@click.option("--weather", type=FILE, default=WEATHER, help="EPW file, hourly [the demo's].")
-@click.option(
-    "--cfs", "system", type=FILE, default=VENETIAN_BLIND, help="BSDF XML file [the demo's]."
-)
+@weather_option
+@system_option
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
 @click.option("--space", help="Name or GUID of the room; default: the first with a window.")
 @join_option
@@ -68,12 +70,17 @@ _DEFAULT = YearOptions(Path(), Path(), Path())
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
 @click.option("--seed", type=int, default=_DEFAULT.seed, show_default=True)
 @quick_option
-def command(building: Path | None, out: Path, **chosen) -> None:
+def command(
+    building: Path | None, weather: Path | None, system: Path | None, out: Path, **chosen
+) -> None:
     """Daylight glare probability of a room's views in every hour with the sun up.
 
-    Without BUILDING the demo's office.  Writes a table of the views with their classes and
-    EN 17037's protection, each view's hours, a heat map and its worst hours.  A run that was
-    stopped goes on where it was when it is called again.
+    What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
+    the transmittance that it states.  Without BUILDING the demo's office.
+
+    Writes a table of the views with their classes and EN 17037's protection, each view's hours, a
+    heat map and its worst hours.  A run that was stopped goes on where it was when it is called
+    again.
     """
     if chosen["views"] and (chosen["grid"] is not None or chosen["directions"] > 1):
         raise click.UsageError("--view gives the views: not with --grid or --directions")
@@ -85,8 +92,8 @@ def command(building: Path | None, out: Path, **chosen) -> None:
 
     if chosen["quick"]:
         chosen |= quick.picks(quick.VIEWS, given())
-    options = YearOptions(building or OFFICE, **chosen)
-    files = (building, chosen["weather"], chosen["system"], *map(Path, chosen["views"]))
+    files = (building, weather, system, *map(Path, chosen["views"]))
+    options = YearOptions(*room_files(building, weather, system), **chosen)
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
 
     from bim.model import Building, Space
 
-SUFFIXES = {"--radiance": (".rad", ".pts", ".vf"), "--mitsuba": (".xml", ".ply")}
+PATTERNS = {  # of the files that an export writes
+    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml"),
+    "--mitsuba": ("scene.xml", "glass_*.xml", "*.ply"),
+}
 
 
 UNCUT = 100_000  # columns of a table that nobody sees
@@ -151,7 +155,11 @@ def export(
     epjson: Path | None,
     gltf: Path | None,
 ) -> None:
-    """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing."""
+    """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
+
+    Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
+    and what is not known, is said.
+    """
     if radiance is None and mitsuba is None and epjson is None and gltf is None:
         raise click.UsageError("nothing to write: give --radiance, --mitsuba, --epjson or --gltf")
     for field, path in (("--epjson", epjson), ("--gltf", gltf)):
@@ -171,18 +179,28 @@ def export(
     from bim.to_mitsuba import write_mitsuba
     from bim.to_radiance import write_radiance
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.fenestration_exports import known_fenestration
     from scenes.job.inputs import named_spaces
 
-    writers = {"--radiance": write_radiance, "--mitsuba": write_mitsuba}
     with ProgressBar() as progress:
         read = read_ifc(building, join=join, progress=progress)
     spaces = named_spaces(read, names, building)
+    known = known_fenestration(spaces, building)
+
+    def radiance_room(space: Space, building: Building, folder: Path) -> None:
+        write_radiance(space, building, folder, filled=known.groups(space))
+
+    def mitsuba_room(space: Space, building: Building, folder: Path) -> None:
+        write_mitsuba(space, building, folder, bsdfs=known.bsdfs())
+
+    writers = {"--radiance": radiance_room, "--mitsuba": mitsuba_room}
     for parent, folder in folders.items():
         written: list[str] = []
-        kinds = {suffix for option in formats[parent] for suffix in SUFFIXES[option]}
+        kinds = {pattern for option in formats[parent] for pattern in PATTERNS[option]}
 
         def of_these(name: str, written=written, kinds=kinds) -> bool:
-            return name.partition("/")[0] in written and Path(name).suffix in kinds
+            file = Path(name).name
+            return name.partition("/")[0] in written and any(fnmatch(file, k) for k in kinds)
 
         with folder.replaced(gone=of_these) as place:
             written += _export_rooms(
@@ -190,12 +208,17 @@ def export(
             )
         for name in written:
             click.echo(parent / name)
+    assumed: tuple[str, ...] = ()
     if epjson is not None:
-        write_epjson(read, epjson, spaces=spaces)
+        u_and_g, assumed = known.u_and_g()
+        write_epjson(read, epjson, spaces=spaces, known=u_and_g)
         click.echo(epjson)
     if gltf is not None:
         write_gltf(replace(read, spaces=tuple(spaces)), gltf)
         click.echo(gltf)
+    notes = known.notes() if folders or epjson is not None else ()
+    for note in (*notes, *assumed):
+        click.echo(f"note: {note}")
 
 
 def _export_rooms(

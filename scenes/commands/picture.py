@@ -8,18 +8,20 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import check_file
-from scenes.commands.parameters import FILE, IFC_FILE
-from scenes.commands.room_options import join_option
-from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.commands.parameters import IFC_FILE
+from scenes.commands.room_options import (
+    join_option,
+    room_files,
+    system_option,
+    weather_option,
+)
 from scenes.picture_options import SUFFIXES, PictureOptions
 
 
 @click.command()
 @click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
-@click.option("--weather", type=FILE, default=WEATHER, help="EPW file, hourly [the demo's].")
-@click.option(
-    "--cfs", "system", type=FILE, default=VENETIAN_BLIND, help="BSDF XML file [the demo's]."
-)
+@weather_option
+@system_option
 @click.option(
     "--at", required=True, metavar="'MM-DD HH:MM'", help="The hour of the weather that holds it."
 )
@@ -44,10 +46,18 @@ from scenes.picture_options import SUFFIXES, PictureOptions
     "--out", "files", type=click.Path(dir_okay=False, path_type=Path), multiple=True, required=True,
     help=f"File to write ({', '.join(SUFFIXES)}); may be repeated.",
 )  # fmt: skip
-def command(building: Path | None, files: tuple[Path, ...], tone: bool, **chosen) -> None:
+def command(
+    building: Path | None,
+    weather: Path | None,
+    system: Path | None,
+    files: tuple[Path, ...],
+    tone: bool,
+    **chosen,
+) -> None:
     """Luminance picture of a room under the sun and sky of an hour, path-traced.
 
-    Without BUILDING the demo's office.
+    What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
+    the transmittance that it states.  Without BUILDING the demo's office.
     """
     for file in files:
         if file.suffix not in SUFFIXES:
@@ -56,7 +66,7 @@ def command(building: Path | None, files: tuple[Path, ...], tone: bool, **chosen
     from scenes.picture_files import read_files
 
     start = time.perf_counter()
-    options = PictureOptions(building or OFFICE, **chosen)
+    options = PictureOptions(*room_files(building, weather, system), **chosen)
     try:
         read = read_files(options)  # before anything heavy is loaded
         from mitsuba_cfs.glare.evaluation import evaluate

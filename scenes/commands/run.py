@@ -10,7 +10,7 @@ import click
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.quick_option import given, quick_option
-from scenes.commands.room_options import join_option
+from scenes.commands.room_options import join_option, system_option
 from scenes.job.options import METHODS, JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
@@ -20,10 +20,7 @@ _DEFAULT = JobOptions(Path(), Path())
 @click.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
-@click.option(
-    "--cfs", "system", type=FILE,
-    help="BSDF XML file of every window, Klems full or tensor tree; default: what the IFC holds.",
-)  # fmt: skip
+@system_option
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
 @click.option(
     "--method", type=click.Choice(METHODS), default=_DEFAULT.method, show_default=True,
@@ -73,8 +70,6 @@ def command(
     """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
-    if system is None and (chosen["u_value"] is not None or chosen["g_value"] is not None):
-        raise click.UsageError("--u and --g belong to --cfs")
     options = JobOptions(building, weather, system, cache=not no_cache, quick=quick, **chosen)
     if quick:
         options = replace(options, **quick_run.picks(quick_run.ROOM, given()))

@@ -96,7 +96,8 @@ def lines(folder: Path, building: Path, demo: Path) -> Iterator[tuple[str, str, 
     yield "run, hour", "mistake", ["run", building, *of_run, "--picture", "13-45 99"]
     yield "run", "result", ["run", office, *of_run, "--quick"]
     yield "run, house", "result", ["run", building, *of_run, "--quick"]
-    yield "dgp", "mistake", ["dgp", building, "--cfs", bad["bad.xml"], "--out", folder / "dgp"]
+    of_dgp = ["--weather", weather, "--cfs", bad["bad.xml"], "--out", folder / "dgp"]
+    yield "dgp", "mistake", ["dgp", building, *of_dgp]
     yield "dgp", "result", [
         "dgp", office, "--weather", weather, "--cfs", system, "--size", "100",
         "--out", folder / "dgp",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.study_file import StudyFile
 from scenes.job.files import check_names
-from scenes.job.inputs import System, read_weather
+from scenes.job.inputs import Given, System, read_weather
 from scenes.job.operation import read_state
 from scenes.job.thermal_system import checked_system
 
@@ -18,6 +18,7 @@ class HeatFiles:
 
     weather: Weather
     systems: tuple[System, ...]  # by shading state
+    given: Given  # the same as what the study file gives for all windows
 
 
 def read_files(study: StudyFile) -> HeatFiles:
@@ -31,7 +32,8 @@ def read_files(study: StudyFile) -> HeatFiles:
 
         box_building(study.box)
     weather = read_weather(study.weather)
-    systems = tuple(read_state(table, table.bsdf) for table in study.system)
+    by = "[[system]] of the study,"
+    systems = tuple(read_state(table, table.bsdf, by=by) for table in study.system)
     for one, table in zip(systems, study.system, strict=True):
         checked_system(one, table.bsdf)
-    return HeatFiles(weather, systems)
+    return HeatFiles(weather, systems, Given(systems, ask="a [[system]]"))

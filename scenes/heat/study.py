@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,19 +12,20 @@ from bim.ifc.building import read_ifc
 from bim.model import Building, Space
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, item
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration import fill_windows, source_notes, window_sources
 from scenes.heat.box import box_building
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.job.drawn_shades import traced_building
-from scenes.job.inputs import chosen_spaces, named_spaces
+from scenes.job.inputs import States, chosen_spaces, named_spaces
 from scenes.job.room import Room, skies_for
 from scenes.job.thermal_system import thermal_system
-from scenes.job.windows import everywhere
 from scenes.job.zone import RoomZone, balances, coupled
 from thermal.balance import ZoneResult
 from thermal.zone import Zone
@@ -49,12 +50,16 @@ def run_study(
     Args: files: what `read_files` has read of the study; read now without.
     """
     files = files or read_files(study)
-    weather, systems = files.weather, files.systems
+    weather = files.weather
     building, spaces = rooms_of(study)
-    in_windows = {guid: s for space in spaces for guid, s in everywhere(space, *systems).items()}
+    windows = [window for space in spaces for window in space.windows]
+    in_windows = fill_windows(windows, files.given, study.building)
+    _check_states(study, in_windows)
     building = traced_building(building, in_windows)
+    systems = list({id(s): s for states in in_windows.values() for s in states}.values())
+    notes = dict.fromkeys(source_notes(window_sources(windows, in_windows)))
     noted = (weather, *systems, *map(thermal_system, systems))
-    notes = dict.fromkeys(note for t in noted for note in t.notes)
+    notes |= dict.fromkeys(note for t in noted for note in t.notes)
     variants.activate()
     options, trace = study.options, study.trace
     skies, cache = skies_for(weather, options), MatrixCache.of_user()
@@ -81,6 +86,15 @@ def run_study(
             notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
         years.append(_year(study, room, _felt(study, room.zone, result, radiant), weather))
     return years, tuple(notes)
+
+
+def _check_states(study: StudyFile, in_windows: Mapping[str, States]) -> None:
+    """Raise `DataError` where the control names states that no window of the model has."""
+    most = max(map(len, in_windows.values()), default=0)
+    fault = study.control.fault(most) if most else None
+    if fault is not None:
+        field, message = fault
+        raise DataError(message, file=study.building, field=f"control.{field}")
 
 
 def year_of_rooms(

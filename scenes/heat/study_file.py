@@ -94,7 +94,7 @@ class StudyFile(OperationTables):
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     couple: bool = False  # heat flows through the walls between the rooms
     box: BoxTable | None = None
-    system: Annotated[tuple[SystemTable, ...], Field(min_length=1)]
+    system: tuple[SystemTable, ...] = ()  # states; none: what the building's file holds
     comfort: ComfortTable = ComfortTable()
     trace: TraceTable = TraceTable()
     step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10
@@ -110,6 +110,10 @@ class StudyFile(OperationTables):
     def _fits(self) -> StudyFile:
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `[box]`")
+        if not self.system:
+            if self.box is not None:
+                raise ValueError("system: is missing; a box holds no fenestration data")
+            return self
         fault = self.control.fault(len(self.system))
         if fault is not None:
             raise ValueError("control.{}: {}".format(*fault))

@@ -1,52 +1,49 @@
-"""Fenestration data that an IFC file holds for its windows, as the systems of a run."""
+"""Fenestration data that an IFC file holds for its windows, as systems."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.fenestration import AngularGValue, ShadingState
-from bim.ifc.fenestration_read import read_fenestration
 from bim.model import Window
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
-from scenes.job.inputs import System, system_of
+from scenes.job.inputs import States, System, system_of
 from scenes.job.thermal_file import ThermalFile
-from scenes.job.windows import States
+
+Held = Mapping[str, tuple[ShadingState, ...]]  # by window, as `read_fenestration` gives them
 
 
-def attached_systems(path: Path, windows: Iterable[Window]) -> dict[str, States]:
-    """The systems by state of each window, by its GUID, from the data attached in the file.
+def attached_systems(held: Held, windows: Iterable[Window], path: Path) -> dict[str, States]:
+    """The systems by state of each window that has a BSDF attached, by its GUID.
 
     The state without a name is the usual one and comes first; the others follow in the file's
     order.  Windows whose data are the same share their systems.
 
-    Raises: `DataError` that names the windows without data.
+    Args: path: of the IFC file.
     """
-    windows = list(windows)
-    held = read_fenestration(path)
-    missing = [w for w in windows if w.guid not in held]
-    if missing:
-        names = ", ".join(w.name or w.guid for w in missing[:5])
-        more = f" and {len(missing) - 5} more" if len(missing) > 5 else ""
-        raise DataError(
-            "no fenestration data attached and no --cfs given (cfs ifc attach writes them)",
-            file=path,
-            element=f"window {names}{more}",
-        )
-    known: dict[str, States] = {}
-    found = {}
+    alike: dict[str, list[Window]] = {}
     for window in windows:
-        states = sorted(held[window.guid], key=lambda state: state.name != "")
-        key = digest(*(_content(state) for state in states))
-        if key not in known:
-            known[key] = tuple(_system(state, window, path) for state in states)
-        found[window.guid] = known[key]
+        states = usual_first(held.get(window.guid, ()))
+        if any(state.bands for state in states):
+            alike.setdefault(digest(*(_content(state) for state in states)), []).append(window)
+    found = {}
+    for group in alike.values():
+        states = usual_first(held[group[0].guid])
+        source = _source([usual_first(held[window.guid])[0] for window in group], path)
+        systems = tuple(_system(state, group[0], path, source) for state in states)
+        found |= {window.guid: systems for window in group}
     return found
+
+
+def usual_first(states: Iterable[ShadingState]) -> list[ShadingState]:
+    """The states, the one without a name first."""
+    return sorted(states, key=lambda state: state.name != "")
 
 
 def _content(state: ShadingState) -> list:
@@ -56,15 +53,26 @@ def _content(state: ShadingState) -> list:
     return [state.name, bands, *thermal, state.closure, state.shading_position, beside]
 
 
-def _system(state: ShadingState, window: Window, path: Path) -> System:
+def _system(state: ShadingState, window: Window, path: Path, source: str) -> System:
     name = state.name or window.type_name or window.name or window.guid
     if not state.bands:
         label = f"state {state.name!r} has no BSDF" if state.name else "has no BSDF"
         raise DataError(label, file=path, element=f"window {window.name or window.guid}")
-    return system_of(state.bands, name, path=path, **_thermal(state))
+    named = "" if state.file is None else f" as {state.file.name}"
+    thermal = held_thermal(state)
+    return system_of(state.bands, name, path=path, source=f"{source}{named}", **thermal)
 
 
-def _thermal(state: ShadingState) -> dict:
+def _source(states: Iterable[ShadingState], path: Path) -> str:
+    """What holds the data of some windows, one state of each."""
+    types = dict.fromkeys(state.of_type for state in states)
+    names = [name or "without a name" for name in types if name is not None]
+    holders = [f"window type {', '.join(names)}"] if names else []
+    holders += ["the window itself"] if None in types else []
+    return f"what is attached to {' and '.join(holders)} in {path.name}"
+
+
+def held_thermal(state: ShadingState) -> dict:
     """U, g, closure and place of the shade: of the model, else of the file beside the BSDF's."""
     beside = ThermalFile()
     if state.file is not None:

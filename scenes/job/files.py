@@ -13,7 +13,7 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.inputs import System, read_system, read_weather
+from scenes.job.inputs import Given, System, read_system, read_weather
 from scenes.job.operation import Operation, check_states, read_operation
 from scenes.job.options import JobOptions
 from scenes.job.picture_hours import check_hours, wanted_hours
@@ -27,6 +27,7 @@ class JobFiles:
     weather: Weather
     system: System | None
     operation: Operation | None
+    given: Given  # what fills the windows, by flag or operation file
 
 
 def read_files(options: JobOptions) -> JobFiles:
@@ -43,12 +44,16 @@ def read_files(options: JobOptions) -> JobFiles:
     operation = None if options.operation is None else read_operation(options.operation)
     system = None
     if options.system is not None:
-        system = read_system(options.system, u_value=options.u_value, g_value=options.g_value)
+        chosen = {"u_value": options.u_value, "g_value": options.g_value}
+        system = read_system(options.system, **chosen, by="--cfs")
         checked_system(system, options.system)
     if operation is not None:
         _check_operation(operation, system)
     _check_sun(options, weather)
-    return JobFiles(weather, system, operation)
+    states = () if operation is None else operation.systems
+    states = states if system is None else (system,)
+    given = Given(states, options.u_value, options.g_value)
+    return JobFiles(weather, system, operation, given)
 
 
 def check_names(names: tuple[str, ...], field: str = "--space") -> None:
@@ -71,7 +76,7 @@ def _check_operation(operation: Operation, system: System | None) -> None:
     """What does not need the windows: its systems' data, and its control's states."""
     for one, path in zip(operation.systems, operation.files, strict=True):
         checked_system(one, path)
-    if operation.systems:
-        check_states(operation, len(operation.systems))
-    elif system is not None:
+    if system is not None:
         check_states(operation, 1)
+    elif operation.systems:
+        check_states(operation, len(operation.systems))

@@ -41,6 +41,7 @@ class System:
     notes: tuple[str, ...] = ()
     tree: TensorTreeBsdf | None = None  # visible, where the data are a tree: for sun and pictures
     file: Path | None = None  # that it was read from
+    source: str = ""  # where the system comes from, in words
 
     @property
     def fine(self) -> Bsdf:
@@ -48,12 +49,38 @@ class System:
         return self.visible if self.tree is None else self.tree
 
 
+States = tuple[System, ...]  # of a window: its system in each shading state, from open to closed
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What the user gives for all windows; what is not given is looked for in the IFC file."""
+
+    states: States = ()  # by a flag or a study file
+    u_value: float | None = None  # of --u, in place of the file's [W/(m2 K)]
+    g_value: float | None = None  # of --g, at normal incidence
+    ask: str = "--cfs FILE"  # how a system is given, for the error that none is
+    light_only: bool = False  # neither U nor g is needed
+
+
+def given_light(path: Path | None) -> Given:
+    """What `--cfs` gives to a command that asks for the light alone."""
+    states = () if path is None else (read_system(path, by="--cfs"),)
+    return Given(states, light_only=True)
+
+
 def read_system(
-    path: str | PathLike[str], *, u_value: float | None = None, g_value: float | None = None
+    path: str | PathLike[str],
+    *,
+    u_value: float | None = None,
+    g_value: float | None = None,
+    by: str = "",
 ) -> System:
     """The system of a BSDF XML file, with U and g given, or of the `.toml` file beside it.
 
     The `.toml` file has the name of the XML file; see `ThermalFile`.
+
+    Args: by: what names the file, such as "--cfs"; goes before its name in the system's source.
 
     Raises: `DataError` for a file that cannot be used.
     """
@@ -71,6 +98,7 @@ def read_system(
         shading_position=beside.shading_position,
         notes=file.notes,
         file=path,
+        source=f"{by} {path.name}".strip(),
     )
 
 

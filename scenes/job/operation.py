@@ -38,16 +38,19 @@ def read_operation(path: str | PathLike[str]) -> Operation:
         place = path.parent / one.bsdf
         if not place.is_file():
             raise DataError(f"no such file: {one.bsdf}", file=path, field=f"system.{number}.bsdf")
-        system = read_state(one, place)
+        system = read_state(one, place, by=f"[[system]] of {path.name},")
         if any(system.name == other.name for other in systems):
             system = replace(system, name=place.stem)
         systems.append(system)
     return Operation(path, tables, tuple(systems))
 
 
-def read_state(table: SystemTable, path: Path) -> System:
-    """The system of a shading state from its BSDF file, with U, g and closure of its table."""
-    system = read_system(path, u_value=table.u_value, g_value=table.g_value)
+def read_state(table: SystemTable, path: Path, *, by: str = "") -> System:
+    """The system of a shading state from its BSDF file, with U, g and closure of its table.
+
+    Args: by: what names the file, for the system's source.
+    """
+    system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
     return replace(system, closure=table.closure() or system.closure)
 
 

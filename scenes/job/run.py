@@ -18,17 +18,16 @@ from mitsuba_cfs.progress import Progress, item, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration import fill_windows, source_notes, window_sources
 from scenes.job.alike import as_room, same_light, same_systems
-from scenes.job.attached import attached_systems
 from scenes.job.building import read_building
 from scenes.job.drawn_shades import traced_building
 from scenes.job.files import JobFiles, read_files
-from scenes.job.inputs import System, chosen_spaces, sha256
+from scenes.job.inputs import States, System, chosen_spaces, sha256
 from scenes.job.operation import Operation, check_states
 from scenes.job.options import JobOptions
 from scenes.job.room import compute_room, skies_for
 from scenes.job.thermal_system import thermal_system
-from scenes.job.windows import States, everywhere
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 
@@ -104,6 +103,7 @@ def run_inputs(
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
         *([NOTE] if options.quick else []),
+        *source_notes(used_sources(inputs)),
         *(note for system in used for note in system.notes),
         *thermal_notes,
         *_state_notes(inputs, options),
@@ -142,18 +142,10 @@ def job_inputs(building: Building, names: Sequence[str], files: JobFiles) -> Job
 
     Raises: `DataError` for a room that is not there, a window without a system.
     """
-    system, operation, weather = files.system, files.operation, files.weather
+    operation, weather = files.operation, files.weather
     spaces = chosen_spaces(building, names, building.file)
-    systems: dict[str, States] = {}
-    if operation is not None and operation.systems:
-        for space in spaces:
-            systems |= everywhere(space, *operation.systems)
-    elif system is not None:
-        for space in spaces:
-            systems |= everywhere(space, system)
-    else:
-        windows = [window for space in spaces for window in space.windows]
-        systems = attached_systems(building.file, windows)
+    windows = [window for space in spaces for window in space.windows]
+    systems = fill_windows(windows, files.given, building.file)
     if operation is not None:
         check_states(operation, max(len(states) for states in systems.values()))
     building = traced_building(building, systems)
@@ -162,8 +154,19 @@ def job_inputs(building: Building, names: Sequence[str], files: JobFiles) -> Job
 
 def used_systems(inputs: JobInputs) -> list[System]:
     """Every system that the run may use, once."""
-    states = [s if inputs.operation else s[:1] for s in inputs.systems.values()]
+    states = _used_states(inputs).values()
     return list({id(system): system for some in states for system in some}.values())
+
+
+def used_sources(inputs: JobInputs) -> list[dict]:
+    """Name and source of every system that the run may use, and its windows."""
+    windows = [window for space in inputs.spaces for window in space.windows]
+    return window_sources(windows, _used_states(inputs))
+
+
+def _used_states(inputs: JobInputs) -> dict[str, States]:
+    several = inputs.operation is not None
+    return {guid: s if several else s[:1] for guid, s in inputs.systems.items()}
 
 
 def _rooms(
@@ -243,6 +246,7 @@ def _manifest(
         "building": inputs.building.name,
         "site": inputs.weather.site,
         "system": ", ".join(dict.fromkeys(system.name for system in used)),
+        "fenestration": used_sources(inputs),
         "options": {
             key: str(value) if isinstance(value, Path) else value
             for key, value in asdict(options).items()
@@ -259,6 +263,9 @@ def _manifest(
 
 def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
     """A sentence where windows have more states than are used."""
+    if inputs.operation is not None and inputs.operation.systems and options.system is not None:
+        file = inputs.operation.file.name
+        return (f"--cfs fills the windows: [[system]] of {file} is not used.",)
     several = [states[0].name for states in inputs.systems.values() if len(states) > 1]
     if inputs.operation is not None or not several:
         return ()

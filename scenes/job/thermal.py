@@ -53,6 +53,7 @@ def fenestration_table(
             visible = system.visible
             yield {
                 "system": system.name,
+                "source": system.source,
                 "u_value": heat.fenestration.u_value,
                 "g_value": float(heat.g_value[0]),
                 "solar_transmittance": float(heat.transmittance[0]),

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Space
 from bim.to_tracer import window_groups
-from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.surfaces import WindowGroup
-from scenes.job.inputs import System
+from scenes.job.inputs import States, System
+
+if TYPE_CHECKING:
+    from mitsuba_cfs.methods.optics import BsdfOptics
 
 T = TypeVar("T")
-States = tuple[System, ...]  # of a window: its system in each shading state, from open to closed
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,8 @@ class RoomWindows:
 
     def optics(self) -> list[list[BsdfOptics]]:
         """Each group's systems by state [G][J], as the methods take them."""
+        from mitsuba_cfs.methods.optics import BsdfOptics  # a tracer, which no export needs
+
         known: dict[int, BsdfOptics] = {}
         for states in self.systems:
             for system in states:

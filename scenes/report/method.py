@@ -71,6 +71,9 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
                 + (", in the most open shading state." if _controlled(result) else "."),
             )
         )
+    sources = _sources(result)
+    if sources:
+        found.append(("Fenestration", sources))
     found.append(("Glare", _glare(result)))
     found.append(("Heat", _heat(result)))
     twins = [room.space.label for room in rooms if room.like]
@@ -83,6 +86,13 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
             )
         )
     return found
+
+
+def _sources(result: RunResult) -> str:
+    """Where each system comes from; empty where that is not known."""
+    tables = [values for room in result.spaces for values in room.thermal.fenestration]
+    sources = {f"{t['system']}, from {t['source']}." for t in tables if t.get("source")}
+    return " ".join(sorted(sources))
 
 
 def _controlled(result: RunResult) -> bool:

@@ -86,7 +86,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         fenestration=tuple(
             tables.values_table(
                 str(values.get("system", "The window with its shade")),
-                {key: value for key, value in values.items() if key != "system"},
+                {k: v for k, v in values.items() if k not in ("system", "source")},
             )
             for values in room.heat.fenestration
         ),

@@ -13,6 +13,7 @@ from scenes.calibration.costs import Calibration, Work
 from scenes.calibration.shipped import this_machines_costs
 from scenes.job.inputs import System, read_system, read_weather
 from scenes.study.case import AUTO, Case, with_method
+from scenes.study.one_case import case_systems
 from scenes.study.plan import Plan
 from scenes.study.study_file import Study
 from thermal.comfort import hours_between
@@ -34,7 +35,7 @@ def settled(study: Study, plan: Plan, calibration: Calibration | None = None) ->
     for specular in {case.specular for case in open_cases}:
         cases = [case for case in open_cases if case.specular == specular]
         budget = study.auto.time_budget * len(cases) / len(open_cases)
-        demand = Demand(work_of(cases), budget, study.auto.dgp_error, _fine(cases), specular)
+        demand = Demand(work_of(cases), budget, study.auto.dgp_error, _fine(cases, plan), specular)
         choice = choose(demand, calibration)
         chosen[specular] = replace(choice, why=f"{choice.why}; {calibration.origin}")
     cases = []
@@ -63,10 +64,15 @@ def work_of(cases: list[Case]) -> Work:
     return Work(scenes, systems, round(rated), round(lit))
 
 
-def _fine(cases: list[Case]) -> bool:
+def _fine(cases: list[Case], plan: Plan) -> bool:
     """Whether every system is known finely enough for the sun's disc."""
-    paths = {case.bsdf: case.bsdf.path for case in cases}
-    return all(keeps_the_sun(read_system(path)) for path in paths.values())
+    files = {case.bsdf.path for case in cases if case.bsdf is not None}
+    systems = [read_system(path) for path in files]
+    for case in cases:
+        if case.bsdf is None:
+            _, space = plan.rooms[case.scene]
+            systems += [one for states in case_systems(case, space).values() for one in states]
+    return all(map(keeps_the_sun, {id(system): system for system in systems}.values()))
 
 
 def keeps_the_sun(system: System) -> bool:

@@ -41,7 +41,7 @@ class Case:
     building: Source | BoxTable
     specular: bool
     system: str
-    bsdf: Source
+    bsdf: Source | None  # None: what the building's file holds
     thermal: Source | None  # the .toml file beside the BSDF
     u_value: float | None
     g_value: float | None
@@ -53,6 +53,7 @@ class Case:
     program: str  # `program_version()` of the plan
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
+    referenced: tuple[Source, ...] = ()  # BSDF files that the building's names, and those beside
 
     @property
     def key(self) -> str:
@@ -67,12 +68,14 @@ class Case:
             self.orientation_deg % 360.0,
             _plain(asdict(self.options)),
             self.glare,
+            [source.sha256 for source in self.referenced],
         )[:32]
 
     @property
     def files(self) -> tuple[Source | BoxTable | None, ...]:
         """What it is read from; the building last."""
-        return (self.bsdf, self.thermal, self.weather, self.operation, self.building)
+        own = (self.bsdf, self.thermal, self.weather, self.operation)
+        return (*own, *self.referenced, self.building)
 
     @property
     def place(self) -> str:

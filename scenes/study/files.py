@@ -29,7 +29,9 @@ def check_files(study: Study) -> None:
         else:
             box_building(room.box)
     if study.operation is not None:
-        check_states(read_operation(study.operation), 1)
+        operation = read_operation(study.operation)
+        if study.system:
+            check_states(operation, 1)
     for climate in study.climate:
         read_weather(climate.weather)
     for system in study.system:

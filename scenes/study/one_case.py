@@ -19,12 +19,12 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration import fill_windows, source_notes, window_sources
 from scenes.heat.box import box_building
 from scenes.job.drawn_shades import traced_building
-from scenes.job.inputs import System, read_system, read_weather
-from scenes.job.operation import read_operation
+from scenes.job.inputs import Given, States, read_system, read_weather
+from scenes.job.operation import check_states, read_operation
 from scenes.job.room import compute_room, skies_for
-from scenes.job.windows import everywhere
 from scenes.results import RoomYear
 from scenes.study.case import Case, Source, program_version
 from scenes.study.store import CaseResult
@@ -54,15 +54,18 @@ def _computed(case: Case) -> CaseResult:
             raise DataError("is not the file that it was when the study began", file=source.path)
     variants.activate()
     building, space = _room(case)
-    system = _system(case)
-    building = traced_building(building, everywhere(space, system))
+    systems = case_systems(case, space)
+    building = traced_building(building, systems)
     weather = _weather(case.weather, case.orientation_deg)
     skies = _skies(case.weather, case.orientation_deg, case.options)
     cache = MatrixCache.of_user()
+    operation = None if case.operation is None else read_operation(case.operation.path)
+    if operation is not None:
+        check_states(operation, max(map(len, systems.values())))
     hours = _rated_hours(weather, case.options.occupied)
     room = compute_room(
-        building, space, everywhere(space, system), weather, case.options,
-        operation=None if case.operation is None else read_operation(case.operation.path),
+        building, space, systems, weather, case.options,
+        operation=operation,
         skies=skies, cache=cache, pictures=False,
         rate=None if case.glare == "none" else (case.glare, hours),
     )  # fmt: skip
@@ -71,6 +74,9 @@ def _computed(case: Case) -> CaseResult:
         figures |= glare_figures(room.dgp, weather, case.options.occupied)
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
         arrays["dgp"][hours] = room.dgp
+    if case.bsdf is None:  # else the table says it: names are no part of a case's key
+        used = systems if operation is not None else {guid: s[:1] for guid, s in systems.items()}
+        figures["fenestration"] = " ".join(source_notes(window_sources(space.windows, used)))
     figures["seconds"] = round(time.monotonic() - start, 3)
     return CaseResult(case.key, figures, arrays)
 
@@ -106,8 +112,14 @@ def _skies(source: Source, angle: float, options) -> AnnualSky:
     return _skies_of(source, angle, options.sky_subdivision, options)
 
 
-def _system(case: Case) -> System:
-    return read_system(case.bsdf.path, u_value=case.u_value, g_value=case.g_value)
+def case_systems(case: Case, space: Space) -> dict[str, States]:
+    """The systems by state of each window of a case's room, by its GUID."""
+    states: States = ()
+    if case.bsdf is not None:
+        given = {"u_value": case.u_value, "g_value": case.g_value}
+        states = (read_system(case.bsdf.path, **given),)
+    file = case.building.path if isinstance(case.building, Source) else None
+    return fill_windows(space.windows, Given(states, ask="a [[system]]"), file)
 
 
 def _rated_hours(weather: Weather, occupied: tuple[int, int]) -> NDArray[np.int64]:

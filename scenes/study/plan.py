@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from bim.ifc.building import read_ifc
+from bim.ifc.fenestration_read import read_fenestration
 from bim.model import Building, Space
 from scenes.heat.box import box_building
 from scenes.job.inputs import chosen_spaces
 from scenes.job.options import RoomOptions
 from scenes.study.case import AUTO, Case, Source, program_version
 from scenes.study.study_file import RoomTable, Study
+
+AS_HELD = "as in the building's file"  # the system of a study that names none
+NOTHING_GIVEN = {"u_value": None, "g_value": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +45,7 @@ def plan_of(study: Study) -> Plan:
                 "g_value": system.g_value,
             }
         )
+    systems = systems or [{"system": AS_HELD, "bsdf": None, "thermal": None} | NOTHING_GIVEN]
     climates = [{"climate": c.name, "weather": Source.of(c.weather)} for c in study.climate]
     operation = None if study.operation is None else Source.of(study.operation)
     found: list[Case] = []
@@ -47,6 +53,7 @@ def plan_of(study: Study) -> Plan:
     for room in study.room:
         building, spaces = rooms_of(room)
         source = room.box if room.box is not None else Source.of(room.building)
+        referenced = () if study.system else _referenced(room.building)
         for space in spaces:
             about = {
                 "room": room.name,
@@ -55,6 +62,7 @@ def plan_of(study: Study) -> Plan:
                 "building": source,
                 "specular": room.specular,
                 "operation": operation,
+                "referenced": referenced,
             }
             of_space = list(_of_space(study, about, systems, climates))
             rooms[of_space[0].scene] = building, space
@@ -83,6 +91,14 @@ def _of_space(
                         glare=study.glare,
                         chosen=AUTO if method == AUTO else "",
                     )
+
+
+def _referenced(building: Path) -> tuple[Source, ...]:
+    """The BSDF files that a building's file names, and the `.toml` files beside them."""
+    held = read_fenestration(building).values()
+    named = {state.file for states in held for state in states if state.file is not None}
+    beside = (file.with_suffix(".toml") for file in sorted(named))
+    return tuple(Source.of(file) for file in (*sorted(named), *beside) if file.is_file())
 
 
 def rooms_of(room: RoomTable) -> tuple[Building, list[Space]]:

@@ -147,6 +147,7 @@ def described(case: Case, space: Space) -> dict:
         "room": case.room,
         "space": case.space_name,
         "system": case.system,
+        "fenestration": source_of(case),
         "climate": case.climate,
         "orientation_deg": case.orientation_deg,
         "facing": facing(space, case.orientation_deg),
@@ -154,6 +155,13 @@ def described(case: Case, space: Space) -> dict:
         "glare": case.glare,
         "why": case.chosen,
     }
+
+
+def source_of(case: Case) -> str:
+    """Where a case's systems come from, in words."""
+    return (
+        "held by the building's file" if case.bsdf is None else f"[[system]] {case.bsdf.path.name}"
+    )
 
 
 def facing(space: Space, orientation_deg: float) -> str:
@@ -180,5 +188,6 @@ def manifest(study: Study, plan: Plan) -> dict:
         "quick": study.quick,
         "study": study.model_dump(mode="json"),
         "sha256": files,
+        "fenestration": {case.system: source_of(case) for case in plan.cases},
         "cases": [case.key for case in plan.cases],
     }

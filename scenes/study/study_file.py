@@ -95,7 +95,7 @@ class Study(_Table):
 
     title: str = ""
     room: Annotated[tuple[RoomTable, ...], Field(min_length=1)]
-    system: Annotated[tuple[SystemTable, ...], Field(min_length=1)]
+    system: tuple[SystemTable, ...] = ()  # none: what each building's file holds
     climate: Annotated[tuple[ClimateTable, ...], Field(min_length=1)]
     orientations_deg: Annotated[tuple[float, ...], Field(min_length=1)] = (0.0,)  # clockwise
     methods: Annotated[
@@ -110,6 +110,8 @@ class Study(_Table):
 
     @model_validator(mode="after")
     def _no_twins(self) -> Study:
+        if not self.system and any(room.box is not None for room in self.room):
+            raise ValueError("system: is missing; a box holds no fenestration data")
         for key in ("room", "system", "climate"):
             _unique(key, [entry.name for entry in getattr(self, key)])
         turned = [angle % 360.0 for angle in self.orientations_deg]

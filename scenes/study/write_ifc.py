@@ -13,7 +13,7 @@ from scenes.study.files import one_building
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 
-OF_WINDOWS = ("u_value", "g_value", "visible_transmittance", "solar_transmittance")
+OF_WINDOWS = ("fenestration", "u_value", "g_value", "visible_transmittance", "solar_transmittance")
 
 
 def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:

@@ -8,7 +8,7 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.sky.weather import Weather
 from scenes.job.files import check_names
-from scenes.job.inputs import System, read_system, read_weather
+from scenes.job.inputs import Given, given_light, read_weather
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import rated_views
 
@@ -18,7 +18,7 @@ class YearFiles:
     """What the files of a year of glare hold, all but the building."""
 
     weather: Weather
-    system: System
+    given: Given  # what fills the windows, by flag
 
 
 def read_files(options: YearOptions) -> YearFiles:
@@ -30,4 +30,4 @@ def read_files(options: YearOptions) -> YearFiles:
     corrections_beside(options.building)
     check_names(() if options.space is None else (options.space,))
     rated_views(options)
-    return YearFiles(read_weather(options.weather), read_system(options.system))
+    return YearFiles(read_weather(options.weather), given_light(options.system))

@@ -15,7 +15,7 @@ class YearOptions:
 
     building: Path
     weather: Path
-    system: Path
+    system: Path | None = None  # of every window; None: what the building's file holds
     space: str | None = None  # name or GUID; None: the first room that has a window
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     views: tuple[str, ...] = ()  # Radiance view options, or files of them

@@ -122,6 +122,8 @@ def write_summary(year: Year, rows: list[dict[str, object]], folder: Path) -> pd
         "room": year.room,
         "options": {name: _plain(getattr(options, name)) for name in options.__slots__},
         "inputs": year.digest,
+        "fenestration": list(year.fenestration),
+        "notes": list(year.notes),
         "hours_with_sun": len(year.sky.lit),
         "version": metadata.version("mitsuba-cfs"),
     }

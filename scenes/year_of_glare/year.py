@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from bim.ifc.building import STAGES, read_ifc
 from bim.ifc.corrections import corrections_file
-from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
+from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import AnnualGlare, kept_glare
 from mitsuba_cfs.images.view import format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.matrices.cache import digest as content_digest
 from mitsuba_cfs.methods.glare import FIGURES, hourly_glare, pictures
-from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
@@ -31,10 +32,11 @@ from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
+from scenes.fenestration import fill_windows, source_notes, window_sources
 from scenes.job.drawn_shades import traced_building
 from scenes.job.holes import hole_notes
 from scenes.job.inputs import chosen_spaces, sha256
-from scenes.job.windows import everywhere
+from scenes.job.windows import room_windows
 from scenes.year_of_glare.files import YearFiles, read_files
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
@@ -61,12 +63,13 @@ class Year:
     room: str
     views: list[NamedView]
     scene: DaylightScene  # its view is the first
-    optics: BsdfOptics  # of every window
+    optics: Sequence[States]  # [G] of each window group, one state
     weather: Weather
     sky: AnnualSky  # of the hours L with the sun up
     used: NDArray[np.bool_]  # [H] hours of use
     digest: str  # of all inputs
-    notes: tuple[str, ...] = ()  # of system and weather
+    notes: tuple[str, ...] = ()  # of systems and weather
+    fenestration: Sequence[dict] = ()  # name, source and windows of each system
 
 
 def read_year(
@@ -77,14 +80,17 @@ def read_year(
     Args: files: what `read_files` has read of the options; read now without.
     """
     files = files or read_files(options)
-    system, weather = files.system, files.weather
+    weather = files.weather
     progress("inputs", 0.1)
     reading = summed(part(progress, 0.1, 0.6), "inputs", STAGES)
     building = read_ifc(options.building, join=options.join, progress=reading)
     names = () if options.space is None else (options.space,)
     space = chosen_spaces(building, names, options.building)[0]
     views = chosen_views(space, options)
-    building = traced_building(building, everywhere(space, system))
+    filled = fill_windows(space.windows, files.given, options.building)
+    filled = {guid: states[:1] for guid, states in filled.items()}
+    sources, windows = window_sources(space.windows, filled), room_windows(space, filled)
+    building = traced_building(building, filled)
     variants.activate()
     sampling = sampling_of(options)
     sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
@@ -92,21 +98,26 @@ def read_year(
     scene = DaylightScene(
         interior_surfaces(space, "visible"),
         exterior_surfaces(building, space, "visible"),
-        window_groups(space),
+        windows.groups,
         view=views[0].view,
     )
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     corrections = corrections_file(options.building)
-    inputs = [options.building, options.weather, options.system, corrections]
-    hashes = [sha256(path) for path in inputs if path.is_file()]
+    hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
+    systems = [system for states in windows.systems for system in states]
+    # not of files: the model may name others, which change by themselves
+    hashes.append(content_digest(*([s.visible, s.fine] for s in systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
     digest = hashlib.sha256(json.dumps([*chosen, space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))
     return Year(
         options, space.label, views, scene,
-        BsdfOptics(system.visible, system.fine), weather, sky, used, digest,
-        (*system.notes, *weather.notes, *hole_notes(space, cache=MatrixCache.of_user())),
+        windows.optics(), weather, sky, used, digest,
+        tuple(dict.fromkeys([*source_notes(sources), *(note for system in systems for note in
+                                                       system.notes), *weather.notes,
+                             *hole_notes(space, cache=MatrixCache.of_user())])),
+        sources,
     )  # fmt: skip
 
 
@@ -134,7 +145,7 @@ def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[
         found = kept_glare(keep, len(times)) if keep.is_file() else None
         tracing = summed(part(steps, 0.0, 0.3), named.name, TRACING)
         traced = traced.seen_from(named.view, tracing)
-        filled = PhaseSystems(traced, [[year.optics]] * len(traced.scene.groups))
+        filled = PhaseSystems(traced, year.optics)
         light = filled.light(year.sky)
         found = found or hourly_glare(
             light, options.metric, keep=keep, progress=part(steps, 0.3, 1.0)

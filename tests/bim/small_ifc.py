@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ifcopenshell
@@ -97,15 +98,24 @@ class SmallIfc:
         )
         return style
 
-    def window(self, wall, *, shift: float = 0.0, hosted: bool = True, glazed: bool = True):
-        """The window of the south wall, its body moved by `shift` along the wall."""
-        x, sill, width, height = OPENING
+    def window(
+        self,
+        wall,
+        *,
+        shift: float = 0.0,
+        hosted: bool = True,
+        glazed: bool = True,
+        name: str = "W1",
+        place: tuple[float, ...] = OPENING,
+    ):
+        """A window of the south wall, its body moved by `shift` along the wall."""
+        x, sill, width, height = place
         opening = None
         if hosted:
             low, size = (x, -WALL - 0.1, sill), (width, WALL + 0.2, height)
             opening = self.box("IfcOpeningElement", "opening", low, size)
             ifcopenshell.api.feature.add_feature(self.model, feature=opening, element=wall)
-        window = ifcopenshell.api.root.create_entity(self.model, ifc_class="IfcWindow", name="W1")
+        window = ifcopenshell.api.root.create_entity(self.model, ifc_class="IfcWindow", name=name)
         frame = self.style("frame", 0.7)
         pane = self.style("glass", 0.9, 0.8) if glazed else frame
         left, y, inner = x + shift, GLASS_Y, (width - 2 * FRAME, height - 2 * FRAME)
@@ -184,12 +194,14 @@ def box_room(
     doubled_wall: bool = False,
     slab_as_wall: bool = False,
     window: bool = True,
+    places: Sequence[tuple[float, ...]] = (OPENING,),
 ) -> ifcopenshell.file:
     """A room of 4 x 6 x 3 m with one window to the south; each argument plants a defect.
 
     Args:
         space_inset: how far the space stops short of the walls [m].
         gap: width of a slit from floor to roof between the south and the east wall [m].
+        places: of the windows W1, W2, ... in the south wall.
         shift: how far the window's body lies beside its opening [m].
     """
     small = empty_project(schema, unit=unit, true_north=true_north)
@@ -206,7 +218,11 @@ def box_room(
     small.box(slab, "floor", (-WALL, -WALL, -0.2), outline, small.style("floor", 0.3))
     small.box("IfcSlab", "roof", (-WALL, -WALL, HEIGHT), outline, small.style("ceiling", 0.8))
     if window:
-        small.window(walls["south"], shift=shift, hosted=hosted, glazed=glazed)
+        for number, place in enumerate(places, 1):
+            small.window(
+                walls["south"], shift=shift, hosted=hosted, glazed=glazed,
+                name=f"W{number}", place=place,
+            )  # fmt: skip
     if space:
         low = (space_inset, space_inset, 0.0)
         size = (WIDTH - 2 * space_inset, DEPTH - 2 * space_inset, HEIGHT)

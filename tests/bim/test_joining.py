@@ -10,6 +10,7 @@ from bim.ifc.corrections import Corrections
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
 from scenes import cli
+from scenes.demo import WEATHER
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WALLS, WIDTH, empty_project
 
 THICK = 0.2  # of the partition [m]
@@ -109,8 +110,9 @@ def test_what_check_says_is_what_the_commands_take(tmp_path, capsys):
 def test_a_picture_of_joined_rooms(tmp_path, capsys):
     """The reading commands hand the option on: the joined room is there under its name."""
     path = two_rooms(tmp_path)
-    call = ["picture", str(path), "--at", "06-21 12:00", "--out", str(tmp_path / "a.hdr")]
-    year = ["dgp", str(path), "--out", str(tmp_path / "out")]
+    weather = ["--weather", str(WEATHER)]
+    call = ["picture", str(path), *weather, "--at", "06-21 12:00", "--out", str(tmp_path / "a.hdr")]
+    year = ["dgp", str(path), *weather, "--out", str(tmp_path / "out")]
     for command in (call, year):
         assert cli.run([*command, "--join", "North + South", "--space", "North + South"]) == 1
         assert "space North + South: has no window" in capsys.readouterr().err

@@ -94,11 +94,18 @@ def _run(*words: object, building="house.ifc", weather=WEATHER, cfs=VENETIAN_BLI
 
 
 def _dgp(*words: object, building: object = "house.ifc") -> list:
-    return ["dgp", building, "--out", "out", *words]
+    return ["dgp", building, "--weather", WEATHER, "--out", "out", *words]
 
 
 def _picture(*words: object, building: object = "house.ifc", at: str = "06-21 12:00") -> list:
-    return ["picture", building, "--at", at, "--out", "a.hdr", *words]
+    more = ["--weather", WEATHER, "--at", at, "--out", "a.hdr"]
+    return ["picture", building, *more, *words]
+
+
+def _box_study(place: Place) -> str:
+    box = "width = 4\ndepth = 6\nheight = 3\nwindow = [{x = 1, sill = 1, width = 2, height = 1}]"
+    place.write("box.toml", f'weather = "{WEATHER}"\n[box]\n{box}\n')
+    return "box.toml"
 
 
 def _pv(weather: object = WEATHER, building: object = "house.ifc", study: str = "pv.toml") -> list:
@@ -202,6 +209,15 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "dgp, view file": (lambda p: _dgp("--view", "none.vf"), "none.vf: --view: cannot be read"),
     "dgp, --space": (lambda p: _dgp("--space", ""), "--space: expected the name"),
     "dgp, folder": (lambda p: _dgp("--out", p.folder), "--out: "),
+    "dgp, no weather": (lambda p: ["dgp", "house.ifc", "--out", "out"], "--weather: give the EPW"),
+    "picture, no weather": (
+        lambda p: ["picture", "house.ifc", "--at", "06-21 12:00", "--out", "a.hdr"],
+        "--weather: give the EPW",
+    ),
+    "thermal, box without a system": (
+        lambda p: ["thermal", _box_study(p), "--out", "out"],
+        "system: is missing; a box holds no fenestration data",
+    ),
     "picture, head": (lambda p: _picture(building="word.ifc"), "word.ifc: not an IFC file"),
     "picture, weather": (lambda p: _picture("--weather", "short.epw"), SHORT),
     "picture, BSDF": (lambda p: _picture("--cfs", "bad.xml"), "bad.xml: is not well-formed"),

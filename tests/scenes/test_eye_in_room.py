@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scenes import cli
+from scenes.demo import WEATHER
 from tests.bim.small_ifc import box_room
 
 # the room spans x 0 to 4, y 0 to 6, z 0 to 3 m; its walls are 0.3 m thick, its window to the south
@@ -30,8 +31,22 @@ def room(tmp_path):
     return folder / "room.ifc"
 
 
+YEAR = ["dgp", "--weather", str(WEATHER)]
+
+
 def picture(room, view: str, out) -> int:
-    call = ["picture", str(room), "--at", "06-21 12:00", "--size", "16", "--samples", "1"]
+    call = [
+        "picture",
+        str(room),
+        "--weather",
+        str(WEATHER),
+        "--at",
+        "06-21 12:00",
+        "--size",
+        "16",
+        "--samples",
+        "1",
+    ]
     return cli.run([*call, "--view", view, "--out", str(out)])
 
 
@@ -47,7 +62,7 @@ def test_a_picture_from_outside_the_room_is_refused(room, place, kind, tmp_path,
 
 def test_a_year_of_glare_from_outside_the_room_is_refused(room, tmp_path, capsys):
     view = f"-vta {OUTSIDE['on the wall' + chr(39) + 's face']} -vh 180 -vv 180"
-    assert cli.run(["dgp", str(room), "--view", view, "--out", str(tmp_path / "out")]) == 1
+    assert cli.run([*YEAR, str(room), "--view", view, "--out", str(tmp_path / "out")]) == 1
     assert "is not in the room R1 Room" in capsys.readouterr().err
 
 

@@ -353,10 +353,9 @@ def test_the_folder_of_an_input_is_refused(place, capsys, tmp_path):
     building = tmp_path / "model" / "office.ifc"
     building.parent.mkdir()
     shutil.copy(OFFICE, building)
-    for command in (["run", building, "--weather", WEATHER], ["dgp", building],
-                    ["pv", building, "--weather", WEATHER, "--study", PV_STUDY]):  # fmt: skip
+    for name, *more in (["run"], ["dgp"], ["pv", "--study", PV_STUDY]):
         here = place("run")
-        here.job = _folder(*command)
+        here.job = _folder(name, building, "--weather", WEATHER, *more)
         for out in (building.parent, tmp_path / "model" / ".." / "model"):
             refused(Place(here.job, here.inputs, out), capsys, "--out", str(building))
     assert building.read_bytes() == OFFICE.read_bytes()

@@ -43,7 +43,7 @@ def commands(path, folder):
     out = ["--out", folder / "out"]
     yield ["run", path, *weather, *system, *out]
     yield ["dgp", path, *weather, *system, *out]
-    yield ["picture", path, *system, "--at", "06-21 12:00", "--out", folder / "a.hdr"]
+    yield ["picture", path, *weather, *system, "--at", "06-21 12:00", "--out", folder / "a.hdr"]
     yield ["thermal", thermal, *out]
     yield ["thermal", coupled, *out]
     yield ["study", study, *out]
