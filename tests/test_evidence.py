@@ -21,7 +21,7 @@ NO_EVIDENCE = {
     "studies.md": {"| in the folder | what |"},
     "pv.md": {"| key | what |"},
 }  # fmt: skip
-ONCE = {"benchmarks.md"}  # pages that say it once, for all of their tables
+ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
 
 
 def tables(page: str) -> list[tuple[str, str]]:

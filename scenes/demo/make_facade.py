@@ -119,6 +119,7 @@ def _project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ..
         for kind in ("LENGTHUNIT", "AREAUNIT", "VOLUMEUNIT", "PLANEANGLEUNIT")
     ]
     ifcopenshell.api.unit.assign_unit(model, units=units)
+    project.UnitsInContext.Units = units  # assigned as a set, in an order of their own
     whole = ifcopenshell.api.context.add_context(model, context_type="Model")
     body = ifcopenshell.api.context.add_context(
         model, context_type="Model", context_identifier="Body", target_view="MODEL_VIEW",

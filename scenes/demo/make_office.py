@@ -60,6 +60,7 @@ def _project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ..
                      "THERMODYNAMICTEMPERATUREUNIT")
     ]  # fmt: skip
     ifcopenshell.api.unit.assign_unit(model, units=units)
+    project.UnitsInContext.Units = units  # assigned as a set, in an order of their own
     add_context = ifcopenshell.api.context.add_context
     whole = add_context(model, context_type="Model")
     plan = add_context(model, context_type="Plan")

@@ -83,7 +83,7 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
     (case,) = plan_of(read_grid(grid)).cases
     row = compute_case(case)
 
-    light, heat, ran = room.daylight, room.thermal.temperatures, room.operation
+    light, heat, ran = room.daylight, room.heat.temperatures, room.operation
     plane = light.illuminance.mean(axis=1, dtype=float)
     assert np.ptp(plane) > 100 and ran.summary["cooling_kwh"] > 0
     np.testing.assert_array_equal(year.hours["daylight_lx"], plane)
@@ -151,7 +151,7 @@ def test_states_switch_in_the_same_hours(variant, tmp_path, weather, rule) -> No
     assert 0 < ran["shading_state"].mean() < 1
     for name in ("shading_state", "heating_w", "cooling_w"):
         np.testing.assert_array_equal(year.hours[name], ran[name], err_msg=name)
-    air = found.thermal.temperatures["air_c"]
+    air = found.heat.temperatures["air_c"]
     np.testing.assert_array_equal(year.hours["air_c"], air)
 
 
