@@ -90,7 +90,7 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
 
 def _sources(result: RunResult) -> str:
     """Where each system comes from; empty where that is not known."""
-    tables = [values for room in result.spaces for values in room.thermal.fenestration]
+    tables = [values for room in result.spaces for values in room.heat.fenestration]
     sources = {f"{t['system']}, from {t['source']}." for t in tables if t.get("source")}
     return " ".join(sorted(sources))
 
