@@ -159,7 +159,7 @@ def annual_glare(
     def rated(values: NDArray[np.float32], hour: int) -> list[float]:
         picture = full_picture(values, pictures.pixels, pictures.view)
         known = options if own is None else replace(options, illuminance=float(own[hour]))
-        return _figures(evaluate(picture, geometry, options=known))
+        return figures(evaluate(picture, geometry, options=known))
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for start in range(0, len(left), size):
@@ -195,7 +195,7 @@ def flat(window_luminance: ArrayLike, columns: int) -> NDArray[np.float32]:
     return luminance.reshape(columns, -1)
 
 
-def _figures(result: GlareResult) -> list[float]:
+def figures(result: GlareResult) -> list[float]:
     """One row of the table, in the order of `FIGURES`."""
     return [float(result.count if f == "sources" else getattr(result, f)) for f in FIGURES]
 

@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.glare.annual import AnnualGlare, annual_glare, full_picture
+from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, annual_glare, figures, full_picture
 from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.simplified import DIRECT_DEPTH, simplified_dgp
+from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress, part, silent
 
-FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance")
 State = ArrayLike | None  # [G, L] of each window group in each hour, or [L] of all; None: the first
 
 
@@ -43,7 +43,7 @@ def hourly_glare(
         keep: file of the ratings so far, see `annual_glare`.
     """
     chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
-    rows = states_of(light, state)[:, chosen]
+    rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, chosen]
     if isinstance(light, PathLight):
         return _of_paths(light, metric, chosen, rows, progress)
     if metric == "sDGP":
@@ -74,7 +74,7 @@ def pictures(
 ) -> list[NDArray[np.float32]]:
     """Luminance pictures [ny, nx] [cd/m2] of some hours [n] of the light's sky."""
     hours = np.asarray(hours, dtype=np.int64)
-    rows = states_of(light, state)[:, hours]
+    rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, hours]
     found: dict[int, NDArray[np.float32]] = {}
     if isinstance(light, PathLight):
         for i, now in enumerate(rows.T):
@@ -90,13 +90,6 @@ def pictures(
             found[c] = full_picture(row, of_kind.pixels, of_kind.view)
     progress("pictures", 1.0)
     return [found[i] for i in range(len(hours))]
-
-
-def states_of(light: PhaseLight | PathLight, state: State) -> NDArray[np.int64]:
-    """The state of each window group in each hour [G, L]."""
-    groups, hours = len(light.filled.systems), len(light.sky.lit)
-    rows = np.zeros(hours, dtype=np.int64) if state is None else np.asarray(state)
-    return np.tile(rows, (groups, 1)) if rows.ndim == 1 else rows
 
 
 def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
@@ -123,7 +116,7 @@ def _of_paths(
             options = GlareOptions(illuminance=light.eye(hour, now))
             depth = {"max_depth": DIRECT_DEPTH}
         result = evaluate(light.picture(hour, now, **depth), geometry, options=options)
-        found.append([result.count if f == "sources" else getattr(result, f) for f in FIGURES])
+        found.append(figures(result))
         progress("glare", (i + 1) / len(hours))
     table = np.array(found, dtype=float).reshape(len(hours), len(FIGURES)).T
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)))

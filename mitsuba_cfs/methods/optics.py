@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
@@ -66,6 +66,20 @@ class GivenOptics:
     transmission: NDArray[np.float64] | None = None  # [K, K]
     scattering: Scattering | None = None
     paths: System | None = None
+
+
+def hourly_states(state: ArrayLike | None, groups: int, hours: int) -> NDArray[np.int64]:
+    """The state of each window group in each hour [G, L].
+
+    Args: state: [G, L], or [L] of all groups; None: the first all the time.
+
+    Raises: `ValueError` for another shape.
+    """
+    rows = np.zeros(hours, dtype=np.int64) if state is None else np.asarray(state)
+    rows = np.tile(rows, (groups, 1)) if rows.ndim == 1 else rows
+    if rows.shape != (groups, hours):
+        raise ValueError(f"state {rows.shape}: expected [{groups}, {hours}]")
+    return rows
 
 
 def in_state(systems: Sequence[States], state: Sequence[int]) -> list[SystemOptics]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.optics import States, in_state
+from mitsuba_cfs.methods.optics import States, hourly_states, in_state
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
@@ -71,7 +71,10 @@ class PathLight:
 
         Args: state: [G, L] of each window group in each hour, or [L] of all; the first by default.
         """
-        scene, states = self.filled.scene, self._state(state)
+        scene, states = (
+            self.filled.scene,
+            hourly_states(state, len(self.filled.systems), len(self.sky.lit)),
+        )
         lit = np.zeros((len(scene.points), len(self.sky.lit)))
         variance = np.zeros(len(scene.points))
         for hour, now in enumerate(states.T):
@@ -126,8 +129,3 @@ class PathLight:
             stopping=Stopping(batches=BATCHES),
             seed=chosen.seed * self.sky.hours + int(self.sky.lit[hour]),  # hours scatter apart
         )
-
-    def _state(self, state: NDArray[np.int64] | None) -> NDArray[np.int64]:
-        """The state of each group in each hour [G, L]."""
-        rows = np.zeros(len(self.sky.lit), dtype=np.int64) if state is None else np.asarray(state)
-        return np.tile(rows, (len(self.filled.systems), 1)) if rows.ndim == 1 else rows

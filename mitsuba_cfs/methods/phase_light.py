@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
-from mitsuba_cfs.methods.optics import States, in_state
+from mitsuba_cfs.methods.optics import States, hourly_states, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -152,7 +152,7 @@ class PhaseLight:
         state, variance = self._state(state), 0.0
         for g, row in enumerate(state):
             mean = self._window_luminance("whole", state)[g].mean(axis=-1)
-            tracing = _group(self._traced.sensors, g).error_of(mean)
+            tracing = self._traced.sensors.part(np.s_[:, g]).error_of(mean)
             share = np.bincount(row, minlength=len(self.sensors[g])) / len(row)
             sun = sum(w * s.sun_error for w, s in zip(share, self.sensors[g], strict=True))
             variance = variance + tracing**2 + (sun / len(row)) ** 2
@@ -216,7 +216,7 @@ class PhaseLight:
         if exact[j] is None:
             return SensorLight(three_phase, sun, 0.0)
         luminance = sky.illuminance[shining] / SUN_SOLID_ANGLE
-        found = _row(exact[j], g)
+        found = exact[j].part(np.s_[g])
         sun[:, shining] = found.values * luminance
         return SensorLight(three_phase, sun, found.error_of(luminance))
 
@@ -282,25 +282,6 @@ class PhaseLight:
 
     def _state(self, state: State | None) -> NDArray[np.int64]:
         """The state of each group in each hour [G, L], as far as it has states."""
-        count = len(self.filled.systems)
-        rows = np.zeros(len(self.sky.lit), dtype=np.int64) if state is None else np.asarray(state)
-        rows = np.tile(rows, (count, 1)) if rows.ndim == 1 else rows
-        if rows.shape != (count, len(self.sky.lit)):
-            raise ValueError(f"state {rows.shape}: expected [{count}, {len(self.sky.lit)}]")
-        return np.minimum(rows, np.array([[len(s) - 1] for s in self.filled.systems]))
-
-
-def _group(view: Estimate, g: int) -> Estimate:
-    """V of one window group [S, K]."""
-    return Estimate(
-        view.values[:, g], view.standard_error[:, g], view.sum_error[:, g], view.batches,
-        view.seconds,
-    )  # fmt: skip
-
-
-def _row(estimate: Estimate, g: int) -> Estimate:
-    """One group's part of C_ds [S, Q]."""
-    return Estimate(
-        estimate.values[g], estimate.standard_error[g], estimate.sum_error[g], estimate.batches,
-        estimate.seconds,
-    )  # fmt: skip
+        systems = self.filled.systems
+        rows = hourly_states(state, len(systems), len(self.sky.lit))
+        return np.minimum(rows, np.array([[len(states) - 1] for states in systems]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -27,6 +28,15 @@ class Estimate:
     sum_error: NDArray[np.float64]  # of the sum over the last axis, whose entries may go together
     batches: int
     seconds: float
+
+    def part(self, index: Any) -> Estimate:
+        """The estimate of some entries; `index` leaves the last axis whole."""
+        return replace(
+            self,
+            values=self.values[index],
+            standard_error=self.standard_error[index],
+            sum_error=self.sum_error[index],
+        )
 
     def error_of(self, weights: ArrayLike) -> NDArray[np.float64]:
         """Standard error of the sum over the last axis of `values` times `weights` [..., K].

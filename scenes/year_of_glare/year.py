@@ -17,11 +17,11 @@ from bim.ifc.building import STAGES, read_ifc
 from bim.ifc.corrections import corrections_file
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs import variants
-from mitsuba_cfs.glare.annual import AnnualGlare, kept_glare
+from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
 from mitsuba_cfs.images.view import format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.matrices.cache import digest as content_digest
-from mitsuba_cfs.methods.glare import FIGURES, hourly_glare, pictures
+from mitsuba_cfs.methods.glare import hourly_glare, pictures
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
