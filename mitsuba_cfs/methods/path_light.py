@@ -71,10 +71,8 @@ class PathLight:
 
         Args: state: [G, L] of each window group in each hour, or [L] of all; the first by default.
         """
-        scene, states = (
-            self.filled.scene,
-            hourly_states(state, len(self.filled.systems), len(self.sky.lit)),
-        )
+        scene = self.filled.scene
+        states = hourly_states(state, len(self.filled.systems), len(self.sky.lit))
         lit = np.zeros((len(scene.points), len(self.sky.lit)))
         variance = np.zeros(len(scene.points))
         for hour, now in enumerate(states.T):

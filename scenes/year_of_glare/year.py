@@ -13,12 +13,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.ifc.building import STAGES, read_ifc
 from bim.ifc.corrections import corrections_file
-from bim.to_tracer import exterior_surfaces, interior_surfaces
+from bim.model import Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
-from mitsuba_cfs.images.view import format_view
+from mitsuba_cfs.images.view import View, format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.matrices.cache import digest as content_digest
 from mitsuba_cfs.methods.glare import hourly_glare, pictures
@@ -32,11 +31,8 @@ from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
-from scenes.fenestration import fill_windows, source_notes, window_sources
-from scenes.job.drawn_shades import traced_building
-from scenes.job.holes import hole_notes
-from scenes.job.inputs import chosen_spaces, sha256
-from scenes.job.windows import room_windows
+from scenes.job.inputs import sha256
+from scenes.job.seen_room import read_seen_room
 from scenes.year_of_glare.files import YearFiles, read_files
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
@@ -82,42 +78,31 @@ def read_year(
     files = files or read_files(options)
     weather = files.weather
     progress("inputs", 0.1)
-    reading = summed(part(progress, 0.1, 0.6), "inputs", STAGES)
-    building = read_ifc(options.building, join=options.join, progress=reading)
-    names = () if options.space is None else (options.space,)
-    space = chosen_spaces(building, names, options.building)[0]
-    views = chosen_views(space, options)
-    filled = fill_windows(space.windows, files.given, options.building)
-    filled = {guid: states[:1] for guid, states in filled.items()}
-    sources, windows = window_sources(space.windows, filled), room_windows(space, filled)
-    building = traced_building(building, filled)
+    views: list[NamedView] = []
+
+    def look(space: Space) -> View:
+        views.extend(chosen_views(space, options))
+        return views[0].view
+
+    steps = part(progress, 0.1, 0.6)
+    seen = read_seen_room(options.building, options.space, options.join, files.given, look, steps)
     variants.activate()
     sampling = sampling_of(options)
     sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
     progress("inputs", 1.0)
-    scene = DaylightScene(
-        interior_surfaces(space, "visible"),
-        exterior_surfaces(building, space, "visible"),
-        windows.groups,
-        view=views[0].view,
-    )
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     corrections = corrections_file(options.building)
     hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
-    systems = [system for states in windows.systems for system in states]
     # not of files: the model may name others, which change by themselves
-    hashes.append(content_digest(*([s.visible, s.fine] for s in systems)))
+    hashes.append(content_digest(*([s.visible, s.fine] for s in seen.systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
-    digest = hashlib.sha256(json.dumps([*chosen, space.guid]).encode()).hexdigest()
+    digest = hashlib.sha256(json.dumps([*chosen, seen.space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))
+    notes = (*seen.notes(), *weather.notes)
     return Year(
-        options, space.label, views, scene,
-        windows.optics(), weather, sky, used, digest,
-        tuple(dict.fromkeys([*source_notes(sources), *(note for system in systems for note in
-                                                       system.notes), *weather.notes,
-                             *hole_notes(space, cache=MatrixCache.of_user())])),
-        sources,
+        options, seen.space.label, views, seen.scene, seen.optics, weather, sky, used, digest,
+        notes, seen.sources,
     )  # fmt: skip
 
 
