@@ -89,7 +89,7 @@ def read_ifc(
 
 def _rooms(source: Source, mesh: RayMesh) -> tuple[list[SpaceRecord], list[Problem]]:
     """The spaces of the file that are rooms; found from geometry where there are none."""
-    records, problems = read_spaces(source.model, source.shapes, *source.quantity_scales())
+    records, problems = read_spaces(source.model, source.shapes, source.quantity_scales())
     problems += names_of_overlapping(records)
     records, more = enclosed_spaces(records, mesh)
     problems += more
