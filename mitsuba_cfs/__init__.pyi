@@ -51,7 +51,8 @@ from .sky.matrix import sky_matrix as sky_matrix
 from .sky.patches import ReinhartSky as ReinhartSky
 from .sky.sun import sun_directions as sun_directions
 from .sky.wea import read_wea as read_wea
-from .sky.weather import Weather as Weather, read_epw as read_epw
+from .sky.epw import read_epw as read_epw
+from .sky.weather import Weather as Weather
 from .surfaces import Surfaces as Surfaces, Window as Window, WindowGroup as WindowGroup
 from .trace.daylight_matrix import daylight_matrix as daylight_matrix
 from .trace.estimate import Estimate as Estimate, Stopping as Stopping

@@ -274,8 +274,8 @@ def sun_steps(weather: Weather, sun_model: str) -> np.ndarray:
 
 def read_weather(path: Path) -> Weather:
     """An EPW or a WEA file, by its first word."""
+    from mitsuba_cfs.sky.epw import read_epw
     from mitsuba_cfs.sky.wea import read_wea
-    from mitsuba_cfs.sky.weather import read_epw
 
     try:
         with open(path, "rb") as file:

@@ -35,9 +35,10 @@ from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.hdr import EFFICACY, read_hdr
 from mitsuba_cfs.images.view import View, fisheye, format_view
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE, is_up
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
 from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 from mitsuba_cfs.trace.systems import lit_system
