@@ -152,12 +152,12 @@ def _links(air_links: ArrayLike | None, zones: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(link)
 
 
-def _weather(climate: Climate, steps: int) -> records.Weather:
+def _weather(climate: Climate, steps: int) -> records.OutdoorConditions:
     outdoor = to_steps(climate.outdoor_c, steps)
     speed = to_steps(climate.wind_speed, steps)
     direction = np.radians(np.repeat(climate.wind_direction_deg, steps))
     pressure = to_steps(climate.pressure, steps)
-    return records.Weather(
+    return records.OutdoorConditions(
         outdoor=outdoor,
         sky=to_steps(climate.sky_c, steps),
         ground=to_steps(climate.ground_c, steps),
@@ -272,9 +272,9 @@ def _start(net: Network, zones: int, start_c: float) -> records.State:
     )
 
 
-def _work(net: Network, zones: int) -> records.Work:
+def _work(net: Network, zones: int) -> records.Workspace:
     n, m = net.faces.area.size, net.nodes.capacity.size
-    return records.Work(
+    return records.Workspace(
         matrix=np.zeros((n + zones, n + zones)),
         right=np.zeros(n + zones),
         unknown=np.zeros(n + zones),

@@ -31,7 +31,7 @@ MAX_DEPTH = 16
 
 
 @dataclass(frozen=True)
-class Outdoors:
+class OutdoorCoefficients:
     """Luminance of the pixels through the windows' straight beam, per unit luminance of the sky."""
 
     sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows itself
@@ -50,7 +50,7 @@ def outdoors(
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 8,
     seed: int = 0,
-) -> Outdoors:
+) -> OutdoorCoefficients:
     """Trace every pixel through the windows to the sky; arguments as for `direct_sun_matrix`.
 
     Args:
@@ -69,7 +69,7 @@ def outdoors(
         for rows, depth in ((free, 1), (whole, MAX_DEPTH)):
             rows.append(_rows(inside, outside, sky, lanes, len(block), samples, depth, seed))
     free, whole = (sparse.csr_array(sparse.vstack(rows)) for rows in (free, whole))
-    return Outdoors(free, (whole - free).maximum(0), _beams(scattering, basis))
+    return OutdoorCoefficients(free, (whole - free).maximum(0), _beams(scattering, basis))
 
 
 def _through_windows(

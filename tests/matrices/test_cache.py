@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_cfs.matrices.cache import MatrixCache, State, default_folder, digest
+from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache, default_folder, digest
 from tests.trace import rooms
 
 BY = "mitsuba_cfs.trace.estimate"  # the module that computes what these tests keep
-STATE = State(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
+STATE = BatchMean(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
 
 
 @pytest.fixture

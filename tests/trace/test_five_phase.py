@@ -166,7 +166,7 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     from the room on both sides.
     """
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.point_in_time import point_in_time
 
     diffuse = 300.0  # cd/m2 of a uniform sky and ground
@@ -177,7 +177,7 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     found = lit(matrices, [[glass()]], sun)
     beam = AngularBeam(glass_transmittance(np.linspace(0, 1, 128)))
     behind, luminance = (
-        LitRoom(room, rooms.NOTHING, groups, [System(None, beam)]),
+        LitRoom(room, rooms.NOTHING, groups, [PathOptics(None, beam)]),
         1e5 / SUN_SOLID_ANGLE,
     )
     for h, direction in enumerate(sun.direction):

@@ -44,15 +44,15 @@ def diffuser(*values):
     import mitsuba as mi
 
     from mitsuba_cfs.bsdf.plugin import klems_plugin
-    from mitsuba_cfs.trace.lit_room import System
+    from mitsuba_cfs.trace.lit_room import PathOptics
 
-    return System(mi.load_dict(klems_plugin(klems(*values))))
+    return PathOptics(mi.load_dict(klems_plugin(klems(*values))))
 
 
 def glass(tau: float = 1.0):
-    from mitsuba_cfs.trace.lit_room import AngularBeam, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
 
-    return System(None, AngularBeam(np.full(16, tau)))
+    return PathOptics(None, AngularBeam(np.full(16, tau)))
 
 
 def agree(found, expected, error=0.0):
