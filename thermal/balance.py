@@ -127,7 +127,8 @@ def simulate_zones(
     if progress:
         progress(1.0)
     return tuple(
-        _result(zone, net, z, means, terms[:, z], days, drive.state) for z, zone in enumerate(zones)
+        _result(zone, net, z, means, terms[:, z], days=days, state=drive.state)
+        for z, zone in enumerate(zones)
     )
 
 
@@ -294,6 +295,7 @@ def _result(
     z: int,
     means: records.Means,
     terms: NDArray[np.float64],
+    *,
     days: int,
     state: NDArray[np.int64],
 ) -> ZoneResult:

@@ -233,7 +233,7 @@ class PhaseLight:
             found.append(
                 direct_sun_matrix(
                     scene.interior, scene.exterior, scene.groups, ways, *scene.sensors(),
-                    self.sky.direction[shining],
+                    suns=self.sky.direction[shining],
                     window_points=max(chosen.sun_points // SUN_BATCHES, 1),
                     stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
                     progress=lambda _, done, j=j: self.progress("daylight", (j + done) / count),

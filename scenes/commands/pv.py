@@ -26,6 +26,7 @@ from scenes.commands.quick_option import quick_option
 @quick_option
 def command(
     building: Path,
+    *,
     weather: Path,
     study_file: Path,
     out: Path,

@@ -100,7 +100,7 @@ def test_the_sun_through_glass_is_the_direct_matrix_and_its_reflections():
     found = traced([glass(0.8)], Sky(dark, SUN, SUN_LUMINANCE), scene=black)
     _, groups = rooms.test_room()
     beam = KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, 0.8))
-    direct = direct_sun_matrix(black[0], rooms.NOTHING, groups, [beam], POINTS, UP, SUN[None])
+    direct = direct_sun_matrix(black[0], rooms.NOTHING, groups, [beam], POINTS, UP, suns=SUN[None])
     expected = direct.values[:, 0] * SUN_LUMINANCE
     agree(found, expected, direct.standard_error[:, 0] * SUN_LUMINANCE + 1e-3 * expected + 1e-6)
     bright = traced([glass(0.8)], Sky(dark, SUN, SUN_LUMINANCE))
