@@ -41,8 +41,8 @@ SAME_PART = {"fenestration": "job"}
 # Temporary: to be deleted when the classes of `scenes` have names of their own
 REPEATED_FOR_NOW = {"Choice", "Layer", "Mark", "Plan", "Room", "Source", "SystemTable", "Table"}
 MOST_POSITIONAL = 6
-# numba's functions have no keyword-only parameters, and records in their place are no free choice:
-# what a kernel is given decides how long it compiles
+# These decorators compile with numba, which fails where one compiled function calls another by a
+# keyword-only parameter (0.68: no such call binds).  `dr.syntax` has no such excuse
 COMPILED = {"compiled", "inlined"}
 
 SOURCES = {file_name(path): path.read_text(encoding="utf-8") for path in MODULES}
