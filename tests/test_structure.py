@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 
 import pytest
@@ -48,6 +49,11 @@ COMPILED = {"compiled", "inlined"}
 SOURCES = {file_name(path): path.read_text(encoding="utf-8") for path in MODULES}
 
 
+@cache
+def _tree(source: str) -> ast.Module:
+    return ast.parse(source)
+
+
 def _part(module: str) -> str:
     """What lies directly in a package and holds a module; nothing for the package's face."""
     part = module.partition(".")[2].partition(".")[0]
@@ -61,7 +67,7 @@ def _rank_faults(name: str, source: str) -> list[str]:
     rank = {part: level for level, parts in enumerate(levels) for part in parts}
     rank[""] = len(levels)  # the face
     faults = []
-    for imported, line in imports(ast.parse(source)):
+    for imported, line in imports(_tree(source)):
         mine, other = _part(module), _part(imported)
         if imported.partition(".")[0] != package or not levels or mine == other:
             continue
@@ -75,7 +81,7 @@ def _circle(sources: Mapping[str, str]) -> list[str]:
     known = {dotted(name) for name in sources}
     graph: dict[str, set[str]] = {}
     for name, source in sources.items():
-        targets = (imported for imported, _ in imports(ast.parse(source)))
+        targets = (imported for imported, _ in imports(_tree(source)))
         either = {t if t in known else t.rpartition(".")[0] for t in targets}
         graph[dotted(name)] = either & known
     try:
@@ -91,7 +97,7 @@ def _repeated_classes(sources: Mapping[str, str]) -> dict[str, list[str]]:
     for name, source in sources.items():
         if name.startswith(EVIDENCE):  # scripts beside the product, not in the wheel
             continue
-        for node in ast.walk(ast.parse(source)):
+        for node in ast.walk(_tree(source)):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found[node.name].append(name)
     return {name: modules for name, modules in found.items() if len(modules) > 1}
@@ -99,7 +105,7 @@ def _repeated_classes(sources: Mapping[str, str]) -> dict[str, list[str]]:
 
 def _long_signatures(name: str, source: str) -> Iterator[str]:
     """Functions with too many positional parameters; `self` and `cls` do not count."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(_tree(source)):
         if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
         marks = (m.func if isinstance(m, ast.Call) else m for m in node.decorator_list)
