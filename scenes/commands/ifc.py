@@ -100,6 +100,7 @@ def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
 )  # fmt: skip
 def attach(
     building: Path,
+    *,
     bsdf: Path | None,
     g_value: str | None,
     u_value: float | None,
@@ -148,6 +149,7 @@ def attach(
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 def export(
     building: Path,
+    *,
     names: tuple[str, ...],
     join: tuple[str, ...],
     radiance: Path | None,

@@ -26,6 +26,7 @@ from scenes.commands.quick_option import quick_option
 @quick_option
 def command(
     building: Path,
+    *,
     weather: Path,
     study_file: Path,
     out: Path,
@@ -38,7 +39,7 @@ def command(
     Modules are found by material, type, name or GUID; shade and reflections by everything in the
     model are traced, the sun as its exact disc.
     """
-    from mitsuba_cfs.sky.weather import read_epw
+    from mitsuba_cfs.sky.epw import read_epw
     from scenes.photovoltaics.study_file import read_pv_study
     from scenes.result_folder import ResultFolder
 

@@ -29,6 +29,7 @@ from scenes.commands.quick_option import quick_option
 @quick_option
 def command(
     study: Path,
+    *,
     out: Path,
     processes: int,
     scheduler: str | None,

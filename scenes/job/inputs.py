@@ -19,7 +19,8 @@ from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.job.thermal_file import ThermalFile
 from thermal.closure import Closure
 

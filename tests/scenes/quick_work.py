@@ -62,7 +62,7 @@ def _pv(_building, weather, _study, **_options):
 def _read_year(options, *_others):
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.metrics.schedules import working_hours
-    from mitsuba_cfs.sky.weather import read_epw
+    from mitsuba_cfs.sky.epw import read_epw
     from scenes.year_of_glare.views import NamedView
     from scenes.year_of_glare.year import Year
 

@@ -16,8 +16,8 @@ from mitsuba_cfs.errors import DataError
 from scenes.calibration import choice
 from scenes.calibration.choice import ERRORS, Demand, choose
 from scenes.calibration.costs import HEAT, Calibration, Work, calibration_file
-from scenes.calibration.shipped import Speed, scaled_costs, shipped_costs
-from scenes.calibration.speed import measured_speed
+from scenes.calibration.shipped import scaled_costs, shipped_costs
+from scenes.calibration.speed import Speed, measured_speed
 from scenes.cost.measure import Cost
 
 MINUTE, DAY = 60.0, 86400.0

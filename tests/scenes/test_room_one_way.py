@@ -13,7 +13,8 @@ from bim.model import Building, Element
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import silent
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat.study import rooms_of, run_study
 from scenes.heat.study_file import read_study

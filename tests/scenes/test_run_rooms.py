@@ -17,7 +17,8 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.job.alike import as_room, same_light, same_systems
 from scenes.job.annual import worst_hours

@@ -20,9 +20,9 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.mtx_io import write_matrix
 from mitsuba_cfs.progress import Progress
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import is_up
-from mitsuba_cfs.sky.weather import read_epw
 from scenes.cost import room
 from scenes.evidence.benchmarks import glare_rating, radiance
 from scenes.evidence.benchmarks.annual_product import SYSTEM, WEATHER

@@ -22,7 +22,7 @@ from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.hdr import read_hdr
 from mitsuba_cfs.images.view import fisheye, format_view
 from mitsuba_cfs.progress import Progress
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.cost import room
 from scenes.evidence.benchmarks import radiance
 from scenes.evidence.benchmarks.annual_product import WEATHER

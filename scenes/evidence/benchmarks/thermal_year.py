@@ -18,7 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.progress import Progress
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.benchmarks.harness import Comparison, PeerMissing, Run
 from scenes.evidence.validation import energyplus_model, reference_room
 from scenes.evidence.validation.ashrae140_sun import ANGLES, PANE, glass

@@ -24,8 +24,9 @@ from bim.shoebox import WindowRectangle, shoebox
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Stopping
 from scenes.evidence.validation.ashrae140 import RANGES, WEATHER

@@ -30,15 +30,16 @@ from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.lit_room import LitRoom, Sky, System
+from mitsuba_cfs.trace.lit_room import LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.point_in_time import point_in_time
 from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 from mitsuba_cfs.trace.view_matrix import view_matrix
@@ -108,7 +109,7 @@ def by_fine_matrix(scene: Scene, tilt_deg: float | None, sky: AnnualSky) -> NDAr
     return phases.three_phase(view.values, [T], daylight.values, sky.whole)
 
 
-def by_coefficients(scene: Scene, system: System, sky: AnnualSky) -> NDArray[np.float64]:
+def by_coefficients(scene: Scene, system: PathOptics, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
     room = LitRoom(scene.interior, empty(), scene.groups, [system])
     coefficients = daylight_coefficients(
@@ -118,7 +119,7 @@ def by_coefficients(scene: Scene, system: System, sky: AnnualSky) -> NDArray[np.
 
 
 def by_paths(
-    scene: Scene, exterior: Surfaces, system: System, sky: AnnualSky, samples: int
+    scene: Scene, exterior: Surfaces, system: PathOptics, sky: AnnualSky, samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] by point-in-time paths, and its standard error."""
     room = LitRoom(scene.interior, exterior, scene.groups, [system])

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.validation import energyplus_figures, energyplus_sensitivity
 from scenes.evidence.validation.energyplus_cases import ALL_FILES, EPW_FILES, Case, pairs
 from scenes.evidence.validation.energyplus_statistics import (

@@ -14,7 +14,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.evidence.validation import energyplus_model, reference_room, reference_systems
 from scenes.evidence.validation.facade_sun import FacadeSun, facade_sun, sun_steps
 from scenes.evidence.validation.reference_systems import Optics

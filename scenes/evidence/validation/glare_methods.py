@@ -30,7 +30,8 @@ from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.evidence.validation.blind_room import TILTS, blind_layer, empty, slats
 from scenes.evidence.validation.glare_room import (
