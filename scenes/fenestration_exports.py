@@ -10,16 +10,16 @@ from bim.model import Space, Window
 from bim.to_energyplus import DEFAULT_G, DEFAULT_U, UAndG
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.surfaces import WindowGroup
-from scenes.fenestration import (
+from scenes.fenestration.resolver import (
     held_systems,
     source_notes,
     stated_u_and_g,
     window_sources,
     windows_named,
 )
-from scenes.job.inputs import Given, System
-from scenes.job.thermal_system import checked_system
-from scenes.job.windows import room_windows
+from scenes.fenestration.systems import Given, System
+from scenes.fenestration.thermal_system import checked_system
+from scenes.room.windows import room_windows
 
 
 @dataclass(frozen=True, slots=True)

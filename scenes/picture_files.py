@@ -11,10 +11,11 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.files import check_names
-from scenes.job.inputs import Given, given_light, read_weather
+from scenes.fenestration.systems import Given, given_light
 from scenes.picture_options import PictureOptions
 from scenes.room_views import NamedView, given_views
+from scenes.run.files import check_names
+from scenes.run.inputs import read_weather
 
 
 @dataclass(frozen=True, slots=True)

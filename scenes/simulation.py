@@ -14,17 +14,17 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
 from scenes import quick as quick_run
-from scenes.job.files import JobFiles
-from scenes.job.inputs import Given, System
-from scenes.job.operation import Operation
-from scenes.job.options import JobOptions
-from scenes.job.outputs import write_results
-from scenes.job.run import job_inputs, run_inputs
-from scenes.job.thermal_system import checked_system
+from scenes.fenestration.systems import Given, System
+from scenes.fenestration.thermal_system import checked_system
 from scenes.report import write_report
 from scenes.report.headline import cards
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
+from scenes.room.operation import Operation
+from scenes.run.files import JobFiles
+from scenes.run.options import JobOptions
+from scenes.run.outputs import write_results
+from scenes.run.run import job_inputs, run_inputs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -116,7 +116,7 @@ def attach(
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
     # g may be a number, which no file is; the building may be written back
     check_file(out, inputs=[bsdf, None if g_value is None else Path(g_value)])
-    from scenes.job.state_to_attach import state_to_attach
+    from scenes.fenestration.state_to_attach import state_to_attach
 
     one, notes = state_to_attach(
         bsdf, name=state, u_value=u_value, g_value=g_value, copy_bsdf=not reference
@@ -180,7 +180,7 @@ def export(
     from bim.to_radiance import write_radiance
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
-    from scenes.job.inputs import named_spaces
+    from scenes.run.inputs import named_spaces
 
     with ProgressBar() as progress:
         read = read_ifc(building, join=join, progress=progress)

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import click
 
+from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import join_option, system_option
-from scenes.job.options import METHODS, JobOptions
+from scenes.run.options import JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
 _DEFAULT = JobOptions(Path(), Path())
@@ -79,8 +80,8 @@ def command(
 def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     """Run the job with a progress bar, say what comes out room by room, and write its files."""
     from mitsuba_cfs.matrices.cache import default_folder
-    from scenes.job.files import read_files
     from scenes.result_folder import ResultFolder
+    from scenes.run.files import read_files
 
     inputs = (options.building, options.weather, options.system, options.operation)
     folder = ResultFolder(out, command, inputs=inputs)
@@ -89,14 +90,14 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.job.outputs import write_results
-    from scenes.job.run import run_job
     from scenes.report import write_report
+    from scenes.run.outputs import write_results
+    from scenes.run.run import run_job
 
     if options.quick:
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress, compiled_beside():
-        result = run_job(options, progress, files, told=lambda room: click.echo(summary_line(room)))
+        result = run_job(options, progress, files, on_room=_print_summary)
         progress("results", 0.0)
         write_results(result, folder, write_report)
         progress("results", 1.0)
@@ -106,6 +107,10 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+
+
+def _print_summary(room) -> None:
+    click.echo(summary_line(room))
 
 
 def summary_line(room) -> str:

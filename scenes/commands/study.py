@@ -63,7 +63,7 @@ def command(
         check_dask()
     check_files(parsed)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.job.inputs import read_weather
+    from scenes.run.inputs import read_weather
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.study import run_study, write_study
@@ -81,7 +81,7 @@ def command(
     with ProgressBar() as progress:
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
-            progress=progress, told=_tell,
+            progress=progress, on_case=_print_case,
         )  # fmt: skip
     nothing = result.failed == len(result.results)
     report = None if nothing else lambda path: write_study_report(result, path)
@@ -107,7 +107,7 @@ def command(
         )
 
 
-def _tell(case, result, ready: int, total: int) -> None:
+def _print_case(case, result, ready: int, total: int) -> None:
     """One line for each case that is ready."""
     label = f"[{ready}/{total}] {case.place}, {case.system}, {case.climate}"
     label += f", {case.orientation_deg:g} deg"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.systems import Given, System
+from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.study_file import StudyFile
-from scenes.job.files import check_names
-from scenes.job.inputs import Given, System, read_weather
-from scenes.job.operation import read_state
-from scenes.job.thermal_system import checked_system
+from scenes.room.operation import read_state
+from scenes.run.files import check_names
+from scenes.run.inputs import read_weather
 
 
 @dataclass(frozen=True, slots=True)

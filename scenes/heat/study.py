@@ -16,17 +16,18 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, item
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration import fill_windows, source_notes, window_sources
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import States
+from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
-from scenes.job.drawn_shades import traced_building
-from scenes.job.inputs import States, chosen_spaces, named_spaces
-from scenes.job.room import Room, skies_for
-from scenes.job.thermal_system import thermal_system
-from scenes.job.zone import RoomZone, balances, coupled
+from scenes.room.drawn_shades import traced_building
+from scenes.room.room import Room, skies_for
+from scenes.room.zone import RoomZone, balances, coupled
+from scenes.run.inputs import chosen_spaces, named_spaces
 from thermal.balance import ZoneResult
 from thermal.zone import Zone
 

@@ -11,15 +11,16 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods import METHODS
-from scenes.job.operation_tables import OperationTables, Positive, Share, SystemTable, Table
-from scenes.job.options import RoomOptions
+from scenes.fenestration.tables import SystemTable
 from scenes.quick import HEAT, picks
-from scenes.toml_file import read_table, validated
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
+from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 RUN = RoomOptions()  # what is not stated otherwise is as in `cfs run`
 
 
-class LayerTable(Table):
+class LayerTable(TomlTable):
     """A layer of a construction."""
 
     name: str = "layer"
@@ -29,7 +30,7 @@ class LayerTable(Table):
     heat_capacity: Positive  # [J/(kg K)]
 
 
-class WindowTable(Table):
+class WindowTable(TomlTable):
     """A rectangular opening of the box."""
 
     x: float
@@ -40,7 +41,7 @@ class WindowTable(Table):
     frame: Annotated[float, Field(ge=0)] = 0.0
 
 
-class BoxTable(Table):
+class BoxTable(TomlTable):
     """A box-shaped room in place of a building file."""
 
     width: Positive
@@ -57,7 +58,7 @@ class BoxTable(Table):
     construction: dict[str, tuple[LayerTable, ...]] = Field(default_factory=dict)
 
 
-class ComfortTable(Table):
+class ComfortTable(TomlTable):
     """The person, for PMV and SET."""
 
     metabolic_rate: Annotated[float, Field(ge=0.7, le=4)] = 1.2  # [met]
@@ -67,7 +68,7 @@ class ComfortTable(Table):
     mean_radiant: Literal["view factors", "room centre", "area"] = "view factors"
 
 
-class TraceTable(Table):
+class TraceTable(TomlTable):
     """How the light is computed: as the same options of `RoomOptions`, with fewer rays."""
 
     method: Literal[METHODS] = RUN.method

@@ -11,7 +11,8 @@ from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.calibration.choice import Choice, Demand, choose
 from scenes.calibration.costs import Calibration, Work
 from scenes.calibration.shipped import this_machines_costs
-from scenes.job.inputs import System, read_system, read_weather
+from scenes.fenestration.systems import System, read_system
+from scenes.run.inputs import read_weather
 from scenes.study.case import AUTO, Case, with_method
 from scenes.study.one_case import case_systems
 from scenes.study.plan import Plan

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
-from scenes.job.options import RoomOptions
+from scenes.room.options import RoomOptions
 
 if TYPE_CHECKING:
     from scenes.heat.study_file import BoxTable

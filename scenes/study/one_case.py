@@ -19,13 +19,14 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration import fill_windows, source_notes, window_sources
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import Given, States, read_system
 from scenes.heat.box import box_building
-from scenes.job.drawn_shades import traced_building
-from scenes.job.inputs import Given, States, read_system, read_weather
-from scenes.job.operation import check_states, read_operation
-from scenes.job.room import compute_room, skies_for
 from scenes.results import RoomYear
+from scenes.room.drawn_shades import traced_building
+from scenes.room.operation import check_states, read_operation
+from scenes.room.room import compute_room, skies_for
+from scenes.run.inputs import read_weather
 from scenes.study.case import Case, Source, program_version
 from scenes.study.store import CaseResult
 from thermal.comfort import hours_between

@@ -10,8 +10,8 @@ from bim.ifc.building import read_ifc
 from bim.ifc.fenestration_read import read_fenestration
 from bim.model import Building, Space
 from scenes.heat.box import box_building
-from scenes.job.inputs import chosen_spaces
-from scenes.job.options import RoomOptions
+from scenes.room.options import RoomOptions
+from scenes.run.inputs import chosen_spaces
 from scenes.study.case import AUTO, Case, Source, program_version
 from scenes.study.study_file import RoomTable, Study
 

@@ -96,7 +96,7 @@ def run_study(
     scheduler: str | None = None,
     compute: Compute = compute_case,
     progress: Progress = silent,
-    told: Callable[[Case, CaseResult, int, int], None] | None = None,
+    on_case: Callable[[Case, CaseResult, int, int], None] | None = None,
 ) -> StudyResult:
     """Compute what the folder does not have yet; `write_study` writes what comes of it.
 
@@ -106,7 +106,7 @@ def run_study(
         store: the folder of the finished cases.
         plan: of the study, with the methods that `auto` chose; made here by default.
         processes, scheduler: see `scenes.study.schedule.computed`.
-        told: called with each case that is ready, how many are, and of how many.
+        on_case: called with each case that is ready, how many are, and of how many.
     """
     start = time.monotonic()
     plan = plan or settled(study, plan_of(study))
@@ -127,8 +127,8 @@ def run_study(
             store.save(result)
         found[result.key] = result
         under_way()
-        if told is not None:
-            told(cases[result.key], result, len(found), total)
+        if on_case is not None:
+            on_case(cases[result.key], result, len(found), total)
     results = tuple(found[case.key] for case in plan.cases)
     seconds = round(time.monotonic() - start, 3)
     return StudyResult(study.title, plan, results, reused, seconds, study.quick)

@@ -19,10 +19,10 @@ from pydantic import (
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
-from scenes.job.operation import read_operation
-from scenes.job.operation_tables import Hours
-from scenes.job.options import RoomOptions
 from scenes.quick import ROOM, picks
+from scenes.room.operation import read_operation
+from scenes.room.operation_tables import Hours
+from scenes.room.options import RoomOptions
 from scenes.toml_file import read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")

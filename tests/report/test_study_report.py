@@ -87,7 +87,7 @@ def study(systems: int = 2, failed: bool = True) -> StudyResult:
 
 def options():
     """The options of a room, without which no case is."""
-    from scenes.job.options import RoomOptions
+    from scenes.room.options import RoomOptions
 
     return RoomOptions(method="five-phase")
 

@@ -126,7 +126,7 @@ def _study_report(_result, path):
 
 
 WORK = {
-    "scenes.job.run.run_job": _run_job,
+    "scenes.run.run.run_job": _run_job,
     "scenes.heat.study.run_study": _thermal,
     "scenes.photovoltaics.study.run_pv": _pv,
     "scenes.photovoltaics.picture.view_directions": lambda _result: [],
@@ -147,7 +147,7 @@ def quick_work(give: Callable[[object, str, object], object] = setattr, among: s
     Args: among: only for modules that this command needs; the others load for long.
     """
     needs = {
-        "run": "scenes.job", "demo": "scenes.job", "thermal": "scenes.heat.study", "pv": "photovol",
+        "run": "scenes.run", "demo": "scenes.run", "thermal": "scenes.heat.study", "pv": "photovol",
         "dgp": "year_of_glare", "picture": "view_picture", "calibrate": "calibration",
         "bench": "benchmarks", "bsdf": "bsdf_generation", "study": "scenes.study",
     }  # fmt: skip

@@ -18,9 +18,9 @@ from mitsuba_cfs.files import write_text
 from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.fenestration import fill_windows
-from scenes.job.inputs import Given, System, read_system
-from scenes.job.thermal_system import thermal_system
+from scenes.fenestration.resolver import fill_windows
+from scenes.fenestration.systems import Given, System, read_system
+from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
 from tests.scenes.fenestration_models import COMMON, GLAZING, STATED, grey, room, with_attached
 

@@ -16,9 +16,10 @@ from scenes.cli import run
 from scenes.commands import run as run_command
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat import study_file as heat_file
-from scenes.job import run as job
-from scenes.job.glare import default_hours
-from scenes.job.options import JobOptions, RoomOptions
+from scenes.room.glare import default_hours
+from scenes.room.options import RoomOptions
+from scenes.run import run as job
+from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study
 from scenes.year_of_glare.options import YearOptions
 from tests.scenes.study_files import study_file
@@ -122,8 +123,8 @@ def test_one_picture_is_the_brightest_hours() -> None:
 
 @pytest.fixture
 def three_rooms(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    """Rooms of which the third is alike to the first, each computed by a stub."""
-    rooms = [SimpleNamespace(guid=g, label=g.upper(), like="") for g in ("a", "b", "c")]
+    """Rooms of which the third equals the first, each computed by a stub."""
+    rooms = [SimpleNamespace(guid=g, label=g.upper(), template="") for g in ("a", "b", "c")]
     a, b, c = rooms
     monkeypatch.setattr(job, "template_rooms", lambda spaces: [(a, c), (b,)])
     monkeypatch.setattr(job, "same_systems", lambda *_: False)
@@ -156,11 +157,11 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, files, *, told):
-        told("the first room")
+    def half(options, progress, files, *, on_room):
+        on_room("the first room")
         raise DataError("the second failed")
 
-    monkeypatch.setattr("scenes.job.run.run_job", half)
+    monkeypatch.setattr("scenes.run.run.run_job", half)
     monkeypatch.setattr(run_command, "summary_line", lambda room: f"{room}: DGP 0.30")
     assert run([*RUN[:-1], str(tmp_path / "o"), "--quick"]) == 1
     said = capsys.readouterr()

@@ -15,15 +15,16 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import silent
 from mitsuba_cfs.sky.weather import Weather, read_epw
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.fenestration.systems import read_system
 from scenes.heat.study import rooms_of, run_study
 from scenes.heat.study_file import read_study
-from scenes.job.inputs import read_system
-from scenes.job.operation import read_operation
-from scenes.job.operation_tables import OperationTables
-from scenes.job.options import JobOptions, RoomOptions
-from scenes.job.room import Room, compute_room
-from scenes.job.run import run_job
-from scenes.job.windows import everywhere
+from scenes.room.operation import read_operation
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
+from scenes.room.room import Room, compute_room
+from scenes.room.windows import in_all_windows
+from scenes.run.options import JobOptions
+from scenes.run.run import run_job
 from scenes.study.one_case import compute_case
 from scenes.study.plan import plan_of
 from scenes.study.study_file import read_study as read_grid
@@ -144,8 +145,8 @@ def test_states_switch_in_the_same_hours(variant, tmp_path, weather, rule) -> No
     (year,), _ = run_study(study, silent)
     building, (space,) = rooms_of(study)
     found = compute_room(
-        building, space, everywhere(space, *operation.systems), weather, RoomOptions(**SAMPLING),
-        operation=operation, pictures=False, cache=MatrixCache.of_user(),
+        building, space, in_all_windows(space, *operation.systems), weather,
+        RoomOptions(**SAMPLING), operation=operation, pictures=False, cache=MatrixCache.of_user(),
     )  # fmt: skip
     ran = found.operation.hours
     assert 0 < ran["shading_state"].mean() < 1
@@ -190,7 +191,7 @@ def office(
 ) -> Room:
     """The building's only room with the demo's blind."""
     (space,) = building.spaces
-    systems = everywhere(space, read_system(VENETIAN_BLIND))
+    systems = in_all_windows(space, read_system(VENETIAN_BLIND))
     cache = MatrixCache.of_user()
     return Room(building, space, systems, weather, options, operation=tables, cache=cache)
 

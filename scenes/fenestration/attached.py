@@ -13,8 +13,8 @@ from bim.model import Window
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
-from scenes.job.inputs import States, System, system_of
-from scenes.job.thermal_file import ThermalFile
+from scenes.fenestration.systems import States, System, system_of
+from scenes.fenestration.thermal_file import ThermalFile
 
 Held = Mapping[str, tuple[ShadingState, ...]]  # by window, as `read_fenestration` gives them
 
@@ -27,13 +27,13 @@ def attached_systems(held: Held, windows: Iterable[Window], path: Path) -> dict[
 
     Args: path: of the IFC file.
     """
-    alike: dict[str, list[Window]] = {}
+    equal: dict[str, list[Window]] = {}
     for window in windows:
         states = usual_first(held.get(window.guid, ()))
         if any(state.bands for state in states):
-            alike.setdefault(digest(*(_content(state) for state in states)), []).append(window)
+            equal.setdefault(digest(*(_content(state) for state in states)), []).append(window)
     found = {}
-    for group in alike.values():
+    for group in equal.values():
         states = usual_first(held[group[0].guid])
         source = _source([usual_first(held[window.guid])[0] for window in group], path)
         systems = tuple(_system(state, group[0], path, source) for state in states)

@@ -1,4 +1,4 @@
-"""A room as `cfs dgp` and `cfs picture` look at it: its windows in their first state."""
+"""A room as `cfs dgp` and `cfs picture` view it: its windows in their first state."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress
-from scenes.fenestration import fill_windows, source_notes, window_sources
-from scenes.job.building import read_building
-from scenes.job.drawn_shades import traced_building
-from scenes.job.holes import hole_notes
-from scenes.job.inputs import Given, System, chosen_spaces
-from scenes.job.windows import room_windows
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import Given, System
+from scenes.room.drawn_shades import traced_building
+from scenes.room.holes import hole_notes
+from scenes.room.windows import room_windows
+from scenes.run.building import read_building
+from scenes.run.inputs import chosen_spaces
 
 
 @dataclass(frozen=True, slots=True)
-class SeenRoom:
+class ViewedRoom:
     """A room with its scene, what fills its windows and what is to be said of them."""
 
     space: Space
@@ -38,24 +39,24 @@ class SeenRoom:
         return tuple(dict.fromkeys([*source_notes(self.sources), *own, *holes]))
 
 
-def read_seen_room(
+def read_viewed_room(
     file: Path,
     space: str | None,
     join: Sequence[str],
     given: Given,
-    look: Callable[[Space], View],
+    view_of: Callable[[Space], View],
     progress: Progress,
-) -> SeenRoom:
+) -> ViewedRoom:
     """The room of an IFC file, seen in the visible band.
 
     Args:
         space: its name; None: the first with a window.
         given: what the user gives for all windows.
-        look: the view of a room; it refuses one that is not in it.
+        view_of: the view of a room; it refuses one that is not in it.
     """
     building = read_building(file, join=join, progress=progress)
     room = chosen_spaces(building, () if space is None else (space,), file)[0]
-    view = look(room)
+    view = view_of(room)
     filled = {guid: states[:1] for guid, states in fill_windows(room.windows, given, file).items()}
     windows = room_windows(room, filled)
     building = traced_building(building, filled)
@@ -66,4 +67,4 @@ def read_seen_room(
         view=view,
     )
     systems = tuple(system for (system,) in windows.systems)
-    return SeenRoom(room, scene, systems, windows.optics(), window_sources(room.windows, filled))
+    return ViewedRoom(room, scene, systems, windows.optics(), window_sources(room.windows, filled))

@@ -1,4 +1,4 @@
-"""Rooms alike in shape that also get the same light: computed once, given for each."""
+"""Rooms equal in shape that also get the same light: computed once, given for each."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
-from scenes.job.holes import moved
-from scenes.job.options import RoomOptions
-from scenes.job.windows import States
+from scenes.fenestration.systems import States
 from scenes.results import RoomYear
+from scenes.room.holes import moved_problem
+from scenes.room.options import RoomOptions
 
 SAME_LIGHT = 0.005  # share of the light from anywhere that may come another way
 NEAR = 0.01  # [m] between the places of windows in their rooms
 
 
 def same_systems(a: Space, b: Space, systems: Mapping[str, States]) -> bool:
-    """Whether the windows at the same places of two rooms alike have the same systems."""
+    """Whether the windows at the same places of two equal rooms have the same systems."""
     places = np.array([window.centre - corner(a) for window in a.windows])
     for window in b.windows:
         distance = np.linalg.norm(places - (window.centre - corner(b)), axis=1)
@@ -40,7 +40,7 @@ def same_systems(a: Space, b: Space, systems: Mapping[str, States]) -> bool:
 def same_light(
     building: Building, a: Space, b: Space, options: RoomOptions, cache: MatrixCache | None
 ) -> bool:
-    """Whether two rooms alike see the same outdoors, by their daylight matrices in both bands.
+    """Whether two equal rooms see the same outdoors, by their daylight matrices in both bands.
 
     The matrices are traced with the same random numbers: where the same things stand outdoors they
     differ by rounding only.
@@ -54,8 +54,8 @@ def same_light(
     return True
 
 
-def as_room(result: RoomYear, space: Space) -> RoomYear:
-    """The results of a room for another one alike, moved to its place."""
+def moved_result(result: RoomYear, space: Space) -> RoomYear:
+    """The results of a template room for one equal to it, moved to where that stands."""
     shift = corner(space) - corner(result.space)
     daylight, glare = result.daylight, result.glare
     table = daylight.sensor_metrics.copy()
@@ -68,8 +68,8 @@ def as_room(result: RoomYear, space: Space) -> RoomYear:
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
         glare=replace(glare, view=replace(glare.view, position=place)),
         seconds={},
-        problems=tuple(moved(problem, space, name) for problem in result.problems),
-        like=name,
+        problems=tuple(moved_problem(problem, space, name) for problem in result.problems),
+        template=name,
     )
 
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
-from scenes.job.operation_tables import ClosureTable
+from scenes.fenestration.tables import ClosureTable
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError
 from thermal.gvalue import TYPICAL_SYSTEMS

@@ -10,11 +10,11 @@ import pandas as pd
 from bim.names import folder_names
 from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
-from scenes.job.daylight import illuminance_table
-from scenes.job.glare import glare_table
 from scenes.pictures import write_falsecolour
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
+from scenes.room.daylight import illuminance_table
+from scenes.room.glare import glare_table
 
 
 def write_results(result: RunResult, folder: ResultFolder, write_report=None) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 
 from bim.drawn_shades import without_drawn_shades
 from bim.model import Building
-from scenes.job.inputs import System
-from scenes.job.windows import States
+from scenes.fenestration.systems import States, System
 
 SCATTERED = (
     0.05  # share of the transmitted light beside the straight ray, above it there is a shade

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.to_tracer import window_groups
 from mitsuba_cfs.surfaces import WindowGroup
-from scenes.job.inputs import States, System
+from scenes.fenestration.systems import States, System
 
 if TYPE_CHECKING:
     from mitsuba_cfs.methods.optics import BsdfOptics
@@ -71,7 +71,7 @@ def room_windows(space: Space, systems: Mapping[str, States]) -> RoomWindows:
     return RoomWindows(groups, tuple(states for _, states in found), _groups(space, groups))
 
 
-def everywhere(space: Space, *states: System) -> dict[str, States]:
+def in_all_windows(space: Space, *states: System) -> dict[str, States]:
     """The same states in every window of a room."""
     return {window.guid: states for window in space.windows}
 

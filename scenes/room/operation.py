@@ -7,8 +7,9 @@ from os import PathLike
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
-from scenes.job.inputs import System, read_system
-from scenes.job.operation_tables import OperationTables, SystemTable
+from scenes.fenestration.systems import System, read_system
+from scenes.fenestration.tables import SystemTable
+from scenes.room.operation_tables import OperationTables
 from scenes.toml_file import read_table, validated
 
 

@@ -1,10 +1,10 @@
 """One room from Python objects to all of its results; no file is read or written.
 
 weather = read_weather(Path("city.epw"))
-system = read_system(Path("blind.xml"))                 # scenes.job.inputs
+system = read_system(Path("blind.xml"))                 # scenes.run.inputs
 building = read_ifc("house.ifc")                        # or bim.shoebox.shoebox(...)
 space = building.spaces[0]
-result = compute_room(building, space, everywhere(space, system), weather, RoomOptions())
+result = compute_room(building, space, in_all_windows(space, system), weather, RoomOptions())
 """
 
 from __future__ import annotations
@@ -32,21 +32,22 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
-from scenes.job.annual import glare_by_state, glare_of_year, worst_hours
-from scenes.job.control import shading_states
-from scenes.job.daylight import room_daylight, room_scene
-from scenes.job.glare import default_hours, room_glare
-from scenes.job.holes import hole_problems
-from scenes.job.operation import Operation
-from scenes.job.operation_tables import OperationTables
-from scenes.job.options import RoomOptions
-from scenes.job.picture_hours import wanted_hours
-from scenes.job.solar import RoomSun
-from scenes.job.thermal import fenestration_table, thermal_result
-from scenes.job.thermal_system import ThermalSystem, thermal_system
-from scenes.job.windows import States, room_windows
-from scenes.job.zone import RoomZone, balances, internal_gains, operated, with_states
+from scenes.fenestration.systems import States
+from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYear, ThermalResult
+from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
+from scenes.room.control import shading_states
+from scenes.room.daylight import room_daylight, room_scene
+from scenes.room.glare import default_hours, room_glare
+from scenes.room.holes import hole_problems
+from scenes.room.operation import Operation
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
+from scenes.room.picture_hours import wanted_hours
+from scenes.room.solar import RoomSun
+from scenes.room.thermal import fenestration_table, thermal_result
+from scenes.room.windows import room_windows
+from scenes.room.zone import RoomZone, balances, internal_gains, operated, with_states
 from thermal.balance import ZoneResult
 
 FloatArray = NDArray[np.float64]
@@ -79,7 +80,7 @@ def compute_room(
     Args:
         building: what stands around the room is its `elements`.
         systems: by window GUID the `System` in each shading state, from open to closed; one tuple
-            of one system is the usual case, see `scenes.job.windows.everywhere`.
+            of one system is the usual case, see `scenes.room.windows.in_all_windows`.
         options: method, hours of pictures, sensors, samples, seed; `RoomOptions()` is a full run.
         operation: shading control, gains, set points; without it the first state holds all year
             and the room floats freely.

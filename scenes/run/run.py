@@ -18,27 +18,24 @@ from mitsuba_cfs.progress import Progress, item, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration import fill_windows, source_notes, window_sources
-from scenes.job.alike import as_room, same_light, same_systems
-from scenes.job.building import read_building
-from scenes.job.drawn_shades import traced_building
-from scenes.job.files import JobFiles, read_files
-from scenes.job.inputs import States, System, chosen_spaces, sha256
-from scenes.job.operation import Operation, check_states
-from scenes.job.options import JobOptions
-from scenes.job.room import compute_room, skies_for
-from scenes.job.thermal_system import thermal_system
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import States, System
+from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
+from scenes.room.drawn_shades import traced_building
+from scenes.room.equal_rooms import moved_result, same_light, same_systems
+from scenes.room.operation import Operation, check_states
+from scenes.room.room import compute_room, skies_for
+from scenes.run.building import read_building
+from scenes.run.files import JobFiles, read_files
+from scenes.run.inputs import chosen_spaces, sha256
+from scenes.run.options import JobOptions
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
 
-Told = Callable[[RoomYear], None]  # called with each room as soon as it is computed
-
-
-def untold(room: RoomYear) -> None:
-    """Say nothing of a room before all are computed."""
+OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +54,19 @@ def run_job(
     progress: Progress = silent,
     files: JobFiles | None = None,
     *,
-    told: Told = untold,
+    on_room: OnRoom | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
 
     Args:
         files: what `read_files` has read of the options; read now without.
-        told: called with each room as soon as it is computed, in the rooms' order.
+        on_room: called with each room as soon as it is computed, in the rooms' order.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     start = time.monotonic()
     inputs = read_inputs(options, progress, files)
-    return run_inputs(inputs, options, progress, told=told, start=start)
+    return run_inputs(inputs, options, progress, on_room=on_room, start=start)
 
 
 def run_inputs(
@@ -77,7 +74,7 @@ def run_inputs(
     options: JobOptions,
     progress: Progress = silent,
     *,
-    told: Told = untold,
+    on_room: OnRoom | None = None,
     start: float | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the rooms of `inputs`.
@@ -95,7 +92,7 @@ def run_inputs(
     progress("sky", 0.0)
     skies = skies_for(weather, options)
     progress("sky", 1.0)
-    results, problems, notes = _rooms(inputs, skies, options, progress, told)
+    results, problems, notes = _rooms(inputs, skies, options, progress, on_room)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
     holes = [problem for result in results for problem in result.problems]
@@ -174,13 +171,13 @@ def _rooms(
     skies: AnnualSky,
     options: JobOptions,
     progress: Progress,
-    told: Told = untold,
+    on_room: OnRoom | None = None,
 ) -> tuple[list[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
     found: dict[str, RoomYear] = {}
     problems, notes = [], []
     cache = MatrixCache.of_user() if options.cache else None
-    alike = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
+    equal = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
     for number, space in enumerate(inputs.spaces, 1):
         name = space.label
         steps = item(progress, "room", number, len(inputs.spaces), name)
@@ -188,16 +185,16 @@ def _rooms(
             twin = next(
                 (
                     other
-                    for other in alike[space.guid]
+                    for other in equal[space.guid]
                     if other.guid in found
-                    and not found[other.guid].like
+                    and not found[other.guid].template
                     and same_systems(other, space, inputs.systems)
                     and same_light(inputs.building, other, space, options, cache)
                 ),
                 None,
             )
             if twin is not None:
-                found[space.guid] = as_room(found[twin.guid], space)
+                found[space.guid] = moved_result(found[twin.guid], space)
                 notes.append(
                     f"Room {name} is like {twin.label} in shape, orientation, "
                     "materials, windows and in what shades it: its results are those."
@@ -215,7 +212,8 @@ def _rooms(
                 raise DataError(str(error), file=options.building, element=where) from error
             problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
             continue
-        told(found[space.guid])
+        if on_room is not None:
+            on_room(found[space.guid])
     return list(found.values()), problems, notes
 
 

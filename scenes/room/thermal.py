@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import pandas as pd
 
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.options import RoomOptions
-from scenes.job.thermal_system import ThermalSystem
-from scenes.job.windows import RoomWindows
-from scenes.job.zone import RoomZone
+from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.results import ThermalResult
+from scenes.room.options import RoomOptions
+from scenes.room.windows import RoomWindows
+from scenes.room.zone import RoomZone
 from thermal.balance import ZoneResult
 from thermal.comfort import adaptive_comfort, hours_between, running_mean, summarise
 from thermal.zone import Zone

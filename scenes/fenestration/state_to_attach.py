@@ -7,7 +7,7 @@ from pathlib import Path
 from bim.fenestration import AngularGValue, ShadingState, read_g_table
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
-from scenes.job.thermal_file import ThermalFile
+from scenes.fenestration.thermal_file import ThermalFile
 
 
 def state_to_attach(

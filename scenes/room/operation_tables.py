@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from thermal.closure import Closure
-from thermal.glazing import Gap
+from scenes.fenestration.tables import SystemTable
+from scenes.toml_file import Positive, Share, TomlTable
 from thermal.zone import IdealLoads
 
 CLOCK = 24  # hours of a schedule
-Positive = Annotated[float, Field(gt=0)]
-Share = Annotated[float, Field(ge=0, le=1)]
 
 
 def _in_order(hours: tuple[int, int]) -> tuple[int, int]:
@@ -29,55 +26,7 @@ Hours = Annotated[
 ]
 
 
-class Table(BaseModel):
-    """A table that takes no key which it does not know."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class GapTable(Table):
-    """The gas gap of a double glazing, for `u_model = "gap"`."""
-
-    width: Positive  # [m]
-    gas: dict[str, Share] = {"argon": 0.9, "air": 0.1}
-    emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
-
-
-class ClosureTable(Table):
-    """How a system's thermal model is closed: in a study, and beside a BSDF file."""
-
-    u_model: Literal["constant", "linear", "gap"] = "constant"  # with the temperatures
-    gap: GapTable | None = None
-    realised_inner_resistance: Positive | None = None  # [m2 K/W], see thermal.blackbox
-    realised_outer_resistance: Positive | None = None
-
-    @model_validator(mode="after")
-    def _has_its_gap(self) -> ClosureTable:
-        if (self.u_model == "gap") != (self.gap is not None):
-            raise ValueError('u_model "gap" and a [system.gap] table belong together')
-        return self
-
-    def closure(self) -> Closure | None:
-        """What the table states; None where it states nothing."""
-        if not self.model_fields_set & set(ClosureTable.model_fields):
-            return None
-        gap = self.gap
-        if gap is not None:
-            gap = Gap(gap.width, tuple(gap.gas.items()), gap.emissivity)
-        return Closure(
-            self.u_model, gap, self.realised_inner_resistance, self.realised_outer_resistance
-        )
-
-
-class SystemTable(ClosureTable):
-    """One shading state: a BSDF file and what else was measured."""
-
-    bsdf: Path
-    u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None
-    g_value: Share | None = None
-
-
-class ControlTable(Table):
+class ControlTable(TomlTable):
     """Which state holds: states are numbered from 0 in the order of the file."""
 
     rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
@@ -103,7 +52,7 @@ class ControlTable(Table):
         return None
 
 
-class GainsTable(Table):
+class GainsTable(TomlTable):
     """Heat in the room during the occupied hours."""
 
     equipment_w_m2: Annotated[float, Field(ge=0)] = 8.0
@@ -115,7 +64,7 @@ class GainsTable(Table):
     occupied: Hours = (8, 18)
 
 
-class AirTable(Table):
+class AirTable(TomlTable):
     """Outdoor air."""
 
     infiltration_ach: Annotated[float, Field(ge=0)] = 0.5
@@ -125,7 +74,7 @@ class AirTable(Table):
     door_m3_s: Annotated[float, Field(ge=0)] = 0.0
 
 
-class LoadsTable(Table):
+class LoadsTable(TomlTable):
     """Ideal heating and cooling; without set points the room floats."""
 
     heating_c: float | None = None
@@ -151,7 +100,7 @@ class LoadsTable(Table):
         )
 
 
-class OperationTables(Table):
+class OperationTables(TomlTable):
     """How rooms are operated: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s."""
 
     system: tuple[SystemTable, ...] = ()  # states, from open to closed; none: those of the windows

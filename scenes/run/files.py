@@ -13,11 +13,12 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.inputs import Given, System, read_system, read_weather
-from scenes.job.operation import Operation, check_states, read_operation
-from scenes.job.options import JobOptions
-from scenes.job.picture_hours import check_hours, wanted_hours
-from scenes.job.thermal_system import checked_system
+from scenes.fenestration.systems import Given, System, read_system
+from scenes.fenestration.thermal_system import checked_system
+from scenes.room.operation import Operation, check_states, read_operation
+from scenes.room.picture_hours import check_hours, wanted_hours
+from scenes.run.inputs import read_weather
+from scenes.run.options import JobOptions
 
 
 @dataclass(frozen=True, slots=True)

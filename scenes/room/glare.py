@@ -13,8 +13,8 @@ from mitsuba_cfs.methods.glare import pictures
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress
-from scenes.job.picture_hours import hour_index
 from scenes.results import GlareResults, LuminancePicture
+from scenes.room.picture_hours import hour_index
 
 DEFAULT_DAYS = ("03-21", "06-21", "12-21")
 DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time

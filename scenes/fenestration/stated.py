@@ -16,8 +16,8 @@ from mitsuba_cfs.bsdf.simple_glazing import (
     visible_reflectances,
 )
 from mitsuba_cfs.errors import DataError
-from scenes.job.attached import Held, held_thermal, usual_first
-from scenes.job.inputs import Given, States, System
+from scenes.fenestration.attached import Held, held_thermal, usual_first
+from scenes.fenestration.systems import Given, States, System
 from thermal.gvalue import TYPICAL_SYSTEMS
 
 PANES = (1, 2, 3)  # that Roos' factor knows

@@ -18,8 +18,8 @@ from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
 from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
 from mitsuba_cfs.trace.estimate import Stopping
-from scenes.job.thermal_system import ThermalSystem
-from scenes.job.windows import RoomWindows
+from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.room.windows import RoomWindows
 from thermal.climate import Solar
 from thermal.control import switched
 

@@ -12,9 +12,9 @@ from bim.model import Space
 from bim.to_thermal import ThermalRoom, coupled_rooms, door_links
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.operation_tables import OperationTables
-from scenes.job.options import RoomOptions
-from scenes.job.thermal_system import ThermalSystem
+from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.gains import dimmed_share, split_gains

@@ -18,10 +18,10 @@ from mitsuba_cfs.progress import Progress
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.metrics import daylight_metrics
-from scenes.job.options import RoomOptions
-from scenes.job.windows import RoomWindows
 from scenes.results import DaylightResult
+from scenes.room.metrics import daylight_metrics
+from scenes.room.options import RoomOptions
+from scenes.room.windows import RoomWindows
 
 
 def room_scene(

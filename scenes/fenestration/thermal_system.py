@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.errors import DataError
-from scenes.job.inputs import System
+from scenes.fenestration.systems import System
 from thermal.blackbox import (
     Fenestration,
     LayerAbsorptances,

@@ -1,9 +1,8 @@
-"""What the user may choose about a run; every default is stated here."""
+"""What the user may choose about a room; every default is stated here."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from mitsuba_cfs.methods import METHODS
 from mitsuba_cfs.methods.sampling import Sampling
@@ -14,7 +13,7 @@ class RoomOptions:
     """How a room is computed."""
 
     method: str = "five-phase"  # one of METHODS
-    picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.job.glare.default_hours`
+    picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.room.glare.default_hours`
     picture_count: int = 10  # at most, where no hours are asked for
     picture_size: int = 600  # pixels of a side of the fisheye picture
     picture_samples: int = 8  # paths for each pixel; 4 x 4 of them share what is reflected
@@ -54,19 +53,3 @@ class RoomOptions:
             subdivision=self.sky_subdivision,
             seed=self.seed,
         )
-
-
-@dataclass(frozen=True, slots=True)
-class JobOptions(RoomOptions):
-    """Inputs and choices of a run."""
-
-    building: Path | None  # None: not from a file
-    weather: Path | None
-    system: Path | None = None  # of every window; None: what the building's file holds
-    operation: Path | None = None
-    spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
-    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
-    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
-    g_value: float | None = None  # at normal incidence
-    cache: bool = True  # keep traced matrices and find them again
-    quick: bool = False  # said in the results; what it chooses is in `scenes.quick`

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from bim.model import Window
 from mitsuba_cfs.errors import DataError
-from scenes.job.inputs import Given, States, System
+from scenes.fenestration.systems import Given, States, System
 
 NAMED = 5  # windows that one sentence names
 
@@ -53,8 +53,8 @@ def held_systems(
         raise DataError(f"a box holds no fenestration data: give {given.ask}", field="box")
     # these read IFC: only where there is a file of it
     from bim.ifc.fenestration_read import read_fenestration
-    from scenes.job.attached import attached_systems
-    from scenes.job.stated import stated_systems, stated_values
+    from scenes.fenestration.attached import attached_systems
+    from scenes.fenestration.stated import stated_systems, stated_values
 
     held = read_fenestration(file)
     found = _with_given(attached_systems(held, windows, file), given)
@@ -73,7 +73,7 @@ def stated_u_and_g(
 ) -> dict[str, tuple[float | None, float | None]]:
     """U and g of each window by GUID as they are attached or stated; None where neither is."""
     from bim.ifc.fenestration_read import read_fenestration
-    from scenes.job.stated import stated_values
+    from scenes.fenestration.stated import stated_values
 
     held = read_fenestration(file)
     values = {w.guid: stated_values(held, w, file, Given()) for w in windows}

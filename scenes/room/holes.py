@@ -85,7 +85,7 @@ def _place(point: np.ndarray) -> str:
     return "({:.1f}, {:.1f}, {:.1f}) m".format(*(round(float(x), 1) + 0.0 for x in point))
 
 
-def moved(problem: Problem, space: Space, like: str) -> Problem:
-    """The problem of a room as that of another one alike."""
-    what = f"room {space.label} is like room {like}: {problem.what}"
+def moved_problem(problem: Problem, space: Space, template: str) -> Problem:
+    """The problem of a template room as that of one equal to it."""
+    what = f"room {space.label} is like room {template}: {problem.what}"
     return replace(problem, where=space.guid, what=what)

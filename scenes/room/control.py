@@ -11,7 +11,7 @@ from bim.model import Space
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.operation_tables import ControlTable
+from scenes.room.operation_tables import ControlTable
 from thermal.control import always, by_cut_off, by_glare, by_irradiance, by_schedule
 
 FloatArray = NDArray[np.float64]

@@ -1,0 +1,24 @@
+"""Inputs and choices of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenes.room.options import RoomOptions
+
+
+@dataclass(frozen=True, slots=True)
+class JobOptions(RoomOptions):
+    """Inputs and choices of a run."""
+
+    building: Path | None  # None: not from a file
+    weather: Path | None
+    system: Path | None = None  # of every window; None: what the building's file holds
+    operation: Path | None = None
+    spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
+    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
+    g_value: float | None = None  # at normal incidence
+    cache: bool = True  # keep traced matrices and find them again
+    quick: bool = False  # said in the results; what it chooses is in `scenes.quick`
