@@ -14,7 +14,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
 from scenes import quick as quick_run
-from scenes.fenestration.systems import Given, System
+from scenes.fenestration.systems import FenestrationSystem, Given
 from scenes.fenestration.thermal_system import checked_system
 from scenes.report import write_report
 from scenes.report.headline import cards
@@ -74,7 +74,7 @@ class SimulatedYear(RoomYear):
 
 def simulate(
     room: Room,
-    system: System | None,
+    system: FenestrationSystem | None,
     weather: Weather,
     *,
     operation: Operation | None = None,

@@ -13,7 +13,7 @@ from bim.model import Window
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import digest
-from scenes.fenestration.systems import States, System, system_of
+from scenes.fenestration.systems import FenestrationSystem, States, system_of
 from scenes.fenestration.thermal_file import ThermalFile
 
 Held = Mapping[str, tuple[ShadingState, ...]]  # by window, as `read_fenestration` gives them
@@ -53,7 +53,7 @@ def _content(state: ShadingState) -> list:
     return [state.name, bands, *thermal, state.closure, state.shading_position, beside]
 
 
-def _system(state: ShadingState, window: Window, path: Path, source: str) -> System:
+def _system(state: ShadingState, window: Window, path: Path, source: str) -> FenestrationSystem:
     name = state.name or window.type_name or window.name or window.guid
     if not state.bands:
         label = f"state {state.name!r} has no BSDF" if state.name else "has no BSDF"

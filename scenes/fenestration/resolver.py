@@ -17,7 +17,7 @@ from pathlib import Path
 
 from bim.model import Window
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.systems import Given, States, System
+from scenes.fenestration.systems import FenestrationSystem, Given, States
 
 NAMED = 5  # windows that one sentence names
 
@@ -84,14 +84,14 @@ def _with_given(systems: Mapping[str, States], given: Given) -> dict[str, States
     """The systems with the U and g that the user gives; the same ones stay the same."""
     if given.u_value is None and given.g_value is None:
         return dict(systems)
-    known: dict[int, System] = {}
+    known: dict[int, FenestrationSystem] = {}
     for states in systems.values():
         for system in states:
             known.setdefault(id(system), _changed(system, given))
     return {guid: tuple(known[id(s)] for s in states) for guid, states in systems.items()}
 
 
-def _changed(system: System, given: Given) -> System:
+def _changed(system: FenestrationSystem, given: Given) -> FenestrationSystem:
     source = system.source
     if given.u_value is not None:
         system = replace(system, u_value=given.u_value)

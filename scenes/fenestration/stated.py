@@ -17,7 +17,7 @@ from mitsuba_cfs.bsdf.simple_glazing import (
 )
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.attached import Held, held_thermal, usual_first
-from scenes.fenestration.systems import Given, States, System
+from scenes.fenestration.systems import FenestrationSystem, Given, States
 from thermal.gvalue import TYPICAL_SYSTEMS
 
 PANES = (1, 2, 3)  # that Roos' factor knows
@@ -88,7 +88,7 @@ def _first(*values: float | None) -> float | None:
     return next((value for value in values if value is not None), None)
 
 
-def glazing_system(values: StatedValues, file: str) -> System:
+def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
     """The clear glazing of some values at normal incidence, which falls with the angle after Roos.
 
     What is not stated follows from U and g by the simple window model
@@ -109,7 +109,7 @@ def glazing_system(values: StatedValues, file: str) -> System:
             notes.append(
                 f"{name}: solar transmittance {tau:.2f} from U and g (Arasteh et al. 2009)."
             )
-    return System(
+    return FenestrationSystem(
         name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
         notes=tuple(notes), source=f"the values stated in {file}",
     )  # fmt: skip

@@ -21,7 +21,7 @@ from thermal.closure import Closure
 
 
 @dataclass(frozen=True, slots=True)
-class System:
+class FenestrationSystem:
     """A fenestration system: glazing and shade as one, in both bands."""
 
     name: str
@@ -43,7 +43,8 @@ class System:
         return self.visible if self.tree is None else self.tree
 
 
-States = tuple[System, ...]  # of a window: its system in each shading state, from open to closed
+# of a window: its system in each shading state, from open to closed
+States = tuple[FenestrationSystem, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ def read_system(
     u_value: float | None = None,
     g_value: float | None = None,
     by: str = "",
-) -> System:
+) -> FenestrationSystem:
     """The system of a BSDF XML file, with U and g given, or of the `.toml` file beside it.
 
     The `.toml` file has the name of the XML file; see `ThermalFile`.
@@ -103,10 +104,10 @@ def system_of(
     path: Path,
     notes: Sequence[str] = (),
     **more: float | str | Path | NDArray[np.float64] | Closure | None,
-) -> System:
+) -> FenestrationSystem:
     """The system of BSDF data by band, Klems full or tensor trees.
 
-    Args: path: the file that the data come from; more: fields of `System`.
+    Args: path: the file that the data come from; more: fields of `FenestrationSystem`.
     """
     notes = list(notes)
     if "Visible" not in bands and "Solar" not in bands:
@@ -117,7 +118,7 @@ def system_of(
     visible = bands.get("Visible") or bands["Solar"]
     solar = bands.get("Solar") or bands["Visible"]
     klems = _klems(visible, path, "Visible")
-    return System(
+    return FenestrationSystem(
         name,
         klems,
         klems if solar is visible else _klems(solar, path, "Solar"),

@@ -46,7 +46,7 @@ class ClosureTable(TomlTable):
         )
 
 
-class SystemTable(ClosureTable):
+class StateTable(ClosureTable):
     """One shading state: a BSDF file and what else was measured."""
 
     bsdf: Path

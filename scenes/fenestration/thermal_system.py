@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.systems import System
+from scenes.fenestration.systems import FenestrationSystem
 from thermal.blackbox import (
     Fenestration,
     LayerAbsorptances,
@@ -34,7 +34,7 @@ class ThermalSystem:
     notes: tuple[str, ...]
 
 
-def thermal_system(system: System) -> ThermalSystem:
+def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     """U, g and layer absorptances by direction of a system."""
     solar = system.solar
     tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
@@ -71,7 +71,7 @@ def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
     return float(weight @ solar.direct_hemispherical(block) / weight.sum())
 
 
-def checked_system(system: System, path: Path) -> ThermalSystem:
+def checked_system(system: FenestrationSystem, path: Path) -> ThermalSystem:
     """The thermal data of a system.
 
     Args: path: the file that U and g are wrong in, for the message.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration.systems import Given, System
+from scenes.fenestration.systems import FenestrationSystem, Given
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.study_file import StudyFile
 from scenes.room.operation import read_state
@@ -18,7 +18,7 @@ class HeatFiles:
     """What the files of a study hold, all but a building's."""
 
     weather: Weather
-    systems: tuple[System, ...]  # by shading state
+    systems: tuple[FenestrationSystem, ...]  # by shading state
     given: Given  # the same as what the study file gives for all windows
 
 

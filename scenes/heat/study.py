@@ -25,7 +25,7 @@ from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
 from scenes.room.drawn_shades import traced_building
-from scenes.room.room import Room, skies_for
+from scenes.room.room import RoomSimulation, skies_for
 from scenes.room.zone import RoomZone, balances, coupled
 from scenes.run.inputs import chosen_spaces, named_spaces
 from thermal.balance import ZoneResult
@@ -67,7 +67,7 @@ def run_study(
     rooms, radiants = [], []
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)
-        room = Room(
+        room = RoomSimulation(
             building, space, in_windows, weather, options,
             operation=study, skies=skies, cache=cache, progress=steps,
         )  # fmt: skip

@@ -11,7 +11,7 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods import METHODS
-from scenes.fenestration.tables import SystemTable
+from scenes.fenestration.tables import StateTable
 from scenes.quick import HEAT, picks
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
@@ -95,7 +95,7 @@ class StudyFile(OperationTables):
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     couple: bool = False  # heat flows through the walls between the rooms
     box: BoxTable | None = None
-    system: tuple[SystemTable, ...] = ()  # states; none: what the building's file holds
+    system: tuple[StateTable, ...] = ()  # states; none: what the building's file holds
     comfort: ComfortTable = ComfortTable()
     trace: TraceTable = TraceTable()
     step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from scenes.figures.chart import Chart
-from scenes.figures.plan import Plan
+from scenes.figures.plan import FloorPlan
 from scenes.report import (
     daylight_figures,
     glare_figures,
@@ -31,7 +31,7 @@ class RoomPage:
     name: str
     facts: tuple[tuple[str, str], ...]
     cards: tuple[Card, ...]
-    plans: tuple[Plan, ...]
+    plans: tuple[FloorPlan, ...]
     light: Chart
     daylight_tables: tuple[tables.Table, ...]
     error_words: str

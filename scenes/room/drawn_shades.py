@@ -9,7 +9,7 @@ import numpy as np
 
 from bim.drawn_shades import without_drawn_shades
 from bim.model import Building
-from scenes.fenestration.systems import States, System
+from scenes.fenestration.systems import FenestrationSystem, States
 
 SCATTERED = (
     0.05  # share of the transmitted light beside the straight ray, above it there is a shade
@@ -33,7 +33,7 @@ def traced_building(building: Building, systems: Mapping[str, States]) -> Buildi
     return building
 
 
-def holds_shade(system: System) -> bool:
+def holds_shade(system: FenestrationSystem) -> bool:
     """Whether a system holds a shade: by the stated place of its shade, else by its light.
 
     Clear panes pass light straight on, into one patch for each direction; slats and fabrics

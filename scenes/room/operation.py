@@ -7,8 +7,8 @@ from os import PathLike
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.systems import System, read_system
-from scenes.fenestration.tables import SystemTable
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.fenestration.tables import StateTable
 from scenes.room.operation_tables import OperationTables
 from scenes.toml_file import read_table, validated
 
@@ -19,7 +19,7 @@ class Operation:
 
     file: Path
     tables: OperationTables
-    systems: tuple[System, ...]  # states of every window; empty: the windows' own
+    systems: tuple[FenestrationSystem, ...]  # states of every window; empty: the windows' own
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -46,7 +46,7 @@ def read_operation(path: str | PathLike[str]) -> Operation:
     return Operation(path, tables, tuple(systems))
 
 
-def read_state(table: SystemTable, path: Path, *, by: str = "") -> System:
+def read_state(table: StateTable, path: Path, *, by: str = "") -> FenestrationSystem:
     """The system of a shading state from its BSDF file, with U, g and closure of its table.
 
     Args: by: what names the file, for the system's source.

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from scenes.fenestration.tables import SystemTable
+from scenes.fenestration.tables import StateTable
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.zone import IdealLoads
 
@@ -103,7 +103,7 @@ class LoadsTable(TomlTable):
 class OperationTables(TomlTable):
     """How rooms are operated: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s."""
 
-    system: tuple[SystemTable, ...] = ()  # states, from open to closed; none: those of the windows
+    system: tuple[StateTable, ...] = ()  # states, from open to closed; none: those of the windows
     control: ControlTable = ControlTable()
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()

@@ -79,8 +79,8 @@ def compute_room(
 
     Args:
         building: what stands around the room is its `elements`.
-        systems: by window GUID the `System` in each shading state, from open to closed; one tuple
-            of one system is the usual case, see `scenes.room.windows.in_all_windows`.
+        systems: by window GUID the `FenestrationSystem` in each shading state, from open to
+            closed; one tuple of one system is the usual case, see `in_all_windows`.
         options: method, hours of pictures, sensors, samples, seed; `RoomOptions()` is a full run.
         operation: shading control, gains, set points; without it the first state holds all year
             and the room floats freely.
@@ -94,7 +94,7 @@ def compute_room(
     """
     if operation is None:
         systems = {guid: states[:1] for guid, states in systems.items()}
-    room = Room(
+    room = RoomSimulation(
         building, space, systems, weather, options,
         operation=None if operation is None else operation.tables,
         skies=skies, cache=cache, progress=progress,
@@ -114,7 +114,7 @@ def compute_room(
     return RoomYear(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes)
 
 
-class Room:
+class RoomSimulation:
     """A room on its way: each step is computed when it is first asked for, and serves all others.
 
     `cfs run` and `cfs study` ask for all of them (`compute_room`), `cfs thermal` for `zone`.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.to_tracer import window_groups
 from mitsuba_cfs.surfaces import WindowGroup
-from scenes.fenestration.systems import States, System
+from scenes.fenestration.systems import FenestrationSystem, States
 
 if TYPE_CHECKING:
     from mitsuba_cfs.methods.optics import BsdfOptics
@@ -44,7 +44,7 @@ class RoomWindows:
                     known[id(system)] = BsdfOptics(system.visible, system.fine)
         return [[known[id(system)] for system in states] for states in self.systems]
 
-    def of_state(self, state: int, what: Callable[[System], T]) -> list[T]:
+    def of_state(self, state: int, what: Callable[[FenestrationSystem], T]) -> list[T]:
         """What `what` makes of each group's system in a state; fewer states end with their last."""
         return [what(states[min(state, len(states) - 1)]) for states in self.systems]
 
@@ -71,7 +71,7 @@ def room_windows(space: Space, systems: Mapping[str, States]) -> RoomWindows:
     return RoomWindows(groups, tuple(states for _, states in found), _groups(space, groups))
 
 
-def in_all_windows(space: Space, *states: System) -> dict[str, States]:
+def in_all_windows(space: Space, *states: FenestrationSystem) -> dict[str, States]:
     """The same states in every window of a room."""
     return {window.guid: states for window in space.windows}
 

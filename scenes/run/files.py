@@ -13,7 +13,7 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration.systems import Given, System, read_system
+from scenes.fenestration.systems import FenestrationSystem, Given, read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.room.operation import Operation, check_states, read_operation
 from scenes.room.picture_hours import check_hours, wanted_hours
@@ -26,7 +26,7 @@ class JobFiles:
     """What the files of a run hold, all but the building."""
 
     weather: Weather
-    system: System | None
+    system: FenestrationSystem | None
     operation: Operation | None
     given: Given  # what fills the windows, by flag or operation file
 
@@ -73,7 +73,7 @@ def _check_sun(options: JobOptions, weather: Weather) -> None:
         wanted_hours(options.picture_hours, weather.midpoints, lit)
 
 
-def _check_operation(operation: Operation, system: System | None) -> None:
+def _check_operation(operation: Operation, system: FenestrationSystem | None) -> None:
     """What does not need the windows: its systems' data, and its control's states."""
     for one, path in zip(operation.systems, operation.files, strict=True):
         checked_system(one, path)

@@ -19,7 +19,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
-from scenes.fenestration.systems import States, System
+from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
@@ -149,7 +149,7 @@ def job_inputs(building: Building, names: Sequence[str], files: JobFiles) -> Job
     return JobInputs(building, spaces, weather, systems, operation)
 
 
-def used_systems(inputs: JobInputs) -> list[System]:
+def used_systems(inputs: JobInputs) -> list[FenestrationSystem]:
     """Every system that the run may use, once."""
     states = _used_states(inputs).values()
     return list({id(system): system for some in states for system in some}.values())
@@ -221,7 +221,7 @@ def _manifest(
     options: JobOptions,
     variant: str,
     inputs: JobInputs,
-    used: list[System],
+    used: list[FenestrationSystem],
     results: list[RoomYear],
 ) -> dict:
     """What a reader needs to make the same numbers again."""

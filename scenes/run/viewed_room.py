@@ -14,7 +14,7 @@ from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
-from scenes.fenestration.systems import Given, System
+from scenes.fenestration.systems import FenestrationSystem, Given
 from scenes.room.drawn_shades import traced_building
 from scenes.room.holes import hole_notes
 from scenes.room.windows import room_windows
@@ -28,7 +28,7 @@ class ViewedRoom:
 
     space: Space
     scene: DaylightScene
-    systems: tuple[System, ...]  # [G]
+    systems: tuple[FenestrationSystem, ...]  # [G]
     optics: list[list[BsdfOptics]]  # [G][1]
     sources: list[dict]  # name, source and windows of each system
 

@@ -27,7 +27,7 @@ from scenes.room.drawn_shades import traced_building
 from scenes.room.operation import check_states, read_operation
 from scenes.room.room import compute_room, skies_for
 from scenes.run.inputs import read_weather
-from scenes.study.case import Case, Source, program_version
+from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
 from thermal.comfort import hours_between
 
@@ -51,7 +51,7 @@ def _computed(case: Case) -> CaseResult:
     if case.program != program_version():
         raise DataError("this process runs another version of the program than the study's")
     for source in case.files:
-        if isinstance(source, Source) and Source.of(source.path) != source:
+        if isinstance(source, InputFile) and InputFile.of(source.path) != source:
             raise DataError("is not the file that it was when the study began", file=source.path)
     variants.activate()
     building, space = _room(case)
@@ -83,12 +83,12 @@ def _computed(case: Case) -> CaseResult:
 
 
 @lru_cache(maxsize=4)
-def _building(source: Source) -> Building:
+def _building(source: InputFile) -> Building:
     return read_ifc(source.path)
 
 
 def _room(case: Case) -> tuple[Building, Space]:
-    if isinstance(case.building, Source):
+    if isinstance(case.building, InputFile):
         building = _building(case.building)
     else:
         building = box_building(case.building)
@@ -96,20 +96,20 @@ def _room(case: Case) -> tuple[Building, Space]:
 
 
 @lru_cache(maxsize=4)
-def _read_weather(source: Source) -> Weather:
+def _read_weather(source: InputFile) -> Weather:
     return read_weather(source.path)
 
 
-def _weather(source: Source, angle: float) -> Weather:
+def _weather(source: InputFile, angle: float) -> Weather:
     return _read_weather(source).turned(angle)
 
 
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
-def _skies_of(source: Source, angle: float, subdivision: int, options) -> AnnualSky:
+def _skies_of(source: InputFile, angle: float, subdivision: int, options) -> AnnualSky:
     return skies_for(_weather(source, angle), options)
 
 
-def _skies(source: Source, angle: float, options) -> AnnualSky:
+def _skies(source: InputFile, angle: float, options) -> AnnualSky:
     return _skies_of(source, angle, options.sky_subdivision, options)
 
 
@@ -119,7 +119,7 @@ def case_systems(case: Case, space: Space) -> dict[str, States]:
     if case.bsdf is not None:
         given = {"u_value": case.u_value, "g_value": case.g_value}
         states = (read_system(case.bsdf.path, **given),)
-    file = case.building.path if isinstance(case.building, Source) else None
+    file = case.building.path if isinstance(case.building, InputFile) else None
     return fill_windows(space.windows, Given(states, ask="a [[system]]"), file)
 
 

@@ -52,7 +52,7 @@ class ViewYear:
 
 
 @dataclass(frozen=True, slots=True)
-class Year:
+class GlareYear:
     """What all views share."""
 
     options: YearOptions
@@ -70,7 +70,7 @@ class Year:
 
 def read_year(
     options: YearOptions, progress: Progress = silent, files: YearFiles | None = None
-) -> Year:
+) -> GlareYear:
     """Read and check all inputs, the building last; `DataError` where one cannot be used.
 
     Args: files: what `read_files` has read of the options; read now without.
@@ -102,7 +102,7 @@ def read_year(
     digest = hashlib.sha256(json.dumps([*chosen, viewed.space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))
     notes = (*viewed.notes(), *weather.notes)
-    return Year(
+    return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
         notes, viewed.sources,
     )  # fmt: skip
@@ -114,7 +114,7 @@ def sampling_of(options: YearOptions) -> Sampling:
     return Sampling(view_samples=options.samples, memory=memory, seed=options.seed)
 
 
-def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
+def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
     """Rate one view after the other; what lies in the folder `kept` is not computed again."""
     options = year.options
     traced = PhaseScene(
@@ -146,7 +146,7 @@ def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[
 
 
 def _pictures(
-    light: PhaseLight, year: Year, found: AnnualGlare
+    light: PhaseLight, year: GlareYear, found: AnnualGlare
 ) -> dict[pd.Timestamp, NDArray[np.float32]]:
     """Pictures of the worst lit hours."""
     hours = found.worst(year.options.worst)
@@ -156,7 +156,7 @@ def _pictures(
     return dict(zip(times, pictures(light, hours), strict=True))
 
 
-def used_dgp(year: Year, dgp: NDArray[np.float64]) -> NDArray[np.float64]:
+def used_dgp(year: GlareYear, dgp: NDArray[np.float64]) -> NDArray[np.float64]:
     """DGP of the hours of use [U] from those of the lit hours [L]; dark hours have no glare."""
     whole = np.full(len(year.weather.midpoints), DARK)
     whole[year.sky.lit] = dgp

@@ -64,13 +64,13 @@ def _read_year(options, *_others):
     from mitsuba_cfs.metrics.schedules import working_hours
     from mitsuba_cfs.sky.weather import read_epw
     from scenes.year_of_glare.views import NamedView
-    from scenes.year_of_glare.year import Year
+    from scenes.year_of_glare.year import GlareYear
 
     weather = read_epw(options.weather)
     views = [NamedView("eye001_1", fisheye([0, 0, 1], [0, 1, 0], 64))]
     sky = SimpleNamespace(lit=np.arange(100, 4000, 100))
     used = working_hours(weather, 8.0, 18.0)
-    return Year(options, "A", views, None, None, weather, sky, used, options.metric)
+    return GlareYear(options, "A", views, None, None, weather, sky, used, options.metric)
 
 
 def _rate_views(year, kept, _progress):

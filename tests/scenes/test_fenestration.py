@@ -19,7 +19,7 @@ from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.resolver import fill_windows
-from scenes.fenestration.systems import Given, System, read_system
+from scenes.fenestration.systems import FenestrationSystem, Given, read_system
 from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
 from tests.scenes.fenestration_models import COMMON, GLAZING, STATED, grey, room, with_attached
@@ -35,13 +35,13 @@ def own_cache(tmp_path_factory, monkeypatch) -> None:
     monkeypatch.setenv("CFS_CACHE", str(tmp_path_factory.getbasetemp() / "matrices"))
 
 
-def filled(path: Path, given: Given | None = None) -> System:
+def filled(path: Path, given: Given | None = None) -> FenestrationSystem:
     """What fills the only window of a model, in its first state."""
     (states,) = fill_windows(read_ifc(path).windows, given or Given(), path).values()
     return states[0]
 
 
-def normal(system: System) -> tuple[float, float]:
+def normal(system: FenestrationSystem) -> tuple[float, float]:
     """Visible and solar transmittance at normal incidence."""
     return tuple(
         float(band.direct_hemispherical(band.transmission_front)[0])

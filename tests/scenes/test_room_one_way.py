@@ -21,7 +21,7 @@ from scenes.heat.study_file import read_study
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
-from scenes.room.room import Room, compute_room
+from scenes.room.room import RoomSimulation, compute_room
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions
 from scenes.run.run import run_job
@@ -188,12 +188,12 @@ def office(
     weather: Weather,
     options: RoomOptions,
     tables: OperationTables | None = None,
-) -> Room:
+) -> RoomSimulation:
     """The building's only room with the demo's blind."""
     (space,) = building.spaces
     systems = in_all_windows(space, read_system(VENETIAN_BLIND))
     cache = MatrixCache.of_user()
-    return Room(building, space, systems, weather, options, operation=tables, cache=cache)
+    return RoomSimulation(building, space, systems, weather, options, operation=tables, cache=cache)
 
 
 def test_heat_is_computed_in_one_place() -> None:

@@ -19,7 +19,7 @@ from mitsuba_cfs.progress import silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather, read_epw
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.fenestration.systems import System, read_system
+from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.room.annual import worst_hours
 from scenes.room.control import shading_states
 from scenes.room.equal_rooms import moved_result, same_light, same_systems
@@ -42,30 +42,30 @@ def weather() -> Weather:
 
 
 @pytest.fixture(scope="module")
-def blind() -> System:
+def blind() -> FenestrationSystem:
     return read_system(VENETIAN_BLIND)
 
 
 @pytest.fixture(scope="module")
-def glass() -> System:
+def glass() -> FenestrationSystem:
     return clear("clear", 0.8)
 
 
-def clear(name: str, tau: float) -> System:
+def clear(name: str, tau: float) -> FenestrationSystem:
     """A pane that passes the share `tau` of all light straight on and reflects a tenth."""
     omega = KLEMS_FULL.projected_solid_angles()
     through, back = np.diag(tau / omega), np.diag(0.1 / omega)
     klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, back, back)
-    return System(name, klems, klems, u_value=2.0, g_value=min(tau + 0.05, 0.87))
+    return FenestrationSystem(name, klems, klems, u_value=2.0, g_value=min(tau + 0.05, 0.87))
 
 
 @pytest.fixture(scope="module")
-def milk() -> System:
+def milk() -> FenestrationSystem:
     """A pane that scatters the same to all sides."""
     even = np.full((KLEMS_FULL.size, KLEMS_FULL.size), 0.5 / np.pi)
     nothing = np.zeros_like(even)
     klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, even, even, nothing, nothing)
-    return System("milk", klems, klems, u_value=2.0)
+    return FenestrationSystem("milk", klems, klems, u_value=2.0)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ BOX = shoebox(
 ROOM = BOX.spaces[0]
 
 
-def light(method: str, system: System, weather, skies, **more) -> np.ndarray:
+def light(method: str, system: FenestrationSystem, weather, skies, **more) -> np.ndarray:
     """Illuminance [hours, S] by a method."""
     result = compute_room(
         BOX, ROOM, in_all_windows(ROOM, system), weather, replace(SMALL, method=method),
@@ -157,7 +157,7 @@ def test_windows_with_their_own_systems(variant, weather, skies, blind, glass) -
     dark = clear("dark", 1e-9)
     options = replace(SMALL, method="five-phase", sensor_samples=2048)
 
-    def sensors(one: System, other: System) -> np.ndarray:
+    def sensors(one: FenestrationSystem, other: FenestrationSystem) -> np.ndarray:
         systems = {left: (one,), right: (other,)}
         found = compute_room(both, space, systems, weather, options, skies=skies, pictures=False)
         assert len(room_windows(space, systems).groups) == 2
@@ -206,7 +206,7 @@ def test_states_switch_light_and_heat_together(
     operation = replace(operation, systems=(glass, blind))
     options = replace(SMALL, method="five-phase", sensor_samples=2048)
 
-    def run(*states: System, operation=None):
+    def run(*states: FenestrationSystem, operation=None):
         return compute_room(
             BOX, ROOM, in_all_windows(ROOM, *states), weather, options, operation=operation,
             skies=skies, pictures=False,
