@@ -21,6 +21,7 @@ from scenes.report.headline import cards
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
 from scenes.room.operation import Operation
+from scenes.room.options import RoomOptions
 from scenes.run.files import JobFiles
 from scenes.run.options import JobOptions
 from scenes.run.outputs import write_results
@@ -96,7 +97,7 @@ def simulate(
         quick: few rays and one small picture, for a first look, as `--quick`.
         cache: keep traced matrices in the user's cache and find them again.
         progress: called with each stage and how much of it is done.
-        options: the fields of `RoomOptions`, such as `method`, `seed`, `annual_glare`.
+        options: choices by the names of `RoomOptions.of`, such as `method`, `seed`, `annual_glare`.
 
     Raises: `DataError` for a room that cannot be computed, a window without a system.
     """
@@ -115,7 +116,7 @@ def simulate(
         spaces=(room.space.guid,),
         cache=cache,
         quick=quick,
-        **options,
+        room=RoomOptions.of(**options),
     )
     states = () if operation is None else operation.systems
     states = states if system is None else (system,)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -12,10 +11,11 @@ from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import join_option, system_option
+from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
-_DEFAULT = JobOptions(Path(), Path())
+_DEFAULT = RoomOptions()
 
 
 @click.command()
@@ -36,15 +36,15 @@ _DEFAULT = JobOptions(Path(), Path())
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
 @click.option(
-    "--picture-size", type=click.IntRange(64, 4096), default=_DEFAULT.picture_size,
+    "--picture-size", type=click.IntRange(64, 4096), default=_DEFAULT.outputs.picture_size,
     show_default=True, help="Pixels of a side.",
 )  # fmt: skip
 @click.option(
-    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.sensor_spacing,
+    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.grid.spacing,
     show_default=True, help="Sensor spacing [m].",
 )  # fmt: skip
 @click.option(
-    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.sensor_height,
+    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.grid.height,
     show_default=True, help="Work plane above the floor [m].",
 )  # fmt: skip
 @click.option(
@@ -64,6 +64,11 @@ def command(
     weather: Path,
     system: Path | None,
     out: Path,
+    spaces: tuple[str, ...],
+    u_value: float | None,
+    g_value: float | None,
+    join: tuple[str, ...],
+    operation: Path | None,
     no_cache: bool,
     quick: bool,
     **chosen,
@@ -71,9 +76,12 @@ def command(
     """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
-    options = JobOptions(building, weather, system, cache=not no_cache, quick=quick, **chosen)
     if quick:
-        options = replace(options, **quick_run.picks(quick_run.ROOM, given()))
+        chosen |= quick_run.picks(quick_run.ROOM, given())
+    options = JobOptions(
+        building, weather, system, operation, spaces, join, u_value, g_value,
+        cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen),
+    )  # fmt: skip
     run_to_folder(options, out)
 
 

@@ -69,20 +69,20 @@ class ComfortTable(TomlTable):
 
 
 class TraceTable(TomlTable):
-    """How the light is computed: as the same options of `RoomOptions`, with fewer rays."""
+    """How the light is computed: as the choices of those names of a run, with fewer rays."""
 
     method: Literal[METHODS] = RUN.method
     patch_samples: Annotated[int, Field(ge=64)] = 8192
     sensor_samples: Annotated[int, Field(ge=64)] = 16384
-    sun_points: Annotated[int, Field(ge=16)] = RUN.sun_points
-    path_samples: Annotated[int, Field(ge=16)] = RUN.path_samples
+    sun_points: Annotated[int, Field(ge=16)] = RUN.sampling.sun_points
+    path_samples: Annotated[int, Field(ge=16)] = RUN.sampling.hour_samples
     sky_subdivision: Literal[1, 2, 4, 6] = 1
-    sensor_spacing: Positive = RUN.sensor_spacing  # [m]
-    sensor_height: Positive = RUN.sensor_height  # above the floor [m]
-    sensor_margin: Annotated[float, Field(ge=0)] = RUN.sensor_margin  # from the walls [m]
-    picture_size: Annotated[int, Field(ge=64)] = RUN.picture_size  # for `limit_dgp`
-    picture_samples: Annotated[int, Field(ge=1)] = RUN.picture_samples
-    seed: int = RUN.seed
+    sensor_spacing: Positive = RUN.grid.spacing  # [m]
+    sensor_height: Positive = RUN.grid.height  # above the floor [m]
+    sensor_margin: Annotated[float, Field(ge=0)] = RUN.grid.margin  # from the walls [m]
+    picture_size: Annotated[int, Field(ge=64)] = RUN.outputs.picture_size  # for `limit_dgp`
+    picture_samples: Annotated[int, Field(ge=1)] = RUN.sampling.view_samples
+    seed: int = RUN.sampling.seed
     view_factors: bool = True  # of the room's surfaces, for longwave and the person
 
 
@@ -103,7 +103,7 @@ class StudyFile(OperationTables):
     @property
     def options(self) -> RoomOptions:
         """How a room of the study is computed."""
-        return RoomOptions(
+        return RoomOptions.of(
             **self.trace.model_dump(exclude={"view_factors"}), heat_step_s=60.0 * self.step_minutes
         )
 

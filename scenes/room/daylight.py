@@ -20,20 +20,18 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.results import DaylightResult
 from scenes.room.metrics import daylight_metrics
-from scenes.room.options import RoomOptions
+from scenes.room.options import SensorGrid
 from scenes.room.windows import RoomWindows
 
 
 def room_scene(
-    building: Building, space: Space, windows: RoomWindows, options: RoomOptions
+    building: Building, space: Space, windows: RoomWindows, grid: SensorGrid, picture_size: int
 ) -> DaylightScene:
-    """Triangles, window groups, sensors and view of a room in the visible band."""
-    points, _ = sensor_grid(
-        space,
-        spacing=options.sensor_spacing,
-        height=options.sensor_height,
-        margin=options.sensor_margin,
-    )
+    """Triangles, window groups, sensors and view of a room in the visible band.
+
+    Args: picture_size: pixels of a side of the view.
+    """
+    points, _ = sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)
     position, direction = view_point(space)
     return DaylightScene(
         interior_surfaces(space, "visible"),
@@ -41,7 +39,7 @@ def room_scene(
         windows.groups,
         points,
         np.tile([0.0, 0.0, 1.0], (len(points), 1)),
-        fisheye(position, direction, options.picture_size),
+        fisheye(position, direction, picture_size),
     )
 
 
@@ -49,16 +47,17 @@ def room_daylight(
     light: PhaseLight,
     state: NDArray[np.int64],
     weather: Weather,
-    options: RoomOptions,
+    method: str,
     progress: Progress,
 ) -> DaylightResult:
     """Illuminance of the year with the state of each hour, and its metrics.
 
     Args: state: [L] which one holds in each lit hour.
     """
-    sky, scene = light.sky, light.filled.traced.scene
-    if options.method == "point-in-time":
-        filled = PathSystems(scene, light.filled.systems, options.sampling)
+    sky, traced = light.sky, light.filled.traced
+    scene, sampling = traced.scene, traced.sampling
+    if method == "point-in-time":
+        filled = PathSystems(scene, light.filled.systems, sampling)
         lit, error = filled.light(sky, progress=progress).estimate(state)
     else:
         lit, error = light.illuminance(state), light.relative_error(state)
@@ -66,7 +65,7 @@ def room_daylight(
     # LM-83's direct sun and the daylight factor are those of open blinds
     direct = light.direct_sun()
     direct = None if direct is None else sky.whole_year(direct.astype(np.float32)).T
-    overcast = cie_patches("overcast", ReinhartSky(options.sky_subdivision), 1.0)
+    overcast = cie_patches("overcast", ReinhartSky(sampling.subdivision), 1.0)
     factor = daylight_factor(light.filled.coefficients() @ overcast, 1.0)
     table, of_room = daylight_metrics(scene.points, illuminance, factor, weather, direct)
     return DaylightResult(scene.points, illuminance, error, table, of_room)

@@ -12,12 +12,12 @@ from bim.model import Building, Space
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
 from scenes.results import RoomYear
 from scenes.room.holes import moved_problem
-from scenes.room.options import RoomOptions
 
 SAME_LIGHT = 0.005  # share of the light from anywhere that may come another way
 NEAR = 0.01  # [m] between the places of windows in their rooms
@@ -38,7 +38,7 @@ def same_systems(a: Space, b: Space, systems: Mapping[str, States]) -> bool:
 
 
 def same_light(
-    building: Building, a: Space, b: Space, options: RoomOptions, cache: MatrixCache | None
+    building: Building, a: Space, b: Space, sampling: Sampling, cache: MatrixCache | None
 ) -> bool:
     """Whether two equal rooms see the same outdoors, by their daylight matrices in both bands.
 
@@ -46,7 +46,7 @@ def same_light(
     differ by rounding only.
     """
     for band in ("visible", "solar"):
-        one, other = (_daylight(building, s, band, options, cache) for s in (a, b))
+        one, other = (_daylight(building, s, band, sampling, cache) for s in (a, b))
         if one.shape != other.shape:
             return False
         if np.abs(one - other).sum() > SAME_LIGHT * one.sum():
@@ -79,9 +79,9 @@ def corner(space: Space) -> NDArray[np.float64]:
 
 
 def _daylight(
-    building: Building, space: Space, band: str, options: RoomOptions, cache: MatrixCache | None
+    building: Building, space: Space, band: str, sampling: Sampling, cache: MatrixCache | None
 ) -> NDArray[np.float64]:
     scene = DaylightScene(
         Surfaces.none(), exterior_surfaces(building, space, band), window_groups(space)
     )
-    return PhaseScene(scene, options.sampling, cache=cache).daylight.values
+    return PhaseScene(scene, sampling, cache=cache).daylight.values

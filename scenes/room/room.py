@@ -27,6 +27,7 @@ from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
@@ -55,10 +56,10 @@ T = TypeVar("T")
 WORST = 4  # pictures of an annual glare without hours asked for
 
 
-def skies_for(weather: Weather, options: RoomOptions) -> AnnualSky:
-    """The year's skies as the method of the options needs them; the same for every room."""
-    with_sun = options.method != "three-phase"
-    return annual_sky(weather, options.sky_subdivision, sun=with_sun, solar=True)
+def skies_for(weather: Weather, method: str, sampling: Sampling) -> AnnualSky:
+    """The year's skies as a method needs them; the same for every room."""
+    with_sun = method != "three-phase"
+    return annual_sky(weather, sampling.subdivision, sun=with_sun, solar=True)
 
 
 def compute_room(
@@ -81,10 +82,10 @@ def compute_room(
         building: what stands around the room is its `elements`.
         systems: by window GUID the `FenestrationSystem` in each shading state, from open to
             closed; one tuple of one system is the usual case, see `in_all_windows`.
-        options: method, hours of pictures, sensors, samples, seed; `RoomOptions()` is a full run.
+        options: method, sampling, sensors, occupancy, outputs; `RoomOptions()` is a full run.
         operation: shading control, gains, set points; without it the first state holds all year
             and the room floats freely.
-        skies: `skies_for(weather, options)`, where several rooms share them.
+        skies: of `skies_for`, where several rooms share them.
         cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
             and weather do not enter V and D: variants of them cost only algebra.
         pictures: False leaves the luminance pictures and their glare out.
@@ -99,12 +100,12 @@ def compute_room(
         operation=None if operation is None else operation.tables,
         skies=skies, cache=cache, progress=progress,
     )  # fmt: skip
-    options, skies = room.options, room.skies
-    hours = wanted_hours(options.picture_hours, weather.midpoints, skies.lit)
+    outputs, skies = options.outputs, room.skies
+    hours = wanted_hours(outputs.picture_hours, weather.midpoints, skies.lit)
     daylight = room.timed("daylight", lambda: room.daylight)
     holes = room.timed("holes", room.holes)
     year, rated = None, GlareResults(room.scene.view, ())
-    if options.annual_glare:
+    if outputs.annual_glare:
         year = room.timed("annual glare", room.annual_glare)
     if pictures:
         rated = room.timed("glare", lambda: room.glare(hours, year))
@@ -135,10 +136,13 @@ class RoomSimulation:
     ) -> None:
         """See `compute_room`."""
         if operation is not None:
-            options = replace(options, occupied=operation.gains.occupied)
+            options = options.changed(occupied=operation.gains.occupied)
         self.building, self.space, self.weather, self.options = building, space, weather, options
+        self.sampling, self.outputs = options.sampling, options.outputs
         self.operation, self.cache, self.progress = operation, cache, progress
-        self.skies = skies_for(weather, options) if skies is None else skies
+        self.skies = (
+            skies_for(weather, options.method, options.sampling) if skies is None else skies
+        )
         self.windows = room_windows(space, systems)
         self.seconds: dict[str, float] = {}
 
@@ -152,14 +156,16 @@ class RoomSimulation:
     @cached_property
     def scene(self) -> DaylightScene:
         """Triangles, window groups, sensors and view in the visible band."""
-        return room_scene(self.building, self.space, self.windows, self.options)
+        return room_scene(
+            self.building, self.space, self.windows, self.options.grid, self.outputs.picture_size
+        )
 
     @cached_property
     def traced(self) -> PhaseScene:
         """V and D."""
         return PhaseScene(
             self.scene,
-            self.options.sampling,
+            self.sampling,
             five_phase=self.options.method != "three-phase",
             cache=self.cache,
             progress=self._tracing,
@@ -206,7 +212,8 @@ class RoomSimulation:
         """Illuminance of the work plane and its metrics."""
         self.progress("daylight", 0.0)
         steps = part(self.progress, 0.9, 1.0, "daylight")
-        found = room_daylight(self.light, self.lit_state, self.weather, self.options, steps)
+        method = self.options.method
+        found = room_daylight(self.light, self.lit_state, self.weather, method, steps)
         self.progress("daylight", 1.0)
         return found
 
@@ -215,12 +222,12 @@ class RoomSimulation:
         """The light that pictures are made of."""
         if self.options.method != "point-in-time":
             return self.light
-        filled = PathSystems(self.scene, self.light.filled.systems, self.options.sampling)
+        filled = PathSystems(self.scene, self.light.filled.systems, self.sampling)
         return filled.light(self.skies)
 
     def holes(self) -> tuple[Problem, ...]:
         """What of the light leaves through no window."""
-        return hole_problems(self.space, self.scene, seed=self.options.seed, cache=self.cache)
+        return hole_problems(self.space, self.scene, seed=self.sampling.seed, cache=self.cache)
 
     def annual_glare(self) -> pd.DataFrame:
         """Glare of every hour."""
@@ -237,10 +244,10 @@ class RoomSimulation:
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
         if not hours and year is not None:
-            hours = worst_hours(year, min(WORST, self.options.picture_count))
+            hours = worst_hours(year, min(WORST, self.outputs.picture_count))
         if not hours:
             eye = self.eye()[self.lit_state, np.arange(len(self.skies.lit))]
-            count = self.options.picture_count
+            count = self.outputs.picture_count
             hours = default_hours(self.weather.midpoints, self.skies.lit, eye, count)
         return room_glare(self.pictured, self.scene.view, self.lit_state, hours, self.progress)
 
@@ -254,7 +261,7 @@ class RoomSimulation:
             return self.traced
         scene = DaylightScene(Surfaces.none(), exterior, self.windows.groups)
         steps = part(self.progress, 0.0, 1.0, "sun")
-        found = PhaseScene(scene, self.options.sampling, cache=self.cache, progress=steps)
+        found = PhaseScene(scene, self.sampling, cache=self.cache, progress=steps)
         if scene.groups:
             _ = found.daylight
             steps("sun", 1.0)
@@ -277,7 +284,7 @@ class RoomSimulation:
         """The room's surfaces and windows as a zone, with the gains and the air of the options."""
         group, heats = self.windows.group, self.thermals
         first = heats[group[0]][0].fenestration if len(group) else None
-        gains = internal_gains(self.space, self.skies.hours, self.options)
+        gains = internal_gains(self.space, self.skies.hours, self.options.occupancy)
         air = self.options.infiltration_ach
         room = thermal_room(self.space, first, infiltration_ach=air, gains=gains)
         return replace(room, zone=with_states(room.zone, [heats[g] for g in group]))
@@ -311,7 +318,8 @@ class RoomSimulation:
         (balance,) = balances([self.zone], self.weather, step_s, progress=self.progress)
         self.progress("heat", 1.0)
         table = fenestration_table(self.windows, self.thermals)
-        return thermal_result(self.zone, balance, self.weather, self.options, table), balance
+        occupied = self.options.occupancy.hours
+        return thermal_result(self.zone, balance, self.weather, occupied, table), balance
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""

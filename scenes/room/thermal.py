@@ -9,7 +9,6 @@ import pandas as pd
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.results import ThermalResult
-from scenes.room.options import RoomOptions
 from scenes.room.windows import RoomWindows
 from scenes.room.zone import RoomZone
 from thermal.balance import ZoneResult
@@ -23,14 +22,14 @@ def thermal_result(
     room: RoomZone,
     result: ZoneResult,
     weather: Weather,
-    options: RoomOptions,
+    occupied: tuple[int, int],
     fenestration: Iterator[dict[str, float | str]],
 ) -> ThermalResult:
     """The tables of a room's year.
 
-    Args: fenestration: `fenestration_table` of its windows.
+    Args: occupied: clock hours from and to; fenestration: `fenestration_table` of its windows.
     """
-    comfort, summary = _comfort(result, weather, options)
+    comfort, summary = _comfort(result, weather, occupied)
     return ThermalResult(
         _temperatures(result, room.zone, weather),
         pd.DataFrame(room.gains, index=weather.midpoints).rename_axis("time"),
@@ -81,11 +80,11 @@ def _temperatures(result: ZoneResult, zone: Zone, weather: Weather) -> pd.DataFr
 
 
 def _comfort(
-    result: ZoneResult, weather: Weather, options: RoomOptions
+    result: ZoneResult, weather: Weather, hours: tuple[int, int]
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Adaptive comfort (ASHRAE 55) of every hour, and its shares of the occupied ones."""
     mean = running_mean(weather.dry_bulb_c)
-    occupied = hours_between(*options.occupied, hours=len(mean))
+    occupied = hours_between(*hours, hours=len(mean))
     table = {"occupied": occupied, "running_mean_c": mean}
     summary: dict[str, float] = {}
     for name, band in BANDS.items():

@@ -14,7 +14,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.room.operation_tables import OperationTables
-from scenes.room.options import RoomOptions
+from scenes.room.options import Occupancy
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.gains import dimmed_share, split_gains
@@ -95,12 +95,12 @@ def per_window(solar: Solar, zone: Zone) -> Solar:
     return replace(solar, state=np.minimum(solar.state, most))
 
 
-def internal_gains(space: Space, hours: int, options: RoomOptions) -> Gains:
+def internal_gains(space: Space, hours: int, occupancy: Occupancy) -> Gains:
     """Heat of people and equipment during the occupied hours."""
     power = space.floor_area * (
-        options.equipment_w_m2 + options.person_w / options.floor_per_person
+        occupancy.equipment_w_m2 + occupancy.person_w / occupancy.floor_per_person
     )
-    present = work_hours(*options.occupied, hours=hours)
+    present = work_hours(*occupancy.hours, hours=hours)
     return Gains((1 - RADIANT_SHARE) * power * present, RADIANT_SHARE * power * present)
 
 

@@ -39,9 +39,10 @@ def read_files(options: JobOptions) -> JobFiles:
     check_head(options.building)
     corrections_beside(options.building)
     check_names(options.spaces)
-    check_hours(options.picture_hours)
+    hours = options.room.outputs.picture_hours
+    check_hours(hours)
     weather = read_weather(options.weather)
-    check_hours(options.picture_hours, weather.midpoints)
+    check_hours(hours, weather.midpoints)
     operation = None if options.operation is None else read_operation(options.operation)
     system = None
     if options.system is not None:
@@ -50,7 +51,7 @@ def read_files(options: JobOptions) -> JobFiles:
         checked_system(system, options.system)
     if operation is not None:
         _check_operation(operation, system)
-    _check_sun(options, weather)
+    _check_sun(hours, weather)
     states = () if operation is None else operation.systems
     states = states if system is None else (system,)
     given = Given(states, options.u_value, options.g_value)
@@ -64,13 +65,13 @@ def check_names(names: tuple[str, ...], field: str = "--space") -> None:
             raise DataError("expected the name or GUID of a room, got nothing", field=field)
 
 
-def _check_sun(options: JobOptions, weather: Weather) -> None:
+def _check_sun(hours: tuple[str, ...], weather: Weather) -> None:
     """Whether the sun is up in the hours asked for; where it is takes a second to load."""
-    if options.picture_hours:
+    if hours:
         from mitsuba_cfs.sky.sun import is_up, sun_directions
 
         lit = np.flatnonzero(is_up(sun_directions(weather)))
-        wanted_hours(options.picture_hours, weather.midpoints, lit)
+        wanted_hours(hours, weather.midpoints, lit)
 
 
 def _check_operation(operation: Operation, system: FenestrationSystem | None) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 from scenes.room.options import RoomOptions
 
 
 @dataclass(frozen=True, slots=True)
-class JobOptions(RoomOptions):
+class JobOptions:
     """Inputs and choices of a run."""
 
     building: Path | None  # None: not from a file
@@ -22,3 +23,9 @@ class JobOptions(RoomOptions):
     g_value: float | None = None  # at normal incidence
     cache: bool = True  # keep traced matrices and find them again
     quick: bool = False  # said in the results; what it chooses is in `scenes.quick`
+    room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
+
+    def named(self) -> dict[str, Any]:
+        """Every choice by its name, those of the rooms first."""
+        own = [one.name for one in fields(self) if one.name != "room"]
+        return self.room.named() | {name: getattr(self, name) for name in own}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
@@ -90,7 +90,8 @@ def run_inputs(
     sun = sun_directions(weather)
     variant = variants.activate()
     progress("sky", 0.0)
-    skies = skies_for(weather, options)
+    room = options.room
+    skies = skies_for(weather, room.method, room.sampling)
     progress("sky", 1.0)
     results, problems, notes = _rooms(inputs, skies, options, progress, on_room)
     if not results:
@@ -117,7 +118,7 @@ def run_inputs(
         (*building.problems, *problems, *holes),
         manifest,
         tuple(dict.fromkeys(notes)),
-        options.method,
+        room.method,
     )
 
 
@@ -177,6 +178,7 @@ def _rooms(
     found: dict[str, RoomYear] = {}
     problems, notes = [], []
     cache = MatrixCache.of_user() if options.cache else None
+    sampling = options.room.sampling
     equal = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
     for number, space in enumerate(inputs.spaces, 1):
         name = space.label
@@ -189,7 +191,7 @@ def _rooms(
                     if other.guid in found
                     and not found[other.guid].template
                     and same_systems(other, space, inputs.systems)
-                    and same_light(inputs.building, other, space, options, cache)
+                    and same_light(inputs.building, other, space, sampling, cache)
                 ),
                 None,
             )
@@ -201,7 +203,7 @@ def _rooms(
                 )
             else:
                 found[space.guid] = compute_room(
-                    inputs.building, space, inputs.systems, inputs.weather, options,
+                    inputs.building, space, inputs.systems, inputs.weather, options.room,
                     operation=inputs.operation, skies=skies, cache=cache, progress=steps,
                 )  # fmt: skip
         except (CfsError, ValueError) as error:
@@ -247,9 +249,9 @@ def _manifest(
         "fenestration": used_sources(inputs),
         "options": {
             key: str(value) if isinstance(value, Path) else value
-            for key, value in asdict(options).items()
+            for key, value in options.named().items()
         },
-        "seed": options.seed,
+        "seed": options.room.sampling.seed,
         "variant": variant,
         "versions": {
             "python": platform.python_version(),

@@ -58,7 +58,7 @@ def work_of(cases: list[Case]) -> Workload:
     for case in cases:
         if case.weather not in hours:
             weather = read_weather(case.weather.path)
-            used = hours_between(*case.options.occupied, hours=len(weather.times))
+            used = hours_between(*case.options.occupancy.hours, hours=len(weather.times))
             up = is_up(sun_directions(weather))
             hours[case.weather] = np.array([np.count_nonzero(used & up), np.count_nonzero(up)])
     rated, lit = sum(hours[case.weather] for case in cases) / (scenes * systems)

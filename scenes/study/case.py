@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,7 +66,7 @@ class Case:
             self.u_value,
             self.g_value,
             self.orientation_deg % 360.0,
-            _plain(asdict(self.options)),
+            _plain(self.options.named()),
             self.glare,
             [source.sha256 for source in self.referenced],
         )[:32]

@@ -16,6 +16,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -58,12 +59,12 @@ def _computed(case: Case) -> CaseResult:
     systems = case_systems(case, space)
     building = traced_building(building, systems)
     weather = _weather(case.weather, case.orientation_deg)
-    skies = _skies(case.weather, case.orientation_deg, case.options)
+    skies = _skies(case.weather, case.orientation_deg, case.options.method, case.options.sampling)
     cache = MatrixCache.of_user()
     operation = None if case.operation is None else read_operation(case.operation.path)
     if operation is not None:
         check_states(operation, max(map(len, systems.values())))
-    hours = _rated_hours(weather, case.options.occupied)
+    hours = _rated_hours(weather, case.options.occupancy.hours)
     room = compute_room(
         building, space, systems, weather, case.options,
         operation=operation,
@@ -72,7 +73,7 @@ def _computed(case: Case) -> CaseResult:
     )  # fmt: skip
     figures, arrays = room_figures(room)
     if room.dgp is not None:
-        figures |= glare_figures(room.dgp, weather, case.options.occupied)
+        figures |= glare_figures(room.dgp, weather, case.options.occupancy.hours)
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
         arrays["dgp"][hours] = room.dgp
     if case.bsdf is None:  # else the table says it: names are no part of a case's key
@@ -105,12 +106,8 @@ def _weather(source: InputFile, angle: float) -> Weather:
 
 
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
-def _skies_of(source: InputFile, angle: float, subdivision: int, options) -> AnnualSky:
-    return skies_for(_weather(source, angle), options)
-
-
-def _skies(source: InputFile, angle: float, options) -> AnnualSky:
-    return _skies_of(source, angle, options.sky_subdivision, options)
+def _skies(source: InputFile, angle: float, method: str, sampling: Sampling) -> AnnualSky:
+    return skies_for(_weather(source, angle), method, sampling)
 
 
 def case_systems(case: Case, space: Space) -> dict[str, States]:

@@ -86,7 +86,7 @@ def _of_space(
                         **system,
                         **climate,
                         orientation_deg=angle,
-                        options=RoomOptions(**options),
+                        options=RoomOptions.of(**options),
                         program=program_version(),
                         glare=study.glare,
                         chosen=AUTO if method == AUTO else "",

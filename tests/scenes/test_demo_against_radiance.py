@@ -67,7 +67,7 @@ def test_year_of_illuminance(name, tmp_path):
     variants.activate()
     building = read_ifc(DEMO / "office.ifc")
     space = building.space(name)
-    options = RoomOptions(method="three-phase", sensor_spacing=SPACING)
+    options = RoomOptions.of(method="three-phase", sensor_spacing=SPACING)
     systems = in_all_windows(space, read_system(SYSTEM))
     ours = compute_room(
         building, space, systems, read_weather(WEATHER), options, pictures=False

@@ -13,7 +13,7 @@ from scenes.demo import OFFICE
 from scenes.fenestration.systems import read_system
 from scenes.room.daylight import room_scene
 from scenes.room.holes import hole_problems, moved_problem
-from scenes.room.options import RoomOptions
+from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 
 pytestmark = pytest.mark.usefixtures("variant")
@@ -29,7 +29,7 @@ def problems_of(cache=None, *, missing: str = ""):
     building = shoebox()
     (space,) = building.spaces
     windows = room_windows(space, in_all_windows(space, read_system(BLIND)))
-    scene = room_scene(building, space, windows, RoomOptions())
+    scene = room_scene(building, space, windows, SensorGrid(), 64)
     if missing:
         room = scene.interior
         keep = room.surface != [face.name for face in space.faces].index(missing)

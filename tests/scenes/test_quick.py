@@ -40,7 +40,7 @@ bsdf = "{VENETIAN_BLIND}"
 def test_every_choice_is_an_option_and_none_costs_more() -> None:
     from scenes.photovoltaics.study import run_pv
 
-    defaults = {f.name: f.default for kind in (RoomOptions, YearOptions) for f in fields(kind)}
+    defaults = RoomOptions().named() | {f.name: f.default for f in fields(YearOptions)}
     defaults |= {"samples": YearOptions.__dataclass_fields__["samples"].default}
     for name, value in (quick.ROOM | quick.VIEWS).items():
         coarser = name in ("sensor_spacing", "heat_step_s")
@@ -70,9 +70,10 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list:
 def test_what_the_user_gives_holds_against_quick(chosen: list, size: str) -> None:
     run([*RUN, "--quick", "--picture-size", size, "--spacing", "0.25"])
     (options,) = chosen
-    assert (options.picture_size, options.sensor_spacing) == (int(size), 0.25)
+    named = options.room.named()
+    assert (named["picture_size"], named["sensor_spacing"]) == (int(size), 0.25)
     rest = {n: v for n, v in quick.ROOM.items() if n not in ("picture_size", "sensor_spacing")}
-    assert {name: getattr(options, name) for name in rest} == rest
+    assert {name: named[name] for name in rest} == rest
     assert options.quick
 
 
@@ -96,7 +97,7 @@ def test_what_a_study_says_holds_against_quick(tmp_path) -> None:
     study = read_study(path, quick=True)
     assert study.quick and study.options.picture_size == 96
     assert study.options.sun_points == quick.ROOM["sun_points"]
-    assert read_study(path).options.sun_points == RoomOptions().sun_points
+    assert read_study(path).options.sun_points == RoomOptions().sampling.sun_points
 
 
 def test_what_a_thermal_study_says_holds_against_quick(tmp_path) -> None:

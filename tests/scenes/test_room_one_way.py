@@ -76,8 +76,8 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
         f"[options]\n{TRACE}\n"
     )
     options = JobOptions(
-        OFFICE, WEATHER, VENETIAN_BLIND, operation=operation, spaces=("A",), method=method,
-        picture_hours=("06-21 12",), **SAMPLING,
+        OFFICE, WEATHER, VENETIAN_BLIND, operation, ("A",),
+        room=RoomOptions.of(method=method, picture_hours=("06-21 12",), **SAMPLING),
     )  # fmt: skip
     (room,) = run_job(options).spaces
     (year,), _ = run_study(read_study(thermal), silent)
@@ -146,7 +146,8 @@ def test_states_switch_in_the_same_hours(variant, tmp_path, weather, rule) -> No
     building, (space,) = rooms_of(study)
     found = compute_room(
         building, space, in_all_windows(space, *operation.systems), weather,
-        RoomOptions(**SAMPLING), operation=operation, pictures=False, cache=MatrixCache.of_user(),
+        RoomOptions.of(**SAMPLING), operation=operation, pictures=False,
+        cache=MatrixCache.of_user(),
     )  # fmt: skip
     ran = found.operation.hours
     assert 0 < ran["shading_state"].mean() < 1
@@ -164,7 +165,7 @@ def test_sun_on_the_windows_is_reflected_by_solar_reflectances(variant, weather)
     def irradiance(visible: float, solar: float) -> np.ndarray:
         opposite = Element("w", "wall", "IfcWall", wall, visible, solar)
         building = replace(box, elements=(opposite,))
-        room = office(building, weather, RoomOptions(**SAMPLING))
+        room = office(building, weather, RoomOptions.of(**SAMPLING))
         assert room.scene.groups  # light is asked for as well, as in `cfs run`
         return room.sun.irradiance
 
@@ -178,7 +179,7 @@ def test_a_room_without_windows_has_a_zone_in_the_dark(variant, weather) -> None
     box = shoebox(3.0, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5),))
     blind = replace(box, spaces=(replace(box.spaces[0], windows=()),))
     tables = OperationTables.model_validate({"control": {"rule": "glare"}})
-    zone = office(blind, weather, RoomOptions(**SAMPLING), tables).zone
+    zone = office(blind, weather, RoomOptions.of(**SAMPLING), tables).zone
     assert not zone.solar.inside.any() and zone.daylight is None and not zone.state.any()
     assert zone.solar.facade.max() > 100  # the sun still warms its walls
 

@@ -30,7 +30,7 @@ from scenes.room.windows import in_all_windows, room_windows
 from scenes.run.options import JobOptions
 
 HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
-SMALL = RoomOptions(
+SMALL = RoomOptions.of(
     sensor_spacing=1.0, sensor_samples=8192, patch_samples=4096, sun_points=512,
     path_samples=16384, picture_size=96, picture_samples=8, sky_subdivision=1,
 )  # fmt: skip
@@ -71,7 +71,7 @@ def milk() -> FenestrationSystem:
 @pytest.fixture(scope="module")
 def skies(weather) -> AnnualSky:
     """The skies of a few hours, as if the others were dark."""
-    return only(skies_for(weather, SMALL), HOURS)
+    return only(skies_for(weather, SMALL.method, SMALL.sampling), HOURS)
 
 
 def only(skies: AnnualSky, hours: tuple[int, ...]) -> AnnualSky:
@@ -127,7 +127,7 @@ def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, 
     """The same pictures from the file; a broken file is traced anew."""
     from mitsuba_cfs.methods import phase_scene
 
-    options = replace(SMALL, picture_hours=("12-19 12",), sensor_samples=1024, patch_samples=1024)
+    options = SMALL.changed(picture_hours=("12-19 12",), sensor_samples=1024, patch_samples=1024)
 
     def seen(cache: MatrixCache | None) -> np.ndarray:
         systems = in_all_windows(ROOM, glass)
@@ -155,7 +155,7 @@ def test_windows_with_their_own_systems(variant, weather, skies, blind, glass) -
     space = both.spaces[0]
     left, right = (window.guid for window in space.windows)
     dark = clear("dark", 1e-9)
-    options = replace(SMALL, method="five-phase", sensor_samples=2048)
+    options = SMALL.changed(method="five-phase", sensor_samples=2048)
 
     def sensors(one: FenestrationSystem, other: FenestrationSystem) -> np.ndarray:
         systems = {left: (one,), right: (other,)}
@@ -204,7 +204,7 @@ def test_states_switch_light_and_heat_together(
     day = ", ".join("0" if hour < 12 else "1" for hour in range(24))
     operation = read_operation(operation_file(tmp_path, OPERATION.format(day)))
     operation = replace(operation, systems=(glass, blind))
-    options = replace(SMALL, method="five-phase", sensor_samples=2048)
+    options = SMALL.changed(method="five-phase", sensor_samples=2048)
 
     def run(*states: FenestrationSystem, operation=None):
         return compute_room(
@@ -296,12 +296,12 @@ def test_an_equal_room_has_the_results_of_its_template(
     systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
     assert same_systems(ROOM, twin, systems)
     assert not same_systems(ROOM, twin, in_all_windows(ROOM, glass) | in_all_windows(twin, blind))
-    assert same_light(building, ROOM, twin, SMALL, None)
+    assert same_light(building, ROOM, twin, SMALL.sampling, None)
     wall = np.array([[[8, -2, 0], [14, -2, 0], [14, -2, 6]]], dtype=float)
     shaded = replace(building, elements=(Element("w", "wall", "IfcWall", wall, 0.2, 0.2),))
-    assert not same_light(shaded, ROOM, twin, SMALL, None)
+    assert not same_light(shaded, ROOM, twin, SMALL.sampling, None)
 
-    options = replace(SMALL, sensor_samples=2048)
+    options = SMALL.changed(sensor_samples=2048)
     one, other = (
         compute_room(building, s, systems, weather, options, skies=skies, pictures=False)
         for s in (ROOM, twin)
@@ -330,10 +330,11 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
         return compute_room(building, space, *others, **options, pictures=False)
 
     monkeypatch.setattr(run, "compute_room", noted)
-    options = JobOptions(
-        Path(), Path(), method="three-phase", cache=False, sky_subdivision=1, sensor_spacing=2.0,
+    room = RoomOptions.of(
+        method="three-phase", sky_subdivision=1, sensor_spacing=2.0,
         sensor_samples=1024, patch_samples=1024,
     )  # fmt: skip
+    options = JobOptions(Path(), Path(), cache=False, room=room)
     inputs = run.JobInputs(building, spaces, weather, systems, None)
     results, problems, notes = run._rooms(inputs, skies, options, silent)
     assert computed == ["room", "other"] and not problems
@@ -343,7 +344,7 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
 
 
 def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glass) -> None:
-    options = replace(SMALL, annual_glare=True, picture_hours=("06-20 12", "12-19 12"))
+    options = SMALL.changed(annual_glare=True, picture_hours=("06-20 12", "12-19 12"))
     found = compute_room(BOX, ROOM, in_all_windows(ROOM, glass), weather, options, skies=skies)
     year = found.annual_glare["dgp"].to_numpy()
     assert np.flatnonzero(np.isfinite(year)).tolist() == list(HOURS)
