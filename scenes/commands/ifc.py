@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.parameters import FILE, IFC_FILE
@@ -232,9 +232,7 @@ def _export_rooms(
         try:
             for write in writers if space.windows else ():
                 write(space, building, place / name)
-        except ValueError as error:  # a void too low for a work plane or an eye
-            if isinstance(error, DataError):
-                raise
+        except RoomError as error:  # a void too low for a work plane or an eye
             click.echo(f"{space.label}: left out: {error}", err=True)
             shutil.rmtree(place / name, ignore_errors=True)
             continue

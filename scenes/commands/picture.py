@@ -67,18 +67,13 @@ def command(
 
     start = time.perf_counter()
     options = PictureOptions(*room_files(building, weather, system), **chosen)
-    try:
-        read = read_files(options)  # before anything heavy is loaded
-        from mitsuba_cfs.glare.evaluation import evaluate
-        from scenes.commands.progress_bar import ProgressBar
-        from scenes.view_picture import room_picture, write_picture
+    read = read_files(options)  # before anything heavy is loaded
+    from mitsuba_cfs.glare.evaluation import evaluate
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.view_picture import room_picture, write_picture
 
-        with ProgressBar() as progress:
-            found = room_picture(options, progress, read)
-    except ValueError as error:
-        if type(error) is not ValueError:
-            raise
-        raise click.UsageError(str(error)) from None
+    with ProgressBar() as progress:
+        found = room_picture(options, progress, read)
     for file in files:
         write_picture(found, file, print_like=tone)
     view, lit = found.view, found.luminance

@@ -9,6 +9,7 @@ import numpy as np
 from bim.model import Problem, Space
 from bim.sensors import sensor_grid, view_point
 from bim.to_tracer import interior_surfaces, window_groups
+from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.scene import DaylightScene
@@ -48,7 +49,7 @@ def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None)
     """The problems of a room's holes as sentences, where no scene with sensors is at hand."""
     try:
         points, _ = sensor_grid(space, spacing=SPACING, height=WORK_PLANE, margin=SPACING / 2)
-    except ValueError:  # too low or too narrow for a work plane: the eye alone
+    except RoomError:  # too low for a work plane: the eye alone
         points = np.empty((0, 3))
     scene = DaylightScene(
         interior_surfaces(space, "visible"),

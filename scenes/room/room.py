@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from bim.model import Building, Problem, Space
 from bim.to_thermal import ThermalRoom, thermal_room
 from bim.to_tracer import exterior_surfaces, interior_surfaces
+from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
@@ -50,6 +51,7 @@ from scenes.room.thermal import fenestration_table, thermal_result
 from scenes.room.windows import room_windows
 from scenes.room.zone import RoomZone, balances, internal_gains, operated, with_states
 from thermal.balance import ZoneResult
+from thermal.errors import ThermalInputError
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -91,7 +93,8 @@ def compute_room(
         pictures: False leaves the luminance pictures and their glare out.
         rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
 
-    Raises: `ValueError` for a room that cannot be computed (no work plane, no system for a window).
+    Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
+        `ValueError` for a window without a system.
     """
     if operation is None:
         systems = {guid: states[:1] for guid, states in systems.items()}
@@ -286,7 +289,10 @@ class RoomSimulation:
         first = heats[group[0]][0].fenestration if len(group) else None
         gains = internal_gains(self.space, self.skies.hours, self.options.occupancy)
         air = self.options.infiltration_ach
-        room = thermal_room(self.space, first, infiltration_ach=air, gains=gains)
+        try:
+            room = thermal_room(self.space, first, infiltration_ach=air, gains=gains)
+        except ThermalInputError as error:  # its faces are no zone
+            raise RoomError(f"space {self.space.label}: {error}") from error
         return replace(room, zone=with_states(room.zone, [heats[g] for g in group]))
 
     @cached_property

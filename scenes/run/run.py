@@ -12,7 +12,7 @@ from pathlib import Path
 from bim.model import Building, Problem, Space
 from bim.templates import template_rooms
 from mitsuba_cfs import variants
-from mitsuba_cfs.errors import CfsError, DataError
+from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, item, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -206,9 +206,7 @@ def _rooms(
                     inputs.building, space, inputs.systems, inputs.weather, options.room,
                     operation=inputs.operation, skies=skies, cache=cache, progress=steps,
                 )  # fmt: skip
-        except (CfsError, ValueError) as error:
-            if isinstance(error, DataError):
-                raise
+        except RoomError as error:
             if len(inputs.spaces) == 1:
                 where = f"space {name}"
                 raise DataError(str(error), file=options.building, element=where) from error

@@ -40,7 +40,7 @@ ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have 
 def compute_case(case: Case) -> CaseResult:
     """Figures and arrays of a case.
 
-    Raises: `DataError` for a file that has changed or cannot be used, `ValueError` for a room that
+    Raises: `DataError` for a file that has changed or cannot be used, `RoomError` for a room that
     cannot be computed.
     """
     with ALONE:

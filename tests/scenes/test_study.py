@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, RoomError
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.study.plan import plan_of
@@ -234,7 +234,7 @@ def test_failed_cases_end_with_exit_1_and_their_number(tmp_path, capsys, monkeyp
     ("error", "words"),
     [
         (DataError("is short", file="a.epw"), "a.epw: is short"),
-        (ValueError("no closed room"), "no closed room"),
+        (RoomError("no closed room"), "no closed room"),
         (OSError(28, "No space left on device", "x.npz"), "x.npz: the disk is full"),
         (MemoryError(), "out of memory"),
     ],
