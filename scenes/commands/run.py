@@ -10,7 +10,18 @@ from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.quick_option import given, quick_option
-from scenes.commands.room_options import join_option, system_option
+from scenes.commands.room_options import (
+    join_option,
+    method_option,
+    needed_weather_option,
+    no_cache_option,
+    out_folder_option,
+    seed_option,
+    size_option,
+    space_option,
+    system_option,
+    u_option,
+)
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
@@ -20,25 +31,19 @@ _DEFAULT = RoomOptions()
 
 @click.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
+@needed_weather_option
 @system_option
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
-@click.option(
-    "--method", type=click.Choice(METHODS), default=_DEFAULT.method, show_default=True,
-    help="How light is computed: see docs/daylight.md.",
-)  # fmt: skip
-@click.option("--space", "spaces", multiple=True, help="Name or GUID; default: all with a window.")
-@click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
+@out_folder_option
+@method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
+@space_option("spaces", "default: all with a window")
+@u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @join_option
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
-@click.option(
-    "--picture-size", type=click.IntRange(64, 4096), default=_DEFAULT.outputs.picture_size,
-    show_default=True, help="Pixels of a side.",
-)  # fmt: skip
+@size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
 @click.option(
     "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.grid.spacing,
     show_default=True, help="Sensor spacing [m].",
@@ -56,8 +61,8 @@ _DEFAULT = RoomOptions()
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
 @click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
-@click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
+@seed_option
+@no_cache_option
 @quick_option
 def command(
     building: Path,

@@ -9,17 +9,18 @@ import click
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import quick_option
+from scenes.commands.room_options import method_option, out_folder_option
 
 
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+@out_folder_option
 @click.option(
     "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
     help="Cases at a time on this machine; one already uses all cores.",
 )  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, such as tcp://host:8786.")
-@click.option("--method", type=click.Choice(["auto"]), help="Choose by cost and error.")
+@method_option(["auto"], "auto: by cost and error, in place of the file's")
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
 @click.option(

@@ -100,7 +100,8 @@ JOBS = {
     "ifc export --gltf": Job(lambda _, out: ["ifc", "export", OFFICE, "--gltf", out], "out.glb"),
     "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
     "bsdf plot": Job(
-        lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--in", 40, 0, "--out", out], "out.png"
+        lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out],
+        "out.png",
     ),
     "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
     "bsdf combine": Job(

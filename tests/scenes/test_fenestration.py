@@ -24,7 +24,7 @@ from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
 from tests.scenes.fenestration_models import COMMON, GLAZING, STATED, grey, room, with_attached
 
-TINY = ["--quick", "--picture-size", "64", "--picture", "06-21 12", "--spacing", "2",
+TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2",
         "--method", "three-phase"]  # fmt: skip
 YEAR = ["--quick", "--size", "64", "--metric", "sDGP", "--method", "three-phase"]
 

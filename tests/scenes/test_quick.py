@@ -68,7 +68,7 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list:
 
 @pytest.mark.parametrize("size", ["800", "600"])  # the second is the default of a full run
 def test_what_the_user_gives_holds_against_quick(chosen: list, size: str) -> None:
-    run([*RUN, "--quick", "--picture-size", size, "--spacing", "0.25"])
+    run([*RUN, "--quick", "--size", size, "--spacing", "0.25"])
     (options,) = chosen
     named = options.room.named()
     assert (named["picture_size"], named["sensor_spacing"]) == (int(size), 0.25)

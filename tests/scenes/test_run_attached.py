@@ -25,7 +25,7 @@ from scenes.run.options import JobOptions
 from scenes.run.run import read_inputs, used_systems
 
 QUICK = [
-    "--quick", "--picture-size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
+    "--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
     "--method", "three-phase",
 ]  # fmt: skip
 TABLES = ("daylight_metrics.csv", "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv")
