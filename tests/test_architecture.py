@@ -96,7 +96,7 @@ def test_module_keeps_to_the_rules(path: Path) -> None:
         ("bim/x.py", "from bim.model import *"),
         ("bim/x.py", "from . import model"),
         ("scenes/x.py", "from scenes import evidence"),
-        ("scenes/job/x.py", "def f():\n    from scenes.evidence.benchmarks import harness"),
+        ("scenes/room/x.py", "def f():\n    from scenes.evidence.benchmarks import harness"),
         ("bim/utils.py", ""),
         ("bim/x.py", "x = 1\n" * 401),
         ("bim/x.py", "def f():\n    print(1)\n"),

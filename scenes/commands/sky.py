@@ -38,7 +38,7 @@ format_option = click.option(
 )  # fmt: skip
 ground_option = click.option(
     "-g", "--ground", type=click.FloatRange(0, 1), default=None,
-    help="Ground reflectance [default: the weather's albedo, 0.2]",
+    help="Ground reflectance; default: the weather's albedo, 0.2.",
 )  # fmt: skip
 
 
@@ -240,7 +240,7 @@ def measured(
 @click.option("--azimuth", type=float, default=180.0, show_default=True,
               help="Of the sun, clockwise from north [degrees].")  # fmt: skip
 @click.option("-g", "--ground", type=click.FloatRange(0, 1), default=0.2, show_default=True,
-              help="Ground reflectance.")  # fmt: skip
+              help="Ground reflectance; of the whole ground.")  # fmt: skip
 @format_option
 def cie(
     kind_of_sky: str, out: Path, *, subdivision: str, horizontal: float, altitude: float,

@@ -58,8 +58,6 @@ def attempted(compute: Compute, case: Case) -> CaseResult:
 def said(error: BaseException) -> str:
     """A failure in one line: the message of an expected one, what is known of another."""
     message = user_message(error)
-    if message is None and isinstance(error, ValueError):  # a room that cannot be computed
-        message = one_line(str(error))
     fault = f"fault of the program: {one_line(repr(error))}; cfs -vv tells where"
     return message or fault
 

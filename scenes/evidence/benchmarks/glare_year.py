@@ -35,7 +35,7 @@ EYE = (1.8, 2.0, 1.2)
 PRODUCT = f"dctimestep -o hour%03d.hdr patch%03d.hdr {SYSTEM.name} daylight.mtx sky.mtx"
 
 
-class Year:
+class BenchmarkYear:
     """The benchmark room behind the demo's blind: matrices, and the skies of some lit hours."""
 
     def __init__(self, every: int, size: int = SIZE) -> None:
@@ -97,7 +97,7 @@ def compare(name: str, progress: Progress) -> Comparison:
     radiance.environment()
     variants.activate()
     progress(name, 0.0)
-    year = Year(EVERY)
+    year = BenchmarkYear(EVERY)
     geometry = GlareView(year.matrices.view)
     progress(name, 0.3)
 

@@ -45,7 +45,7 @@ from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 from mitsuba_cfs.trace.view_matrix import view_matrix
 from scenes.evidence.validation.blind_room import (
     TILTS,
-    Scene,
+    BlindRoom,
     blind_layer,
     empty,
     glass_klems,
@@ -79,7 +79,7 @@ def known_klems(tilt_deg: float | None, basis: KlemsBasis, samples: int) -> Klem
 
 
 def by_phases(
-    scene: Scene, system: KlemsBsdf, ways: dict[str, Scattering], sky: AnnualSky
+    scene: BlindRoom, system: KlemsBsdf, ways: dict[str, Scattering], sky: AnnualSky
 ) -> tuple[dict[str, NDArray[np.float64]], float]:
     """Illuminance [S, H] by the three-phase and the five-phase method, and V's share of its error.
 
@@ -96,7 +96,7 @@ def by_phases(
     return found, float(three_phase.relative_error().max())
 
 
-def by_fine_matrix(scene: Scene, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
+def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by three phases with matrices of high resolution."""
     view = view_matrix(
         scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=32,
@@ -109,7 +109,7 @@ def by_fine_matrix(scene: Scene, tilt_deg: float | None, sky: AnnualSky) -> NDAr
     return phases.three_phase(view.values, [T], daylight.values, sky.whole)
 
 
-def by_coefficients(scene: Scene, system: PathOptics, sky: AnnualSky) -> NDArray[np.float64]:
+def by_coefficients(scene: BlindRoom, system: PathOptics, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
     room = LitRoom(scene.interior, empty(), scene.groups, [system])
     coefficients = daylight_coefficients(
@@ -119,7 +119,7 @@ def by_coefficients(scene: Scene, system: PathOptics, sky: AnnualSky) -> NDArray
 
 
 def by_paths(
-    scene: Scene, exterior: Surfaces, system: PathOptics, sky: AnnualSky, samples: int
+    scene: BlindRoom, exterior: Surfaces, system: PathOptics, sky: AnnualSky, samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] by point-in-time paths, and its standard error."""
     room = LitRoom(scene.interior, exterior, scene.groups, [system])
@@ -157,7 +157,7 @@ def errors(found: NDArray, reference: NDArray) -> dict[str, float]:
     }
 
 
-def one_case(scene: Scene, sky: AnnualSky, tilt_deg: float | None, samples: int) -> dict:
+def one_case(scene: BlindRoom, sky: AnnualSky, tilt_deg: float | None, samples: int) -> dict:
     """All methods against the explicit geometry for one system."""
     exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
     klems = known_klems(tilt_deg, KLEMS_FULL, 65536)

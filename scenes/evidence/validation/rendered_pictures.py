@@ -104,7 +104,7 @@ def moments(weather: Weather) -> list[Moment]:
     return found
 
 
-class Fenestration:
+class PicturedSystem:
     """A window's system for both programs."""
 
     def __init__(self, name: str, folder: Path) -> None:
@@ -145,7 +145,7 @@ def _tree() -> BsdfFile:
 class Radiance:
     """The room in a folder, rendered by Radiance."""
 
-    def __init__(self, folder: Path, fenestration: Fenestration) -> None:
+    def __init__(self, folder: Path, fenestration: PicturedSystem) -> None:
         radiance.write_surfaces(room.room(), folder / "room.rad")
         lines = [fenestration.material]
         window = room.window_groups()[0].windows[0]
@@ -196,7 +196,7 @@ def outcomes(
     """Render every moment with every system in both programs."""
     view = fisheye(EYE, DIRECTION, size)
     for name in systems:
-        fenestration = Fenestration(name, folder)
+        fenestration = PicturedSystem(name, folder)
         peer = Radiance(folder, fenestration)
         lit = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         for moment in chosen:
