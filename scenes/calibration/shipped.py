@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from scenes.calibration.costs import Calibration, calibration_file
@@ -42,10 +43,7 @@ def this_machines_costs() -> Calibration:
 
 def scaled_costs(here: Speed | None = None) -> Calibration:
     """The shipped costs for a machine of that speed; this one's, tested now, by default."""
-    if here is None:
-        from scenes.calibration.speed import measured_speed
-
-        here = measured_speed()
+    here = here or _speed_here()
     there, costs = shipped_costs()
     tracing, rating = here.tracing / there.tracing, here.rating / there.rating
     origin = (
@@ -54,6 +52,14 @@ def scaled_costs(here: Speed | None = None) -> Calibration:
     )
     scaled = tuple(_scaled(cost, tracing, rating) for cost in costs.costs)
     return replace(costs, costs=scaled, origin=origin)
+
+
+@cache
+def _speed_here() -> Speed:
+    """Speed of this machine, tested once in a process."""
+    from scenes.calibration.speed import measured_speed
+
+    return measured_speed()
 
 
 def _scaled(cost: Cost, tracing: float, rating: float) -> Cost:
