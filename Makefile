@@ -4,8 +4,13 @@ SHELL := /bin/bash
 VENV := .venv
 BIN := $(VENV)/bin
 WORKERS ?= 2
-PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+# A file's tests stay with one worker, which shares their fixtures; files in tests/conftest.py's
+# order, the long ones first, not by how many tests they have.
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 INPUTS := pyproject.toml constraints.txt .ci/set-up
+
+# Some hundred tests start Python anew; each would compile the program's source to bytecode again
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo test test-all lint format docs clean
 

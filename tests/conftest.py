@@ -17,6 +17,15 @@ REAL_DATA = REPOSITORY.parent / "shared" / "data"
 REFERENCE_DATA = REPOSITORY.parent / "shared" / "reference"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """pytest's hook: files with a test marked `early` come first, the others in their order.
+
+    Workers take files in this order (`make test`); a long one begun last would run on alone.
+    """
+    early = {item.path for item in items if item.get_closest_marker("early")}
+    items.sort(key=lambda item: item.path not in early)
+
+
 def default_signals() -> None:
     """For `preexec_fn`: a child that signals can end, also where this suite ignores them.
 

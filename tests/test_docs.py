@@ -12,6 +12,8 @@ import pytest
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from tests.conftest import REPOSITORY
 
+pytestmark = pytest.mark.early
+
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILES = {  # the names that the pages use

@@ -5,7 +5,8 @@ first patch is the polar cap.  Azimuth zero is the centre of a ring's first patc
 means for incident and for outgoing light is stated in `mitsuba_cfs.directions`.
 
 Source: Klems 1994, "A new method for predicting the solar heat gain of complex fenestration
-systems", ASHRAE Transactions 100; the half (77) and quarter (41) bases as in Radiance 6.
+systems", ASHRAE Transactions 100; the half (77) and quarter (41) bases as in Radiance 6
+and in WINDOW's engine.
 """
 
 from __future__ import annotations

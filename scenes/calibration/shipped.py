@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
 
 from scenes.calibration import speed
@@ -35,7 +36,7 @@ def this_machines_costs() -> Calibration:
 
 def scaled_costs(here: speed.Speed | None = None) -> Calibration:
     """The shipped costs for a machine of that speed; this one's, tested now, by default."""
-    here = speed.measured_speed() if here is None else here
+    here = here or _speed_here()
     there, costs = shipped_costs()
     tracing, rating = here.tracing / there.tracing, here.rating / there.rating
     origin = (
@@ -44,6 +45,12 @@ def scaled_costs(here: speed.Speed | None = None) -> Calibration:
     )
     scaled = tuple(_scaled(cost, tracing, rating) for cost in costs.costs)
     return replace(costs, costs=scaled, origin=origin)
+
+
+@cache
+def _speed_here() -> speed.Speed:
+    """Speed of this machine, tested once in a process."""
+    return speed.measured_speed()
 
 
 def _scaled(cost: Cost, tracing: float, rating: float) -> Cost:

@@ -37,6 +37,17 @@ def test_patches_tile_the_hemisphere(basis):
     np.testing.assert_array_equal(basis.index(*basis.centres()), np.arange(basis.size))
 
 
+@pytest.mark.peer
+@pytest.mark.parametrize("basis", STANDARD_BASES, ids=lambda basis: basis.name)
+def test_patches_are_those_of_windows_engine(basis):
+    """Radiance's tables had 73 patches in the half basis once; WINDOW's engine has 77."""
+    pywincalc = pytest.importorskip("pywincalc")
+    kind = getattr(pywincalc.BSDFBasisType, basis.name.split()[-1].upper())
+    hemisphere = pywincalc.BSDFHemisphere.create(kind)
+    theirs = hemisphere.get_directions(pywincalc.BSDFDirection.Incoming).lambda_vector()
+    np.testing.assert_allclose(basis.projected_solid_angles(), theirs, rtol=1e-12)
+
+
 def test_angles_within_a_patch_stay_in_it():
     generator = np.random.default_rng(3)
     patch = generator.integers(0, KLEMS_FULL.size, 10_000)

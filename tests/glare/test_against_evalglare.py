@@ -13,7 +13,7 @@ from glare_pictures import CASES, PICTURES, VIEWS
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, Task, evaluate
 from mitsuba_cfs.images.hdr import read_hdr, write_hdr
 
-pytestmark = pytest.mark.peer
+pytestmark = [pytest.mark.early, pytest.mark.peer]
 RELATIVE, DECIMALS = 2e-5, 2e-6
 
 OPTIONS = {

@@ -13,6 +13,8 @@ from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.demo.make_facade import facade
 from tests.scenes.study_files import study_file
 
+pytestmark = pytest.mark.early
+
 REPOSITORY = Path(__file__).parents[2]
 PV = """
 [module]

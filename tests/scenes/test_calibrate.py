@@ -145,14 +145,14 @@ def test_the_costs_that_ship_are_scaled_to_the_machine():
 
 
 def test_without_a_calibration_the_shipped_costs_are_taken_and_said(tmp_path, monkeypatch):
-    from scenes.calibration import speed
+    from scenes.calibration import shipped
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.study_file import read_study
     from tests.scenes.study_files import study_file
 
     monkeypatch.setenv("CFS_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(speed, "measured_speed", lambda: Speed(0.2, 0.002))
+    monkeypatch.setattr(shipped, "_speed_here", lambda: Speed(0.2, 0.002))
     study = read_study(study_file(tmp_path, 'methods = ["auto"]\n'))
     plan = settled(study, plan_of(study))
     assert "costs that ship with the program, scaled by a two-second test" in plan.cases[0].chosen
@@ -167,6 +167,16 @@ def test_the_machines_speed_is_measured_in_seconds(variant):
     assert 0 < found.rating < found.tracing
     # all threads, kernels that are compiled the first time among them; 4 s on two busy cores
     assert time.process_time() - start < 30
+
+
+def test_the_machine_is_tested_once_in_a_process(monkeypatch):
+    from scenes.calibration import shipped, speed
+
+    tested = iter([Speed(0.2, 0.002)])
+    monkeypatch.setattr(speed, "measured_speed", lambda: next(tested))
+    shipped._speed_here.cache_clear()
+    assert scaled_costs() == scaled_costs()
+    shipped._speed_here.cache_clear()
 
 
 def test_a_calibration_that_cannot_be_read_is_one_clear_line(tmp_path):

@@ -19,6 +19,8 @@ from scenes import cli
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from tests.conftest import REPOSITORY as ROOT
 
+pytestmark = pytest.mark.early
+
 # Loaded by nothing before the small files are read: the tracer, the readers of IFC, what draws
 HEAVY = ("mitsuba", "drjit", "ifcopenshell", "trimesh", "manifold3d", "matplotlib", "colour")
 # Modules that take `open_ifc` by its name

@@ -15,7 +15,7 @@ import pytest
 from tests import radiance
 
 pytest.importorskip("pyradiance")
-pytestmark = [pytest.mark.peer, pytest.mark.usefixtures("variant")]
+pytestmark = [pytest.mark.early, pytest.mark.peer, pytest.mark.usefixtures("variant")]
 
 DEMO = Path(str(files("scenes") / "demo"))
 WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
@@ -54,7 +54,8 @@ def radiance_illuminance(space, building, folder: Path) -> np.ndarray:
     return total
 
 
-@pytest.mark.parametrize("name", ["A", "B"])
+# room A is the quick twin of B: Radiance takes most of a minute for each
+@pytest.mark.parametrize("name", ["A", pytest.param("B", marks=pytest.mark.slow)])
 def test_year_of_illuminance(name, tmp_path):
     from bim.ifc.building import read_ifc
     from mitsuba_cfs import variants

@@ -34,6 +34,8 @@ from tests.scenes.quick_work import STOP, quick_work
 from tests.scenes.study_files import study_file
 from tests.thermal.test_study import study_file as thermal_file
 
+pytestmark = pytest.mark.early
+
 PV_STUDY = REPOSITORY / "scenes" / "demo" / "facade_pv.toml"
 WRITES_NOTHING = {"doctor", "bsdf check", "bsdf info", "bsdf eval"}
 ONE_LINE = 1

@@ -30,6 +30,8 @@ from scenes.study.one_case import compute_case
 from scenes.study.plan import plan_of
 from scenes.study.study_file import read_study as read_grid
 
+pytestmark = pytest.mark.early
+
 SCENES = Path(__file__).parents[2] / "scenes"
 SAMPLING = {
     "sensor_spacing": 1.0, "sensor_samples": 1024, "patch_samples": 512, "sun_points": 128,

@@ -13,6 +13,8 @@ import pytest
 from scenes.cli import run
 from scenes.quick import NOTE
 
+pytestmark = pytest.mark.early
+
 DEMO = Path(str(files("scenes") / "demo"))
 OFFICE = DEMO / "office.ifc"
 WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"

@@ -30,6 +30,8 @@ from scenes.room.room import compute_room, skies_for
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.run.options import JobOptions
 
+pytestmark = pytest.mark.early
+
 HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
 SMALL = RoomOptions.of(
     sensor_spacing=1.0, sensor_samples=8192, patch_samples=4096, sun_points=512,

@@ -15,6 +15,8 @@ from mitsuba_cfs.errors import DataError
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 
+pytestmark = pytest.mark.early
+
 OPTIONS = {"picture_hours": ("06-21 12",), "picture_size": 96}
 HOURS = 8760
 

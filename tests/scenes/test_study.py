@@ -26,6 +26,8 @@ from tests.conftest import REPOSITORY, default_signals
 from tests.scenes.study_files import BOX, CLIMATE, FEW_RAYS, SYSTEM, study_file
 from tests.scenes.study_noted import noted
 
+pytestmark = pytest.mark.early
+
 SECOND = f"""
 [[system]]
 name = "brighter"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[2]
@@ -48,3 +50,53 @@ def test_every_kept_function_goes_through_one_door() -> None:
         or re.search(r"cache=True, \*\*options", path.read_text())
     }
     assert found == doors
+
+
+CALL = """
+import sys, time
+from pathlib import Path
+import numpy as np
+from numba.core.caching import IndexDataCacheFile
+import increment
+kind, before = sys.argv[1:]
+act = getattr(IndexDataCacheFile, before, None)
+def waiting(*given):
+    Path(f"{kind}.waits").touch()
+    while not Path(f"{kind}.goes").exists():
+        time.sleep(0.01)
+    act(*given)
+if act:
+    setattr(IndexDataCacheFile, before, waiting)
+print(increment.increment(np.array([1], dtype=kind)))
+"""
+
+
+def test_processes_that_compile_at_once_never_get_each_others_code(tmp_path) -> None:
+    """Both have found the index empty; then one writes it last, and the other the code."""
+    (tmp_path / "increment.py").write_text(
+        "from mitsuba_cfs.compiled import compiled\n"
+        "@compiled()\ndef increment(x):\n    return x[0] + 1\n"
+    )
+    environment = os.environ | {
+        "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), str(REPOSITORY)]),
+    }
+
+    def start(kind: str, before: str = "-") -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", CALL, kind, before]
+        return subprocess.Popen(
+            command, cwd=tmp_path, env=environment, text=True, stdout=subprocess.PIPE
+        )
+
+    started = []
+    for kind, before in (("f8", "_save_index"), ("i8", "_save_data")):
+        started.append(start(kind, before))
+        end = time.monotonic() + 120
+        while not (tmp_path / f"{kind}.waits").exists():
+            assert started[-1].poll() is None and time.monotonic() < end
+            time.sleep(0.01)
+    for kind, process in zip(("f8", "i8"), started, strict=True):
+        (tmp_path / f"{kind}.goes").touch()
+        assert process.communicate(timeout=120)[0] and process.returncode == 0
+    found = {kind: start(kind).communicate(timeout=120)[0].strip() for kind in ("i8", "f8")}
+    assert found == {"i8": "2", "f8": "2.0"}

@@ -11,15 +11,30 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from scenes.evidence.validation.energyplus_cases import EPW_FILES, pairs
+from mitsuba_cfs.sky.epw import read_epw
+from scenes.evidence.benchmarks.thermal_year import EPW, glazing
+from scenes.evidence.validation.energyplus_cases import (
+    EPW_FILES,
+    FIRST_HOUR,
+    Site,
+    pairs,
+    simulate_case,
+)
 from scenes.evidence.validation.energyplus_loads import annual_loads
+from scenes.evidence.validation.energyplus_reference import DEMO_FILE, DEMO_ORIENTATIONS
 from scenes.evidence.validation.energyplus_statistics import (
     case_row,
     comfort_classification,
     pooled,
 )
 from scenes.evidence.validation.facade_sun import facade_sun, sun_steps
-from scenes.evidence.validation.reference_room import ORIENTATIONS, facade_normal
+from scenes.evidence.validation.reference_room import (
+    ORIENTATIONS,
+    RoomLight,
+    climate,
+    facade_normal,
+)
+from tests.conftest import REPOSITORY
 
 BARS = {
     "dgu": (0.2, 0.3),
@@ -53,8 +68,6 @@ def hold(table: pd.DataFrame) -> None:
 
 
 def test_sun_on_the_facade_is_energyplus_own(real_data, reference_data):
-    from mitsuba_cfs.sky.epw import read_epw
-
     weather = read_epw(real_data / "epw" / EPW_FILES["Houlton"])
     steps = sun_steps(weather, 6)
     columns = ["cfs", "ori", "I_inc", "I_beam", "I_sky"]
@@ -66,6 +79,22 @@ def test_sun_on_the_facade_is_energyplus_own(real_data, reference_data):
             error = values.reshape(-1, 6).mean(axis=1) - hours[name].to_numpy()
             # the table has one decimal: 0.03 rms; the sky model's tables have four digits
             assert np.sqrt(np.mean(error**2)) < 0.15, (orientation, name)
+
+
+def test_clear_glazing_meets_the_bars_in_the_demo_s_climate():
+    """Without other data: the demo's weather, and EnergyPlus' hours that the repository holds."""
+    weather = read_epw(EPW)
+    suns = {o: facade_sun(sun_steps(weather, 6), facade_normal(o)) for o in DEMO_ORIENTATIONS}
+    place, light = Site("Chicago", weather, climate(weather), suns), RoomLight()
+    stored = pd.read_csv(REPOSITORY / "tests/reference/energyplus_chicago" / DEMO_FILE)
+    air, window = BARS["dgu"]
+    for orientation, table in stored.groupby("ori"):
+        year = simulate_case(place, str(orientation), glazing(), light)
+        wall = year.surface_in_c.mean(axis=1)
+        found = {"T_air": year.air_c, "T_wall": wall, "T_win_in": year.window_inner_c[:, 0]}
+        for name, bar in (("T_air", air), ("T_wall", air), ("T_win_in", window)):
+            error = (found[name] - table[name].to_numpy())[FIRST_HOUR:]
+            assert np.sqrt(np.mean(error**2)) <= bar, (orientation, name)
 
 
 def test_better_closure_meets_the_bars_in_one_climate(real_data, reference_data):
@@ -94,8 +123,6 @@ def test_better_closure_meets_the_bars_in_all_cases(real_data, reference_data):
 
 @pytest.mark.slow
 def test_comfort_agrees(real_data, reference_data):
-    from mitsuba_cfs.sky.epw import read_epw
-
     outdoor = read_epw(real_data / "epw" / EPW_FILES["Frankfurt"]).dry_bulb_c
     total = None
     for theirs, ours in pairs(

@@ -6,31 +6,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests import radiance
+from .radiance_matrices import MATRICES, POINTS, SCENES, STORED, UP, Repeated
 
-from . import rooms
-
-pytest.importorskip("pyradiance")
-pytestmark = [pytest.mark.peer, pytest.mark.usefixtures("variant")]
-
-SCENES = {
-    "room": lambda: (*rooms.test_room(), rooms.obstruction()),
-    "L": rooms.l_shaped_room,
-    "skylight": lambda: (*rooms.skylight_room(), rooms.NOTHING),
-}
-POINTS = np.array([[1.0, 1.2, 0.85], [2.2, 2.6, 0.85], [3.0, 2.9, 0.85]])
-RAYS = 4000  # of a Klems patch
-RUNS = 10  # repetitions of Radiance, for its error
+pytestmark = pytest.mark.usefixtures("variant")
 
 
-def normal_scores(ours, values):
+def normal_scores(ours, theirs: Repeated):
     """(mean of theirs - ours) over the error of both, as scores of a unit normal.
 
     Theirs are few repetitions, so the quotient has Student's distribution; its quantiles are turned
     into the normal's.  Entries known to less than 10 % are counts of few rays, not normal.
     """
-    runs = len(values)
-    mean, error = values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(runs)
+    runs = theirs.runs
+    mean, error = theirs.mean, theirs.deviation / np.sqrt(runs)
     own = ours.standard_error**2
     both = np.sqrt(own + error**2)
     known = (both > 0) & (both < 0.1 * ours.values)
@@ -41,9 +29,10 @@ def normal_scores(ours, values):
     return np.sign(t) * stats.norm.isf(np.maximum(tail, 1e-12))
 
 
-def check(ours, theirs, axis: int, name: str):
+def check(ours, theirs: Repeated, name: str):
     z = normal_scores(ours, theirs)
-    total = theirs.mean(axis=0).sum(axis=axis) / ours.values.sum(axis=axis)
+    sums = ours.values.sum(axis=-1)
+    total = theirs.mean.sum(axis=-1) / sums
     print(
         f"{name}: {len(z)} entries, mean z {z.mean():.3f}, rms z {np.sqrt(np.mean(z**2)):.3f}, "
         f"beyond 1.96: {100 * np.mean(np.abs(z) > 1.96):.1f} %, beyond 3.29: "
@@ -55,50 +44,41 @@ def check(ours, theirs, axis: int, name: str):
     assert abs(z.mean()) < allowed
     assert 1 - allowed < np.sqrt(np.mean(z**2)) < 1 + allowed
     assert np.mean(np.abs(z) > 1.96) < 0.05 + allowed / 2
-    spread = theirs.sum(axis=axis + 1).std(axis=0, ddof=1) / np.sqrt(len(theirs))
+    spread = theirs.sum_deviation / np.sqrt(theirs.runs)
     error = 4 * np.hypot(spread, ours.sum_error.reshape(spread.shape))
-    assert np.all(np.abs(total - 1) < np.maximum(error / ours.values.sum(axis=axis), 0.005)), total
+    assert np.all(np.abs(total - 1) < np.maximum(error / sums, 0.005)), total
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_view_matrix(name, tmp_path):
+def ours(matrix: str, name: str):
+    """The same matrix by our tracer."""
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
     from mitsuba_cfs.trace.view_matrix import view_matrix
 
-    surfaces, groups, _ = SCENES[name]()
-    up = np.tile([0.0, 0.0, 1.0], (len(POINTS), 1))
-    ours = view_matrix(surfaces, groups, POINTS, up, samples=16384)
-    radiance.write_surfaces(surfaces, tmp_path / "room.rad")
-    theirs = []
-    for g, group in enumerate(groups):
-        radiance.write_group(group, tmp_path / f"group{g}.rad")
-        command = (
-            f"rfluxmtx -faf -I+ -n 2 -ab 10 -ad 12000 -lw 1e-6 -y {len(POINTS) * RUNS} "
-            f"- group{g}.rad room.rad"  # the other windows are holes, as good as black
-        )
-        text = radiance.sensors_text(np.tile(POINTS, (RUNS, 1)), np.tile(up, (RUNS, 1)))
-        out = radiance.read_float_matrix(radiance.run(command, tmp_path, text))
-        theirs.append(out.reshape(RUNS, len(POINTS), 145))
-    check(ours, np.stack(theirs, axis=2), 2, f"V, {name}")
+    surfaces, groups, outside = SCENES[name]()
+    if matrix == "view":
+        return view_matrix(surfaces, groups, POINTS, UP, samples=16384)
+    return daylight_matrix(outside, groups, subdivision=1, samples=8192)
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_daylight_matrix(name, tmp_path):
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_matrices_are_those_of_radiance(matrix, name):
+    stored = Repeated.read(STORED / f"{matrix}_{name}.npz")
+    check(ours(matrix, name), stored, f"{matrix}, {name}")
 
-    _, groups, outside = SCENES[name]()
-    ours = daylight_matrix(outside, groups, subdivision=1, samples=8192)
-    radiance.write_surfaces(outside, tmp_path / "outdoors.rad")
-    radiance.write_sky(tmp_path / "sky.rad", 1)
-    theirs = []
-    for g, group in enumerate(groups):
-        radiance.write_group(group, tmp_path / f"group{g}.rad")
-        # rfluxmtx's rays start with the same random numbers in each run: only another count of
-        # them, and so another division of the patch, makes a repetition
-        runs = [
-            f"rfluxmtx -ff -n 2 -ab 4 -ad 1 -lw 1e-6 -c {RAYS + 41 * i} "
-            f"group{g}.rad sky.rad outdoors.rad"
-            for i in range(RUNS)
-        ]
-        runs = [radiance.read_float_matrix(radiance.run(command, tmp_path)) for command in runs]
-        theirs.append(np.stack(runs))
-    check(ours, np.stack(theirs, axis=1), 2, f"D, {name}")
+
+@pytest.mark.peer
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_matrices_are_those_of_radiance_run_here_and_now(matrix, name, tmp_path):
+    pytest.importorskip("pyradiance")
+    theirs, stored = (
+        MATRICES[matrix](name, tmp_path),
+        Repeated.read(STORED / f"{matrix}_{name}.npz"),
+    )
+    check(ours(matrix, name), theirs, f"{matrix}, {name}")
+    # what is stored is what Radiance computes: both have the noise of their runs
+    error = np.hypot(theirs.sum_deviation, stored.sum_deviation) / np.sqrt(theirs.runs)
+    gap = np.abs(theirs.mean.sum(axis=-1) - stored.mean.sum(axis=-1))
+    assert np.all(gap <= 5 * error + 1e-4 * stored.mean.sum(axis=-1))

@@ -14,7 +14,7 @@ from mitsuba_cfs.surfaces import WindowGroup
 
 from . import rooms
 
-pytestmark = pytest.mark.usefixtures("variant")
+pytestmark = [pytest.mark.early, pytest.mark.usefixtures("variant")]
 
 UP = [0.0, 0.0, 1.0]
 
