@@ -7,7 +7,6 @@ from os import PathLike
 from pathlib import Path
 
 from bim.ifc.building import STAGES, read_ifc
-from bim.ifc.head import check_head
 from bim.model import Building
 from mitsuba_cfs.progress import Progress, silent, summed
 
@@ -22,6 +21,4 @@ def read_building(
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
         `problems`.
     """
-    path = Path(path)
-    check_head(path)
-    return read_ifc(path, join=join, progress=summed(progress, "inputs", STAGES))
+    return read_ifc(Path(path), join=join, progress=summed(progress, "inputs", STAGES))

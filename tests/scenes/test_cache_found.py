@@ -12,6 +12,8 @@ import pytest
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.demo.make_facade import facade
 from tests.scenes.study_files import study_file
+from tests.thermal.test_study import TRACE
+from tests.thermal.test_study import study_file as thermal_file
 
 pytestmark = pytest.mark.early
 
@@ -25,23 +27,6 @@ current = 8.05
 voltage = 29.8
 cells = 60
 """
-THERMAL = f"""
-weather = "{WEATHER}"
-[box]
-width = 4.0
-depth = 5.0
-height = 3.0
-[[box.window]]
-x = 0.5
-sill = 1.0
-width = 3.0
-height = 1.5
-[[system]]
-bsdf = "{VENETIAN_BLIND}"
-[trace]
-patch_samples = 256
-sensor_samples = 256
-"""
 
 
 def run_arguments(folder: Path) -> list[str]:
@@ -50,9 +35,7 @@ def run_arguments(folder: Path) -> list[str]:
 
 
 def thermal_arguments(folder: Path) -> list[str]:
-    path = folder / "room.toml"
-    path.write_text(THERMAL)
-    return ["thermal", str(path)]
+    return ["thermal", str(thermal_file(folder, TRACE))]
 
 
 def pv_arguments(folder: Path) -> list[str]:

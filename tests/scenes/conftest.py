@@ -1,0 +1,47 @@
+"""Fixtures of the tests of every command that writes (`tests.scenes.writing_jobs`)."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.scenes.quick_work import quick_work
+from tests.scenes.writing_jobs import JOBS, Place
+
+
+@pytest.fixture
+def own_cache(tmp_path_factory, monkeypatch):
+    """No file of the user's is touched."""
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path_factory.mktemp("cache")))
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch, own_cache) -> Callable[[str], Place]:
+    """The place of a job, whose command works quickly in this process."""
+    quick_work(monkeypatch.setattr)
+
+    def of(name: str, root: Path = tmp_path) -> Place:
+        for folder in ("inputs", "results"):
+            (tmp_path / folder).mkdir(exist_ok=True)
+        (root / "results").mkdir(exist_ok=True)
+        return Place(JOBS[name], tmp_path / "inputs", root / "results" / JOBS[name].name)
+
+    return of
+
+
+@pytest.fixture
+def small_disk(tmp_path) -> Iterator[Path]:
+    """A disk of a few megabytes; only root may mount one."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64m", "none", str(disk)],
+        capture_output=True, check=False,
+    )  # fmt: skip
+    if mounted.returncode:
+        pytest.skip("no disk can be mounted here")
+    yield disk
+    subprocess.run(["umount", "-l", str(disk)], check=False)

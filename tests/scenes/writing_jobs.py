@@ -1,0 +1,167 @@
+"""Every command that writes: how it is called, what it writes, the place that it writes to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mitsuba_cfs.files import TEMPORARY
+from mitsuba_cfs.images.hdr import write_hdr
+from mitsuba_cfs.images.view import fisheye
+from scenes import cli
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from tests.conftest import REPOSITORY
+from tests.scenes.study_files import study_file
+from tests.thermal.test_study import study_file as thermal_file
+
+PV_STUDY = REPOSITORY / "scenes" / "demo" / "facade_pv.toml"
+ONE_LINE = 1
+
+
+@dataclass(frozen=True)
+class Job:
+    """How a command is called, and what it writes."""
+
+    words: Callable[[Path, Path], list[object]]  # of the folder of inputs and the output
+    name: str = "out"  # of the output
+    folder: bool = False
+    adds: bool = False  # to a folder that may hold anything
+
+
+def to_folder(*words: object, **options) -> Job:
+    """A job that writes a folder of results."""
+    return Job(lambda _inputs, out: [*words, "--out", out], folder=True, **options)
+
+
+def _study(inputs: Path, out: Path) -> list[object]:
+    return ["study", study_file(inputs, "orientations_deg = [0, 90]\n"), "--out", out]
+
+
+def _measured(inputs: Path, out: Path) -> list[object]:
+    rows = "time,global_horizontal,diffuse_horizontal\n2020-06-21 12:00,500,200\n"
+    (inputs / "m.csv").write_text(rows + "2020-06-21 13:00,500,200\n")
+    place = ["--latitude", 49, "--longitude", 8, "--timezone", 1]
+    return ["sky", "measured", inputs / "m.csv", out, *place]
+
+
+def _glare(option: str) -> Callable[[Path, Path], list[object]]:
+    def words(inputs: Path, out: Path) -> list[object]:
+        view = fisheye([0, 0, 1], [0, 1, 0], 64)
+        write_hdr(inputs / "desk.hdr", np.full((64, 64), 500.0, np.float32), view)
+        return ["glare", option, out, inputs / "desk.hdr"]
+
+    return words
+
+
+GENERATE = "bsdf generate --depth-mm 80 --spacing-mm 72 --visible 0.5 --out".split()
+JOBS = {
+    "run": to_folder("run", OFFICE, "--weather", WEATHER, "--cfs", VENETIAN_BLIND),
+    "demo": to_folder("demo"),
+    "thermal": Job(
+        lambda inputs, out: ["thermal", thermal_file(inputs, ""), "--out", out], folder=True
+    ),
+    "pv": to_folder("pv", OFFICE, "--weather", WEATHER, "--study", PV_STUDY),
+    "dgp": to_folder("dgp"),
+    "study": Job(_study, folder=True),
+    "study --write-ifc": Job(
+        lambda inputs, out: [
+            "study", _study_of_the_office(inputs), "--out", inputs / "results", "--write-ifc", out,
+        ], "out.ifc",
+    ),
+    "ifc check": Job(lambda _, out: ["ifc", "check", OFFICE, "--csv", out], "out.csv"),
+    "ifc attach": Job(lambda _, out: ["ifc", "attach", OFFICE, "--all", "--u", 1.1, "-o", out],
+                      "out.ifc"),
+    "ifc export --radiance": Job(lambda _, out: ["ifc", "export", OFFICE, "--radiance", out],
+                                 folder=True, adds=True),
+    "ifc export --mitsuba": Job(lambda _, out: ["ifc", "export", OFFICE, "--mitsuba", out],
+                                folder=True, adds=True),
+    "ifc export --epjson": Job(lambda _, out: ["ifc", "export", OFFICE, "--epjson", out],
+                               "out.epJSON"),
+    "ifc export --gltf": Job(lambda _, out: ["ifc", "export", OFFICE, "--gltf", out], "out.glb"),
+    "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
+    "bsdf plot": Job(
+        lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out],
+        "out.png",
+    ),
+    "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
+    "bsdf combine": Job(
+        lambda _, out: ["bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", out], "out.xml"
+    ),
+    "bsdf combine --absorptances": Job(
+        lambda inputs, out: [
+            "bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", inputs / "both.xml",
+            "--absorptances", out,
+        ], "out.csv",
+    ),
+    "sky matrix": Job(lambda _, out: ["sky", "matrix", WEATHER, out, "-5", "-m", 1], "out.smx"),
+    "sky positions": Job(lambda _, out: ["sky", "positions", WEATHER, out], "out.csv"),
+    "sky wea": Job(lambda _, out: ["sky", "wea", WEATHER, out], "out.wea"),
+    "sky measured": Job(_measured, "out.wea"),
+    "sky cie": Job(lambda _, out: ["sky", "cie", "overcast", out], "out.smx"),
+    "glare -c": Job(_glare("-c"), "out.hdr"),
+    "glare --csv": Job(_glare("--csv"), "out.csv"),
+    "glare --png": Job(_glare("--png"), folder=True, adds=True),
+    **{
+        f"picture {kind}": Job(
+            lambda _, out: ["picture", "--at", "06-21 12:00", "--out", out], f"out.{kind}"
+        )
+        for kind in ("hdr", "exr", "png")
+    },
+    "calibrate": Job(lambda _, out: ["calibrate", "--out", out], "out.json"),
+    "bench": Job(lambda _, out: ["bench", "--json", out], "out.json"),
+}  # fmt: skip
+FOLDERS = [name for name, job in JOBS.items() if job.folder]
+OWN = [name for name in FOLDERS if not JOBS[name].adds]
+FILES = [name for name, job in JOBS.items() if not job.folder]
+
+
+def _study_of_the_office(inputs: Path) -> Path:
+    path = study_file(inputs)
+    text = path.read_text()
+    start, end = text.index("[[room]]"), text.index("[[system]]")
+    path.write_text(text[:start] + f'[[room]]\nbuilding = "{OFFICE}"\n' + text[end:])
+    return path
+
+
+@dataclass
+class Place:
+    """A folder of inputs, and the output of one command in another folder."""
+
+    job: Job
+    inputs: Path
+    out: Path
+
+    @property
+    def words(self) -> list[str]:
+        """What follows `cfs`."""
+        return [str(word) for word in self.job.words(self.inputs, self.out)]
+
+    def content(self) -> dict[str, bytes]:
+        """Every file beside and in the output, but for what a study or a year keeps on the way."""
+        root = self.out.parent
+        found = {p.relative_to(root).as_posix(): p for p in root.rglob("*") if p.is_file()}
+        return {
+            name: path.read_bytes()
+            for name, path in found.items()
+            if not {"cases", "ratings", "filler"} & set(name.split("/"))
+        }
+
+    def temporaries(self) -> list[Path]:
+        """What is left of unfinished work."""
+        roots = (self.out.parent, self.inputs)
+        return [p for root in roots for p in root.rglob("*") if TEMPORARY.fullmatch(p.name)]
+
+
+def refused(place: Place, capsys, *words: str, code: int = 1) -> str:
+    """The one line of a command that fails."""
+    capsys.readouterr()
+    assert cli.run(place.words) == code
+    told = capsys.readouterr().err
+    lines = [line for line in told.splitlines() if line.startswith(("error", "cfs"))]
+    assert len(lines) == ONE_LINE and "Traceback" not in told, told
+    assert all(word in lines[0] for word in words), lines
+    assert not place.temporaries()
+    return lines[0]
