@@ -89,13 +89,16 @@ def daylight_matrix(
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
-    tracer = TracedScene(surfaces, groups, windows_block=False)
+    something = len(surfaces.triangles) > 0  # light comes back to the windows
+    tracer = TracedScene(surfaces, groups, windows_block=something)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     n = int(samples)
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+        clear = tracer.outward(mi.Int32(paths.group), mi.Bool(True)) if something else 0.0
         add_daylight_paths(
-            tracer, sky, matrix, paths.patch, paths.position, paths.outward, paths.generator,
+            tracer, sky, matrix, paths.patch, mi.Point3f(paths.position + clear), paths.outward,
+            paths.generator,
             dr.opaque(mi.UInt32, max_depth), mi.Bool(True),
         )  # fmt: skip
 
