@@ -14,6 +14,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.methods.optics import States, SystemOptics, hourly_states, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.methods.subdivision import coarse_sky
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -37,6 +38,7 @@ class PhaseSystems:
             raise ValueError(f"systems of {len(systems)} groups for {len(traced.scene.groups)}")
         self.traced, self.systems = traced, systems
         self._seen: dict[tuple[int, ...], tuple[PictureSun, Outdoors]] = {}
+        self.straight = StraightViews(traced, systems)
 
     @property
     def states(self) -> int:
@@ -57,8 +59,10 @@ class PhaseSystems:
         optics = self.optics([state] * len(self.systems))
         view, daylight = self.traced.sensors.values, self.traced.daylight.values
         through = np.stack([o.transmission @ d for o, d in zip(optics, daylight, strict=True)])
-        count = len(self.traced.scene.points)
-        return np.einsum("sqk,qkp->sp", view[:count], through, optimize=True)
+        found = np.einsum("sqk,qkp->sp", view, through, optimize=True)
+        for g in range(len(self.systems)):
+            found += self.straight.coefficients(g, min(state, len(self.systems[g]) - 1))
+        return found[: len(self.traced.scene.points)]
 
     def seen_sun(self, state: tuple[int, ...]) -> tuple[PictureSun, Outdoors]:
         """The sun and the outdoors in the view's pixels, with each group in a state."""
@@ -174,17 +178,22 @@ class PhaseLight:
         return error[: len(self._traced.scene.points)]
 
     def _subdivision_error(self, g: int, row: NDArray[np.int64]) -> NDArray[np.float64]:
-        """What D as a mean over the parts of a group changes in each sensor's mean [S + 1]."""
+        """What D as a mean over the parts of a group changes in each sensor's mean [S]."""
         points, normals = self._traced.scene.sensors()
-        found = np.zeros(len(points))
+        found, straight = np.zeros(len(points)), 0.0
         if not self._traced.parts.cells:
             return found
         for j, optics in enumerate(self.filled.systems[g]):
             sky = self._diffuse_sky[:, row == j].sum(axis=1, keepdims=True) / len(row)
-            if sky.any():
-                cells = self._traced.parts.cells[g]
-                found += cells.error(points, normals, optics.transmission, sky)[:, 0]
-        return found
+            if not sky.any():
+                continue
+            through, seen = optics.transmission, self.filled.straight.matrix(g, j)
+            if seen is not None:
+                through = through - np.diag(self.filled.straight.beam(g, j))
+                mean = self.sky.whole[:, row == j].sum(axis=1) / len(row)
+                straight = straight + seen.error_of(mean) ** 2
+            found += self._traced.parts.cells[g].error(points, normals, through, sky)[:, 0]
+        return np.sqrt(found**2 + straight)
 
     @cached_property
     def _diffuse_sky(self) -> NDArray[np.float64]:
@@ -225,8 +234,8 @@ class PhaseLight:
         return found
 
     def _sensor_light(self, g: int, j: int, exact: list[Estimate | None]) -> SensorLight:
-        parts = np.flatnonzero(self._traced.parts.group == g)
-        diffuse = sum(self._diffuse_light(q, g, j) for q in parts)
+        diffuse = sum(self._diffuse_light(q, g, j) for q in self._traced.parts.of(g))
+        diffuse = diffuse + self.filled.straight.light(g, j, self.sky)
         if not self._traced.five_phase:
             return SensorLight(diffuse, None, 0.0)
         sun, shining = np.zeros_like(diffuse), self._shining()

@@ -21,7 +21,7 @@ from mitsuba_cfs.surfaces import WindowGroup
 from mitsuba_cfs.window_parts import Cells, Region, cut_group
 
 LIMIT = 0.01  # share of the light that D's mean may be wrong by, root mean square of the places
-MOST_PARTS = 16  # of a group
+MOST_PARTS = 8  # of a group
 SKY = ReinhartSky(1)  # of the cells' matrices
 SUN_ALTITUDE = np.radians(35)  # of the clear skies that the parts are judged by
 DEPTHS = (0.5, 1.0, 2.0, 4.0)  # into the room, of the places that the parts are judged at [m]
@@ -104,6 +104,10 @@ class Parts:
         pieces = [cut_group(light.group, light.regions) for light in cells]
         group = np.repeat(np.arange(len(cells)), [len(found) for found in pieces])
         return cls(tuple(part for found in pieces for part in found), group, cells)
+
+    def of(self, g: int) -> NDArray[np.int64]:
+        """The parts of a window group."""
+        return np.flatnonzero(self.group == g)
 
     def of_groups(self, values: Array) -> Array:
         """The mean over each group [G, ...] of values of the parts [Q, ...], by area."""

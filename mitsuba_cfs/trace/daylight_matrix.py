@@ -34,8 +34,10 @@ def add_daylight_paths(
     generator: mi.PCG32,
     max_depth: mi.UInt32,
     active: mi.Bool,
+    weight: mi.Float | None = None,  # of each path, 1 by default
 ) -> None:
     """Follow each path to the sky, where the patch it meets gains the product of reflectances."""
+    weight = mi.Float(1.0 if weight is None else weight)
     beta = mi.Float(1.0)
     depth = mi.UInt32(0)
     while active:
@@ -43,7 +45,7 @@ def add_daylight_paths(
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         free = active & ~hit.is_valid()
         slot = row * mi.UInt32(sky.size) + sky.index(direction)
-        dr.scatter_add(matrix, mi.Float64(beta), slot, free)
+        dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
 
         face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
