@@ -68,8 +68,10 @@ def faces_and_windows(
         kind = _kind(piece, behind, records)
         counts[kind] += 1
         faces.append(
-            _face(f"{kind} {counts[kind]}", kind, piece, triangles, behind, records, reflectances,
-                  assumed)
+            _face(
+                f"{kind} {counts[kind]}", kind, piece, triangles, behind,
+                records=records, reflectances=reflectances, assumed=assumed,
+            )
         )  # fmt: skip
     return faces, [_window(parts) for parts in glass.values()], assumed
 
@@ -95,6 +97,7 @@ def _face(
     piece: Piece,
     triangles: NDArray[np.float64],
     behind: Beyond,
+    *,
     records: Sequence[ElementRecord],
     reflectances: NDArray[np.float64],
     assumed: Counter,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from bim.planes import SMALLEST_AREA
+from mitsuba_cfs.errors import RoomError
 
 OFF_THE_VERTEX = 1.3e-5  # the cut is made this much higher, off sills at a round height [m]
 GRID = 1e-7  # coordinates of a cut are rounded to this [m]
@@ -70,13 +71,13 @@ def sensor_grid(
     A square grid of `spacing`, `height` above the floor, at least `margin` from what bounds the
     room there (EN 17037:2018: 0.85 m and 0.5 m; LM-83: 0.76 m); its rows follow the longest wall
     and its middle is the room's.  Where the margin leaves nothing it is halved until it does.
+
+    Raises: `RoomError` for a room that is lower than its work plane.
     """
     if spacing <= 0 or margin < 0:
         raise ValueError("the spacing must be positive and the margin not negative")
+    section = _section(space, height)
     z = space.floor_level + height
-    section = horizontal_section(space.shell, z)
-    if section.is_empty:
-        raise ValueError(f"space {space.label}: no room at {height} m above the floor")
     work_plane = section.buffer(-margin, join_style="mitre")
     while work_plane.area < SMALLEST_AREA and margin > 0.01:
         margin *= 0.5
@@ -84,6 +85,16 @@ def sensor_grid(
     flat = _grid_inside(work_plane, spacing)
     points = np.column_stack([flat, np.full(len(flat), z)])
     return points, np.tile([0.0, 0.0, 1.0], (len(points), 1))
+
+
+def _section(space: Space, height: float) -> shapely.Geometry:
+    """The room's outline at a height above its floor [m]."""
+    if not space.faces:
+        raise RoomError(f"space {space.label}: has no faces")
+    section = horizontal_section(space.shell, space.floor_level + height)
+    if section.is_empty:
+        raise RoomError(f"space {space.label}: no room at {height} m above the floor")
+    return section
 
 
 def _grid_inside(area: shapely.Geometry, spacing: float) -> NDArray[np.float64]:
@@ -122,11 +133,11 @@ def view_point(
     """Position [3] [m] in the middle of the room, horizontal direction [3] to its biggest window.
 
     Without a window the view is along the room's longest edge; 1.2 m is a seated eye (EN 17037).
+
+    Raises: `RoomError` for a room that is lower.
     """
+    section = _section(space, eye_height)
     z = space.floor_level + eye_height
-    section = horizontal_section(space.shell, z)
-    if section.is_empty:
-        raise ValueError(f"space {space.label}: no room at {eye_height} m above the floor")
     middle = section.centroid
     if not section.buffer(-0.05).contains(middle):
         middle = shapely.point_on_surface(section.buffer(-0.05) or section)

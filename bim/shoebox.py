@@ -14,6 +14,7 @@ from bim.defaults import ROOM_REFLECTANCE, default_construction
 from bim.model import Building, Construction, Element, Face, Space, Window
 from bim.planes import Facet, Plane, plane_through, polygons_of
 from bim.shell import conforming_triangles
+from mitsuba_cfs.errors import RoomError
 
 T = TypeVar("T")
 SIDES = ("front", "right", "back", "left", "floor", "ceiling")
@@ -73,7 +74,7 @@ def shoebox(
         elements: what stands outdoors.
     """
     if min(width, depth, height) <= 0 or recess < 0:
-        raise ValueError("width, depth and height must be positive, the recess not negative")
+        raise RoomError("width, depth and height must be positive, the recess not negative")
     for w in windows:
         if w.side not in SIDES or w.side == "floor":
             raise ValueError(f"window side {w.side!r}: expected one of {SIDES}, not the floor")
@@ -184,11 +185,11 @@ def _side_facets(
         x1, y1 = w.x + w.width, w.sill + w.height
         opening = shapely.box(w.x, w.sill, x1, y1)
         if w.width <= 0 or w.height <= 0 or not shapely.box(0, 0, *size).covers(opening):
-            raise ValueError(f"window {index}: does not lie inside the {side} side")
+            raise RoomError(f"window {index}: does not lie inside the {side} side")
         if not wall.covers(opening):
-            raise ValueError(f"window {index}: overlaps another window")
+            raise RoomError(f"window {index}: overlaps another window")
         if not 0 <= 2 * w.frame < min(w.width, w.height):
-            raise ValueError(f"window {index}: the frame covers the opening")
+            raise RoomError(f"window {index}: the frame covers the opening")
         wall = wall.difference(opening)
         glass = shapely.box(w.x + w.frame, w.sill + w.frame, x1 - w.frame, y1 - w.frame)
         frame = polygons_of(opening.difference(glass))

@@ -8,8 +8,7 @@ import numpy as np
 
 from bim.model import Building, Element, Face, Space, Window
 from mitsuba_cfs.directions import window_frame
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.surfaces import Window as Aperture
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 
 SAME_ORIENTATION = 5e-4  # difference between frame axes [1] within a group: 0.03 degrees
 COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
@@ -62,7 +61,7 @@ def window_groups(space: Space) -> list[WindowGroup]:
     groups.sort(key=lambda group: -round(sum(window.area for window in group), 6))
     names = _unique([orientation_name(group[0]) for group in groups])
     return [
-        WindowGroup(name, tuple(Aperture(w.name, w.triangles) for w in group))
+        WindowGroup(name, tuple(WindowSurface(w.name, w.triangles) for w in group))
         for name, group in zip(names, groups, strict=True)
     ]
 

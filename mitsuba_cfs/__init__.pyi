@@ -47,12 +47,17 @@ from .methods.scene import DaylightScene as DaylightScene
 from .metrics.room import RoomMetrics as RoomMetrics, room_metrics as room_metrics
 from .sky.annual import AnnualSky as AnnualSky, annual_sky as annual_sky
 from .sky.cie import cie_patches as cie_patches
+from .sky.epw import read_epw as read_epw
 from .sky.matrix import sky_matrix as sky_matrix
 from .sky.patches import ReinhartSky as ReinhartSky
 from .sky.sun import sun_directions as sun_directions
 from .sky.wea import read_wea as read_wea
-from .sky.weather import Weather as Weather, read_epw as read_epw
-from .surfaces import Surfaces as Surfaces, Window as Window, WindowGroup as WindowGroup
+from .sky.weather import Weather as Weather
+from .surfaces import (
+    Surfaces as Surfaces,
+    WindowGroup as WindowGroup,
+    WindowSurface as WindowSurface,
+)
 from .trace.daylight_matrix import daylight_matrix as daylight_matrix
 from .trace.estimate import Estimate as Estimate, Stopping as Stopping
 from .trace.view_matrix import view_matrix as view_matrix

@@ -25,5 +25,9 @@ class DataError(CfsError, ValueError):
         super().__init__(": ".join([*where, message]))
 
 
+class RoomError(CfsError, ValueError):
+    """A room that cannot be computed: no work plane, no closed zone.  Other rooms may go on."""
+
+
 class VariantError(CfsError, RuntimeError):
     """No usable Mitsuba variant or LLVM library: says what to install."""

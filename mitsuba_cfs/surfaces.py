@@ -42,7 +42,7 @@ class Surfaces:
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class WindowSurface:
     """A plane glazed aperture; its normal points outdoors."""
 
     name: str
@@ -77,7 +77,7 @@ class WindowGroup:
     """Windows of one orientation and one fenestration system: one set of phase matrices."""
 
     name: str
-    windows: tuple[Window, ...]
+    windows: tuple[WindowSurface, ...]
 
     def __post_init__(self) -> None:
         if not self.windows:

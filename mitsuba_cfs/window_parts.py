@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.surfaces import Window, WindowGroup, triangle_areas
+from mitsuba_cfs.surfaces import WindowGroup, WindowSurface, triangle_areas
 
 CELLS = 144  # of a group, about; a window has no fewer than `LEAST_CELLS`
 LEAST_CELLS = 6
@@ -88,7 +88,7 @@ def cut_group(group: WindowGroup, regions: Sequence[Region]) -> list[WindowGroup
     return found
 
 
-def _cut_window(window: Window, group: WindowGroup, region: Region) -> Window | None:
+def _cut_window(window: WindowSurface, group: WindowGroup, region: Region) -> WindowSurface | None:
     """What of a window lies in a region; None where nothing does."""
     triangles = window.triangles @ group.frame.T
     depth = triangles[..., 2].mean()

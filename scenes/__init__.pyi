@@ -1,9 +1,13 @@
 """The names of `import scenes`, and the modules that they come from."""
 
-from .job.building import read_building as read_building
-from .job.inputs import System as System, read_system as read_system, read_weather as read_weather
-from .job.operation import Operation as Operation, read_operation as read_operation
-from .job.options import RoomOptions as RoomOptions
+from .run.building import read_building as read_building
+from .fenestration.systems import (
+    FenestrationSystem as FenestrationSystem,
+    read_system as read_system,
+)
+from .run.inputs import read_weather as read_weather
+from .room.operation import Operation as Operation, read_operation as read_operation
+from .room.options import RoomOptions as RoomOptions
 from .results import (
     DaylightResult as DaylightResult,
     GlareResults as GlareResults,

@@ -10,16 +10,16 @@ from bim.model import Space, Window
 from bim.to_energyplus import DEFAULT_G, DEFAULT_U, UAndG
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.surfaces import WindowGroup
-from scenes.fenestration import (
+from scenes.fenestration.resolver import (
     held_systems,
     source_notes,
     stated_u_and_g,
     window_sources,
     windows_named,
 )
-from scenes.job.inputs import Given, System
-from scenes.job.thermal_system import checked_system
-from scenes.job.windows import room_windows
+from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.thermal_system import checked_system
+from scenes.room.windows import room_windows
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class KnownFenestration:
 
     file: Path
     windows: tuple[Window, ...]
-    systems: dict[str, System]  # by window GUID
+    systems: dict[str, FenestrationSystem]  # by window GUID
     unfilled: dict[str, list[str]]  # names of the other windows, by what is missing of them
 
     def notes(self) -> tuple[str, ...]:
@@ -58,7 +58,7 @@ class KnownFenestration:
 
     def groups(self, space: Space) -> list[tuple[WindowGroup, BsdfFile | None]]:
         """The window groups of a room by orientation and system, with their Klems matrices."""
-        nothing = System("unknown", None, None)
+        nothing = FenestrationSystem("unknown", None, None)
         systems = {w.guid: (self.systems.get(w.guid, nothing),) for w in space.windows}
         windows = room_windows(space, systems)
         bands = (

@@ -11,10 +11,12 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.files import check_names
-from scenes.job.inputs import Given, given_light, read_weather
+from scenes.fenestration.systems import Given, given_light
 from scenes.picture_options import PictureOptions
+from scenes.room.picture_hours import PictureHourError
 from scenes.room_views import NamedView, given_views
+from scenes.run.files import check_names
+from scenes.run.inputs import read_weather
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class PictureFiles:
 def read_files(options: PictureOptions) -> PictureFiles:
     """The hour, the view and the system of a picture, the quick ones first.
 
-    Raises: `DataError` for a file that cannot be used, `ValueError` for a wrong hour.
+    Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
     """
     check_head(options.building)
     corrections_beside(options.building)
@@ -46,12 +48,13 @@ def hour_of(weather: Weather, at: str) -> int:
     try:
         asked = pd.to_datetime(f"2000-{at}", format="%Y-%m-%d %H:%M")
     except ValueError:
-        raise ValueError(f"--at {at}: expected month-day hour:minute, as 06-21 12:00") from None
+        message = f"--at {at}: expected month-day hour:minute, as 06-21 12:00"
+        raise PictureHourError(message) from None
     middles = weather.midpoints
     same_day = (middles.month == asked.month) & (middles.day == asked.day)
     found = np.flatnonzero(same_day & (middles.hour == asked.hour))
     if not len(found):
-        raise ValueError(f"--at {at}: the weather of {weather.site} has no such hour")
+        raise PictureHourError(f"--at {at}: the weather of {weather.site} has no such hour")
     return int(found[0])
 
 

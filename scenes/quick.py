@@ -9,7 +9,7 @@ NOTE = (
     "results to rely on."
 )
 
-ROOM = {  # of `scenes.job.options.RoomOptions`: `cfs run` and `cfs study`
+ROOM = {  # by the names of `scenes.room.options.NAMES`: `cfs run` and `cfs study`
     "picture_count": 1,
     "picture_size": 200,
     "picture_samples": 4,

@@ -28,7 +28,7 @@ MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class FolderMark:
     """What a mark says: the command that made the folder, and the files that it wrote."""
 
     command: str
@@ -36,7 +36,7 @@ class Mark:
     removed: tuple[str, ...] = ()  # of finished results: earlier files that go for them
 
     @classmethod
-    def read(cls, folder: Path) -> Mark | None:
+    def read(cls, folder: Path) -> FolderMark | None:
         """The mark of a folder; None where there is none of ours."""
         try:
             record = json.loads((folder / MARK).read_text(encoding="utf-8"))
@@ -125,7 +125,7 @@ class ResultFolder:
             earlier = set(filter(gone, earlier))
         elif self._adding:
             earlier = set()
-        Mark(self._command, files, tuple(earlier)).write(part)
+        FolderMark(self._command, files, tuple(earlier)).write(part)
 
     def kept(self, name: str) -> Path:
         """A folder inside for what is kept while the command works; it is never cleared."""
@@ -153,15 +153,15 @@ class ResultFolder:
     def _finish_cut_off(self) -> None:
         """Do what a killed process left: finished results go in place, the rest goes."""
         for part in stale(self._place):
-            if part.is_dir() and Mark.read(part) is not None:
-                self._mark = Mark.read(self._place) or Mark(self._command)
+            if part.is_dir() and FolderMark.read(part) is not None:
+                self._mark = FolderMark.read(self._place) or FolderMark(self._command)
                 self._put_in_place(part)
         remove_stale(self._place)
         remove_stale(self._place.parent)
 
-    def _own_mark(self) -> Mark:
+    def _own_mark(self) -> FolderMark:
         """The mark of the earlier results, or an empty one."""
-        mark = Mark.read(self._place)
+        mark = FolderMark.read(self._place)
         if mark is None:
             others = self._place.is_dir() and any(
                 not TEMPORARY.fullmatch(one.name) for one in self._place.iterdir()
@@ -170,7 +170,7 @@ class ResultFolder:
                 raise self._error(
                     f"holds other files (and no {MARK} of earlier results): name another folder"
                 )
-            return Mark(self._command)
+            return FolderMark(self._command)
         if mark.command != self._command:
             raise self._error(f"holds results of `cfs {mark.command}`: name another folder")
         return mark
@@ -185,7 +185,7 @@ class ResultFolder:
 
     def _put_in_place(self, part: Path) -> None:
         """Move the finished files in; the mark is the last, and a cut is taken up from `part`."""
-        done = Mark.read(part)
+        done = FolderMark.read(part)
         if self._mark is None or done is None:
             raise RuntimeError("no mark of the earlier results, or of the finished part")
         old = set(self._mark.files)
@@ -198,7 +198,7 @@ class ResultFolder:
             (part / name).replace(self._place / name)
         _remove(self._place, old.intersection(done.removed))
         files = old.difference(done.removed).union(done.files)
-        self._mark = Mark(done.command, tuple(files))
+        self._mark = FolderMark(done.command, tuple(files))
         self._mark.write(self._place)
 
     def _set_aside(self, part: Path, name: str) -> None:

@@ -118,7 +118,7 @@ class RoomYear:
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: NDArray[np.float64] | None = None  # [n] of the metric and hours asked for
     problems: tuple[Problem, ...] = ()  # that tracing found
-    like: str = ""  # name of the room alike that these results were computed for; "": this one
+    template: str = ""  # name of the equal room that was computed; "": this one
 
     @property
     def hours(self) -> pd.DataFrame:
@@ -149,4 +149,4 @@ class RunResult:
     problems: tuple[Problem, ...]
     manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know
-    method: str = "three-phase"  # one of scenes.job.options.METHODS
+    method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS

@@ -14,17 +14,18 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
 from scenes import quick as quick_run
-from scenes.job.files import JobFiles
-from scenes.job.inputs import Given, System
-from scenes.job.operation import Operation
-from scenes.job.options import JobOptions
-from scenes.job.outputs import write_results
-from scenes.job.run import job_inputs, run_inputs
-from scenes.job.thermal_system import checked_system
+from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.thermal_system import checked_system
 from scenes.report import write_report
 from scenes.report.headline import cards
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
+from scenes.room.operation import Operation
+from scenes.room.options import RoomOptions
+from scenes.run.files import JobFiles
+from scenes.run.options import JobOptions
+from scenes.run.outputs import write_results
+from scenes.run.run import job_inputs, run_inputs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,7 +75,7 @@ class SimulatedYear(RoomYear):
 
 def simulate(
     room: Room,
-    system: System | None,
+    system: FenestrationSystem | None,
     weather: Weather,
     *,
     operation: Operation | None = None,
@@ -96,7 +97,7 @@ def simulate(
         quick: few rays and one small picture, for a first look, as `--quick`.
         cache: keep traced matrices in the user's cache and find them again.
         progress: called with each stage and how much of it is done.
-        options: the fields of `RoomOptions`, such as `method`, `seed`, `annual_glare`.
+        options: choices by the names of `RoomOptions.of`, such as `method`, `seed`, `annual_glare`.
 
     Raises: `DataError` for a room that cannot be computed, a window without a system.
     """
@@ -115,7 +116,7 @@ def simulate(
         spaces=(room.space.guid,),
         cache=cache,
         quick=quick,
-        **options,
+        room=RoomOptions.of(**options),
     )
     states = () if operation is None else operation.systems
     states = states if system is None else (system,)

@@ -6,13 +6,21 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mitsuba_cfs.errors import DataError
 
 T = TypeVar("T", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class TomlTable(BaseModel):
+    """A table that takes no key which it does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def read_table(path: Path) -> dict[str, Any]:

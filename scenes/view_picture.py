@@ -18,11 +18,11 @@ from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import annual_sky
-from scenes.job.seen_room import read_seen_room
 from scenes.picture_files import PictureFiles, read_files
 from scenes.picture_options import SUFFIXES, PictureOptions
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.room_views import check_eye
+from scenes.run.viewed_room import read_viewed_room
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,22 +46,26 @@ def room_picture(
     files = files or read_files(options)
     weather, hour = files.weather, files.hour
 
-    def look(space: Space) -> View:
+    def view_of(space: Space) -> View:
         if files.view is None:
             return fisheye(*view_point(space, options.eye_height), options.size)
         check_eye(files.view, space)
         return fitted(files.view.view, options.size)
 
     steps = part(progress, 0.0, 0.4)
-    seen = read_seen_room(options.building, options.space, options.join, files.given, look, steps)
+    viewed = read_viewed_room(
+        options.building, options.space, options.join, files.given, view_of, steps
+    )
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
-    light = PathSystems(seen.scene, seen.optics, sampling).light(
+    light = PathSystems(viewed.scene, viewed.optics, sampling).light(
         annual_sky(weather, sampling.subdivision, hours=[hour])
     )
     luminance = light.picture(0, progress=part(progress, 0.4, 1.0, "picture"))
-    notes = (*seen.notes(), *weather.notes)
-    return RoomPicture(luminance, seen.scene.view, seen.space.label, weather.midpoints[hour], notes)
+    notes = (*viewed.notes(), *weather.notes)
+    return RoomPicture(
+        luminance, viewed.scene.view, viewed.space.label, weather.midpoints[hour], notes
+    )
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Who may import whom (DESIGN.md), and the rules of size and naming, read from the source."""
+"""Which package may import which, and the rules of size and naming, read from the source."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-REPOSITORY = Path(__file__).parent.parent
-PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
+from tests.modules import EVIDENCE, MODULES, PACKAGES, REPOSITORY, dotted, file_name, imports
+
 MAY_IMPORT = {
     "mitsuba_cfs": {"mitsuba_cfs"},
     "thermal": {"thermal"},
@@ -37,7 +36,8 @@ TRACING = (
 SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
-        "by_name", "glare", "optics", "path_light", "phase_light", "phase_scene", "view_cache",
+        "by_name", "glare", "optics", "path_light", "phase_light", "phase_scene",
+        "straight_views", "view_cache",
     )
 )  # fmt: skip
 IFC = ("bim/ifc/", "scenes/demo/")
@@ -48,43 +48,8 @@ LIMITED = {
     "ifcopenshell": IFC,
     "matplotlib": PLOTTING,
 }
-EVIDENCE = "scenes/evidence/"  # imports the product, never the other way
 LONGEST_MODULE = 400
 CATCH_ALL_NAMES = {"utils.py", "util.py", "common.py", "helpers.py", "misc.py"}
-
-MODULES = sorted(path for package in PACKAGES for path in (REPOSITORY / package).rglob("*.py"))
-
-
-def _name(path: Path) -> str:
-    return path.relative_to(REPOSITORY).as_posix()
-
-
-def _imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
-    """Top-level names of all modules imported anywhere in a module, with the line.
-
-    `import_module("x")` and `find_spec("x")` with a plain text count too.
-    """
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name.partition(".")[0], node.lineno) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            yield node.module.partition(".")[0], node.lineno
-        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
-            called = ast.unparse(node.func).rpartition(".")[2]
-            if called in {"import_module", "find_spec", "__import__"}:
-                yield str(node.args[0].value).partition(".")[0], node.lineno
-
-
-def _evidence_imports(tree: ast.AST) -> Iterator[int]:
-    """Lines that import a module of `scenes.evidence`."""
-    for node in ast.walk(tree):
-        names: list[str] = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        if any(f"{name}.".startswith("scenes.evidence.") for name in names):
-            yield node.lineno
 
 
 def _faults(name: str, source: str) -> list[str]:
@@ -92,18 +57,19 @@ def _faults(name: str, source: str) -> list[str]:
     tree = ast.parse(source)
     package = name.partition("/")[0]
     faults = []
-    for imported, line in _imports(tree):
+    for whole, line in dict.fromkeys(imports(tree)):
+        imported = whole.partition(".")[0]
         if imported in PACKAGES and imported not in MAY_IMPORT[package]:
             faults.append(f"{name}:{line}: {package} must not import {imported}")
         if imported in LIMITED and not name.startswith(LIMITED[imported]):
             faults.append(f"{name}:{line}: {imported} only in {', '.join(LIMITED[imported])}")
+        if not name.startswith(EVIDENCE) and f"{whole}.".startswith("scenes.evidence."):
+            faults.append(f"{name}:{line}: {EVIDENCE} is no part of it")
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and any(alias.name == "*" for alias in node.names):
             faults.append(f"{name}:{node.lineno}: import *")
-    if not name.startswith(EVIDENCE):
-        faults += [
-            f"{name}:{line}: {EVIDENCE} is no part of it" for line in _evidence_imports(tree)
-        ]
+        if isinstance(node, ast.ImportFrom) and node.level:
+            faults.append(f"{name}:{node.lineno}: a module is imported by its whole name")
     if len(source.splitlines()) > LONGEST_MODULE:
         faults.append(f"{name}: longer than {LONGEST_MODULE} lines")
     if Path(name).name in CATCH_ALL_NAMES:
@@ -113,9 +79,9 @@ def _faults(name: str, source: str) -> list[str]:
     return faults
 
 
-@pytest.mark.parametrize("path", MODULES, ids=_name)
+@pytest.mark.parametrize("path", MODULES, ids=file_name)
 def test_module_keeps_to_the_rules(path: Path) -> None:
-    assert not _faults(_name(path), path.read_text())
+    assert not _faults(file_name(path), path.read_text())
 
 
 @pytest.mark.parametrize(
@@ -129,8 +95,9 @@ def test_module_keeps_to_the_rules(path: Path) -> None:
         ("bim/x.py", "import ifcopenshell.geom"),
         ("bim/x.py", "import matplotlib.pyplot as plt"),
         ("bim/x.py", "from bim.model import *"),
+        ("bim/x.py", "from . import model"),
         ("scenes/x.py", "from scenes import evidence"),
-        ("scenes/job/x.py", "def f():\n    from scenes.evidence.benchmarks import harness"),
+        ("scenes/room/x.py", "def f():\n    from scenes.evidence.benchmarks import harness"),
         ("bim/utils.py", ""),
         ("bim/x.py", "x = 1\n" * 401),
         ("bim/x.py", "def f():\n    print(1)\n"),
@@ -141,7 +108,7 @@ def test_planted_fault_is_found(name: str, source: str) -> None:
 
 
 def test_modules_were_found() -> None:
-    assert {_name(path).partition("/")[0] for path in MODULES} == set(PACKAGES)
+    assert {file_name(path).partition("/")[0] for path in MODULES} == set(PACKAGES)
 
 
 def test_the_wheel_holds_exactly_the_four_packages() -> None:
@@ -154,7 +121,7 @@ def test_the_wheel_holds_exactly_the_four_packages() -> None:
 
 def test_every_folder_of_modules_is_a_package() -> None:
     folders = {path.parent for path in MODULES}
-    missing = [_name(folder) for folder in folders if not (folder / "__init__.py").is_file()]
+    missing = [file_name(folder) for folder in folders if not (folder / "__init__.py").is_file()]
     assert not missing, "these would be left out of the wheel"
 
 
@@ -165,18 +132,16 @@ def test_data_files_are_packed_into_the_wheel(package: str) -> None:
     endings = {pattern.removeprefix("**/*") for pattern in settings["package-data"]["*"]}
     files = [path for path in (REPOSITORY / package).rglob("*") if path.is_file()]
     data = [path for path in files if path.suffix not in {".py", ".pyc", ".nbi", ".nbc"}]
-    unpacked = [_name(path) for path in data if path.suffix not in endings]
+    unpacked = [file_name(path) for path in data if path.suffix not in endings]
     assert not unpacked
 
 
 def test_modules_that_trace_no_rays_start_without_mitsuba() -> None:
     """Importing a reader, a table or a formula must not start Dr.Jit (and choose its LLVM)."""
-    names = [_name(path) for path in MODULES]
+    names = [file_name(path) for path in MODULES]
     tracing = [place for place in TRACING if place != "mitsuba_cfs/variants.py"]
     pure = [name for name in names if not name.startswith((*tracing, *SOLVERS, "scenes/"))]
-    modules = [
-        name.removesuffix(".py").removesuffix("/__init__").replace("/", ".") for name in pure
-    ]
+    modules = [dotted(name) for name in pure]
     code = "\n".join(
         [
             "import importlib, sys",

@@ -116,7 +116,7 @@ from scenes.demo import VENETIAN_BLIND
 bsdf = cfs.read_bsdf_xml(str(VENETIAN_BLIND)).band("Visible")
 optics = cfs.BsdfOptics(cfs.klems_of(bsdf), bsdf)
 pane = np.array([[[0, 0, 0], [1, 0, 0], [1, 0, 1.0]]])
-groups = [cfs.WindowGroup("south", (cfs.Window("pane", pane),))]
+groups = [cfs.WindowGroup("south", (cfs.WindowSurface("pane", pane),))]
 points = np.array([[0.5, 1.0, 0.3]])
 scene = cfs.DaylightScene(
     cfs.Surfaces.none(), cfs.Surfaces.none(), groups, points, np.array([[0.0, -1.0, 0.0]])

@@ -127,7 +127,8 @@ def simulate_zones(
     if progress:
         progress(1.0)
     return tuple(
-        _result(zone, net, z, means, terms[:, z], days, drive.state) for z, zone in enumerate(zones)
+        _result(zone, net, z, means, terms[:, z], days=days, state=drive.state)
+        for z, zone in enumerate(zones)
     )
 
 
@@ -152,12 +153,12 @@ def _links(air_links: ArrayLike | None, zones: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(link)
 
 
-def _weather(climate: Climate, steps: int) -> records.Weather:
+def _weather(climate: Climate, steps: int) -> records.OutdoorConditions:
     outdoor = to_steps(climate.outdoor_c, steps)
     speed = to_steps(climate.wind_speed, steps)
     direction = np.radians(np.repeat(climate.wind_direction_deg, steps))
     pressure = to_steps(climate.pressure, steps)
-    return records.Weather(
+    return records.OutdoorConditions(
         outdoor=outdoor,
         sky=to_steps(climate.sky_c, steps),
         ground=to_steps(climate.ground_c, steps),
@@ -272,9 +273,9 @@ def _start(net: Network, zones: int, start_c: float) -> records.State:
     )
 
 
-def _work(net: Network, zones: int) -> records.Work:
+def _work(net: Network, zones: int) -> records.Workspace:
     n, m = net.faces.area.size, net.nodes.capacity.size
-    return records.Work(
+    return records.Workspace(
         matrix=np.zeros((n + zones, n + zones)),
         right=np.zeros(n + zones),
         unknown=np.zeros(n + zones),
@@ -294,6 +295,7 @@ def _result(
     z: int,
     means: records.Means,
     terms: NDArray[np.float64],
+    *,
     days: int,
     state: NDArray[np.int64],
 ) -> ZoneResult:

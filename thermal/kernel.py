@@ -12,9 +12,9 @@ from thermal.records import (
     Drive,
     Means,
     Method,
+    OutdoorConditions,
     State,
-    Weather,
-    Work,
+    Workspace,
     compiled,
     inlined,
 )
@@ -25,8 +25,8 @@ from thermal.step import step
 def _account(
     net: Network,
     state: State,
-    work: Work,
-    weather: Weather,
+    work: Workspace,
+    weather: OutdoorConditions,
     drive: Drive,
     t: int,
     method: Method,
@@ -73,7 +73,7 @@ def _account(
 
 
 @inlined
-def _move_nodes(net: Network, i: int, state: State, work: Work) -> float:
+def _move_nodes(net: Network, i: int, state: State, work: Workspace) -> float:
     """Move the inner nodes of face i's wall; returns what the wall stored [W/m2]."""
     faces, nodes = net.faces, net.nodes
     first, count, kind = faces.first_node[i], faces.node_count[i], faces.kind[i]
@@ -96,8 +96,8 @@ def _move_nodes(net: Network, i: int, state: State, work: Work) -> float:
 def advance(
     net: Network,
     state: State,
-    work: Work,
-    weather: Weather,
+    work: Workspace,
+    weather: OutdoorConditions,
     drive: Drive,
     method: Method,
     hours: int,
@@ -117,7 +117,12 @@ def advance(
 
 
 def warm_up(
-    net: Network, state: State, work: Work, weather: Weather, drive: Drive, method: Method
+    net: Network,
+    state: State,
+    work: Workspace,
+    weather: OutdoorConditions,
+    drive: Drive,
+    method: Method,
 ) -> int:
     """Repeat the first day until it ends as it began; returns the number of days."""
     for day in range(method.warm_days):

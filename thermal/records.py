@@ -62,7 +62,7 @@ def _drop_stale_cache(entry: Path, folder: Path) -> None:
                 file.unlink(missing_ok=True)
 
 
-class Weather(NamedTuple):
+class OutdoorConditions(NamedTuple):
     """Values at the end of each step T."""
 
     outdoor: NDArray[np.float64]  # [T] [degC]
@@ -99,7 +99,7 @@ class State(NamedTuple):
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """Scratch of a step."""
 
     matrix: NDArray[np.float64]  # [N + Z, N + Z] lower triangle

@@ -31,7 +31,7 @@ from thermal.network import (
     Network,
     Nodes,
 )
-from thermal.records import AIR_HEAT, Drive, Method, State, Weather, Work, inlined
+from thermal.records import AIR_HEAT, Drive, Method, OutdoorConditions, State, Workspace, inlined
 
 
 @inlined
@@ -70,7 +70,7 @@ def _inside_film(faces: Faces, i: int, surface: float, air: float, choice: int) 
 
 @inlined
 def _outside_exchange(
-    faces: Faces, i: int, surface: float, weather: Weather, t: int, method: Method
+    faces: Faces, i: int, surface: float, weather: OutdoorConditions, t: int, method: Method
 ) -> tuple[float, float]:
     """Sum of the outside coefficients [W/(m2 K)], and of them times their temperatures."""
     out, sky = weather.outdoor[t], weather.sky[t]
@@ -94,7 +94,7 @@ def _outside_exchange(
 
 
 @inlined
-def _still_nodes(faces: Faces, nodes: Nodes, state: State, work: Work) -> None:
+def _still_nodes(faces: Faces, nodes: Nodes, state: State, work: Workspace) -> None:
     """Inner nodes with both faces at zero: the part that comes from the step before."""
     for i in range(faces.area.size):
         first, count = faces.first_node[i], faces.node_count[i]
@@ -112,8 +112,8 @@ def _wall_row(
     net: Network,
     i: int,
     state: State,
-    work: Work,
-    weather: Weather,
+    work: Workspace,
+    weather: OutdoorConditions,
     t: int,
     outer_sun: float,
     method: Method,
@@ -149,8 +149,8 @@ def _window_row(
     net: Network,
     i: int,
     state: State,
-    work: Work,
-    weather: Weather,
+    work: Workspace,
+    weather: OutdoorConditions,
     t: int,
     shading: int,
     outer_sun: float,
@@ -178,8 +178,8 @@ def _window_row(
 def _assemble(
     net: Network,
     state: State,
-    work: Work,
-    weather: Weather,
+    work: Workspace,
+    weather: OutdoorConditions,
     drive: Drive,
     t: int,
     method: Method,
@@ -232,7 +232,7 @@ def _assemble(
 
 
 @inlined
-def _solve(net: Network, work: Work, state: State, drive: Drive, t: int) -> None:
+def _solve(net: Network, work: Workspace, state: State, drive: Drive, t: int) -> None:
     """Eliminate the faces (symmetric, diagonally dominant: no pivoting), then the air.
 
     A face touches its own room, the other sides of its room's walls and little else: only the rows
@@ -263,7 +263,7 @@ def _solve(net: Network, work: Work, state: State, drive: Drive, t: int) -> None
 
 
 @inlined
-def _solve_air(work: Work, state: State, drive: Drive, t: int, n: int) -> None:
+def _solve_air(work: Workspace, state: State, drive: Drive, t: int, n: int) -> None:
     """Air temperatures and ideal loads: Gauss-Seidel with the loads' limits as projections."""
     a, b, x = work.matrix, work.right, work.unknown
     zones = x.size - n
@@ -292,7 +292,9 @@ def _solve_air(work: Work, state: State, drive: Drive, t: int, n: int) -> None:
 
 
 @inlined
-def _outer_from_inner(net: Network, state: State, work: Work, weather: Weather, t: int) -> None:
+def _outer_from_inner(
+    net: Network, state: State, work: Workspace, weather: OutdoorConditions, t: int
+) -> None:
     faces = net.faces
     for i in range(faces.area.size):
         kind = faces.kind[i]
@@ -311,8 +313,8 @@ def _outer_from_inner(net: Network, state: State, work: Work, weather: Weather, 
 def step(
     net: Network,
     state: State,
-    work: Work,
-    weather: Weather,
+    work: Workspace,
+    weather: OutdoorConditions,
     drive: Drive,
     t: int,
     method: Method,

@@ -71,7 +71,9 @@ def read_ifc(
         tell("rooms", index / len(records))
         own = [a for a in attachments if a.room == record.solid.guid]
         try:
-            space, more = _space(record, own, records, around, index, elements, reflectances)
+            space, more = _space(
+                index, own, records, around, elements=elements, reflectances=reflectances
+            )
         except (shapely.errors.ShapelyError, ValueError, RuntimeError) as error:
             what = f"room {record.solid.name}: its boundary cannot be built"
             problems.append(Problem(record.solid.guid, what, f"left out: {error}", "room"))
@@ -89,7 +91,7 @@ def read_ifc(
 
 def _rooms(source: Source, mesh: RayMesh) -> tuple[list[SpaceRecord], list[Problem]]:
     """The spaces of the file that are rooms; found from geometry where there are none."""
-    records, problems = read_spaces(source.model, source.shapes, *source.quantity_scales())
+    records, problems = read_spaces(source.model, source.shapes, source.quantity_scales())
     problems += names_of_overlapping(records)
     records, more = enclosed_spaces(records, mesh)
     problems += more
@@ -166,15 +168,16 @@ def _surroundings(
 
 
 def _space(
-    record: SpaceRecord,
+    index: int,
     attachments: Sequence[Attachment],
     records: Sequence[SpaceRecord],
     around: Surroundings,
-    index: int,
+    *,
     elements: Sequence[ElementRecord],
     reflectances: NDArray[np.float64],
 ) -> tuple[Space, list[Problem]]:
-    """One room with its faces and windows, checked to be closed."""
+    """The room of a record with its faces and windows, checked to be closed."""
+    record = records[index]
     pieces, volume, problems = room_pieces(record.solid, attachments)
     pieces = cut_by_neighbours(record.solid, pieces, [other.solid for other in records])
     beyond = [

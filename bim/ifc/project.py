@@ -92,10 +92,17 @@ def area_scale(model: ifcopenshell.file, kind: str) -> float:
     try:
         if ifcopenshell.util.unit.get_project_unit(model, kind) is not None:
             return float(ifcopenshell.util.unit.calculate_unit_scale(model, kind))
-        length = float(ifcopenshell.util.unit.calculate_unit_scale(model))
+    except Exception:  # files with broken unit assignments
+        return 1.0
+    return length_scale(model) ** (2 if kind == "AREAUNIT" else 3)
+
+
+def length_scale(model: ifcopenshell.file) -> float:
+    """Factor from the file's unit of length to m."""
+    try:
+        return float(ifcopenshell.util.unit.calculate_unit_scale(model))
     except Exception:  # files without or with broken unit assignments
         return 1.0
-    return length ** (2 if kind == "AREAUNIT" else 3)
 
 
 def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[Problem]]:

@@ -2,40 +2,76 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 AREA_NAMES = ("GrossFloorArea", "NetFloorArea", "GSA BIM Area", "Area", "Gross Area", "FloorArea",
               "Gemessene Nettofläche")  # fmt: skip
 VOLUME_NAMES = ("NetVolume", "GrossVolume", "Volume", "Gross Volume")
+HEIGHT_NAMES = ("Height", "FinishCeilingHeight")
 BASE_SETS = ("Qto_SpaceBaseQuantities", "BaseQuantities")
+SAME = 1e-4  # of two numbers that the exporter computed from each other
+
+
+@dataclass(frozen=True, slots=True)
+class QuantityScales:
+    """Factors from a file's units to SI."""
+
+    length: float  # [m]
+    area: float  # [m2]
+    volume: float  # [m3]
 
 
 def stated_quantities(
-    psets: dict[str, dict], area_scale: float, volume_scale: float
+    psets: dict[str, dict], scales: QuantityScales
 ) -> tuple[float | None, float | None]:
     """Stated floor area [m2] and volume [m3]; base quantities first, then other property sets."""
     return (
-        _first(psets, AREA_NAMES, area_scale),
-        _first(psets, VOLUME_NAMES, volume_scale),
+        _first(psets, AREA_NAMES, scales.area),
+        _first(psets, VOLUME_NAMES, scales.volume),
     )
 
 
 def _first(psets: dict[str, dict], names: tuple[str, ...], scale: float) -> float | None:
+    values = _all(psets, names)
+    return values[0] * scale if values else None
+
+
+def _all(psets: dict[str, dict], names: tuple[str, ...]) -> list[float]:
+    """Every positive number of those names, the likeliest first."""
     order = sorted(psets, key=lambda name: (name not in BASE_SETS, name))
-    for name in names:
-        for pset in order:
-            value = psets[pset].get(name)
-            if isinstance(value, int | float) and not isinstance(value, bool) and value > 0:
-                return float(value) * scale
-    return None
+    values = (psets[pset].get(name) for name in names for pset in order)
+    return [
+        float(value)
+        for value in values
+        if isinstance(value, int | float) and not isinstance(value, bool) and value > 0
+    ]
 
 
-def checked_volume(stated: float | None, drawn: float) -> tuple[float | None, str]:
+def checked_volume(
+    stated: float | None, drawn: float, psets: dict[str, dict], length_scale: float
+) -> tuple[float | None, str]:
     """The stated volume [m3], freed of a slip of the exporter's unit, and what the slip was.
 
-    Revit writes GrossVolume as area in m2 times height in mm: a thousand times too much.
+    Revit writes GrossVolume as area in m2 times height in mm: a thousand times too much. Where that
+    height is not the room's own (it ends at the level above), the file states no volume of the
+    room at all: None.
+
+    Args:
+        drawn: volume of the space's body [m3].
+        psets: of the space, as the file has them.
+        length_scale: metres of the file's unit of length.
     """
     if stated is None:
         return None, ""
     for factor in (1e3, 1e-3, 1e9, 1e-9):
         if abs(stated / (factor * drawn) - 1) < 0.02:
             return stated / factor, f"stated volume {stated:g} is {factor:g} times the drawn one"
+    areas, heights = (_all(psets, names) for names in (AREA_NAMES, HEIGHT_NAMES))
+    for height in heights:
+        mixed = any(abs(stated / (area * height) - 1) < SAME for area in areas)
+        if mixed and abs(length_scale - 1) > SAME:
+            return None, (
+                f"stated volume {stated:g} is its floor area times its height of {height:g} in "
+                f"another unit ({height * length_scale:.2f} m)"
+            )
     return stated, ""

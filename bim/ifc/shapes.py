@@ -86,6 +86,8 @@ def read_shapes(
     settings = ifcopenshell.geom.settings()
     settings.set("use-world-coords", True)
     settings.set("weld-vertices", True)
+    # its own colours would make unstyled windows wholly glass and walls white, without a word
+    settings.set("apply-default-materials", False)
     settings.set("mesher-linear-deflection", 0.005)
     settings.set("mesher-angular-deflection", 0.35)
     settings.set("disable-opening-subtractions", not cut_openings)

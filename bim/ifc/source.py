@@ -16,10 +16,12 @@ from bim.ifc.project import (
     area_scale,
     ending_problems,
     length_problems,
+    length_scale,
     north_rotation,
     open_ifc,
     site_location,
 )
+from bim.ifc.quantities import QuantityScales
 from bim.ifc.shapes import Shape, read_shapes
 from bim.model import Problem
 
@@ -67,9 +69,13 @@ class Source:
         name = (project[0].LongName or project[0].Name or "") if project else ""
         return name or self.path.stem
 
-    def quantity_scales(self) -> tuple[float, float]:
-        """Factors from the file's area and volume units to m2 and m3."""
-        return area_scale(self.model, "AREAUNIT"), area_scale(self.model, "VOLUMEUNIT")
+    def quantity_scales(self) -> QuantityScales:
+        """Factors from the file's units of length, area and volume to m, m2 and m3."""
+        return QuantityScales(
+            length_scale(self.model),
+            area_scale(self.model, "AREAUNIT"),
+            area_scale(self.model, "VOLUMEUNIT"),
+        )
 
 
 def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> Source:

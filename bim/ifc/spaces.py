@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bim.apertures import shadow
 from bim.ifc.project import psets_of, storey_of
-from bim.ifc.quantities import checked_volume, stated_quantities
+from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
 from bim.model import Problem
 from bim.names import label_of
@@ -54,8 +54,7 @@ class SpaceRecord:
 def read_spaces(
     model: ifcopenshell.file,
     shapes: dict[int, Shape],
-    area_scale: float,
-    volume_scale: float,
+    scales: QuantityScales,
 ) -> tuple[list[SpaceRecord], list[Problem]]:
     """Every space that is indoors and has a body; the others are problems."""
     records: list[SpaceRecord] = []
@@ -90,8 +89,8 @@ def read_spaces(
             continue
         if repair:
             problems.append(Problem(guid, f"space {label}: its shell was not sound", repair))
-        area, volume = stated_quantities(psets, area_scale, volume_scale)
-        volume, slip = checked_volume(volume, solid.volume())
+        area, volume = stated_quantities(psets, scales)
+        volume, slip = checked_volume(volume, solid.volume(), psets, scales.length)
         if slip:
             problems.append(Problem(guid, f"space {label}: {slip}", "the drawn one is used"))
         records.append(

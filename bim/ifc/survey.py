@@ -7,9 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields
-from multiprocessing import get_context
 from pathlib import Path
 
 from bim.ifc.building import AGREES, read_ifc
@@ -20,6 +18,7 @@ from bim.to_energyplus import write_epjson
 from bim.to_gltf import write_gltf
 from bim.to_radiance import write_radiance
 from mitsuba_cfs.errors import CfsError
+from mitsuba_cfs.processes import process_pool
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +49,7 @@ class Surveyed:
 def survey(paths: Iterable[str | Path]) -> Iterator[Surveyed]:
     """Figures of each file in turn; every file has its own process, so that memory is its own."""
     for path in paths:
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        with process_pool(1) as pool:
             yield pool.submit(_surveyed, Path(path)).result()
 
 

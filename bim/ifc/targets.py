@@ -124,7 +124,7 @@ def _room(building: Building, name: str, path: str | Path):
     try:
         return found_by_name(building.spaces, name, "room")
     except (KeyError, ValueError) as error:
-        raise DataError(str(error.args[0]), file=path, field="--room") from None
+        raise DataError(str(error.args[0]), file=path, field="--space") from None
 
 
 def _storey(building: Building, name: str, path: str | Path) -> str:

@@ -182,21 +182,6 @@ def evaluate(
     )
 
 
-def enhanced_simplified_dgp(
-    illuminance: float, direct: ArrayLike, view: View | GlareView, **changes: Any
-) -> float:
-    """eDGP: DGP with the illuminance of one calculation and the sources of a direct-only picture.
-
-    Source: Wienold (2009), Dynamic daylight glare evaluation.
-
-    Args:
-        illuminance: at the eye, of all light [lx].
-        direct: [ny, nx] luminance of what is seen without any interreflection [cd/m2].
-        view: as for `evaluate`; `changes` are single options by name.
-    """
-    return evaluate(direct, view, illuminance=illuminance, **changes).dgp
-
-
 def prepare(
     luminance: ArrayLike, geometry: GlareView
 ) -> tuple[NDArray[np.float64], float, float, float]:

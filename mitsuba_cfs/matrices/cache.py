@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class BatchMean:
     """The running mean of batches: enough to go on with the next one."""
 
     count: int  # batches so far
@@ -103,11 +103,11 @@ class CacheEntry:
     cache: MatrixCache
     path: Path
 
-    def load(self) -> State | None:
+    def load(self) -> BatchMean | None:
         """What is there; None where there is nothing, or nothing readable."""
         try:
             with opened_arrays(self.path) as data:
-                state = State(
+                state = BatchMean(
                     int(data["count"]),
                     data["mean"].astype(float),
                     data["spread"].astype(float),
@@ -128,7 +128,7 @@ class CacheEntry:
         )
         return state if whole else None
 
-    def save(self, state: State) -> None:
+    def save(self, state: BatchMean) -> None:
         """Write the state; the file is the old one or the new one at any time.
 
         A folder that cannot be written to costs a warning, not the run.

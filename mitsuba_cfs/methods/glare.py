@@ -4,7 +4,8 @@
     five-phase     E_v = V T D s - V_d T D_d s_d + C_ds s_sun   V_d T D_d s_sky + C s_sun
     paths          E_v of a sensor at the eye                   paths of one reflection
 
-Source: Wienold 2009, "Dynamic daylight glare evaluation" (eDGP); the dissertation's 3.2.4 to 3.2.6.
+Source: Wienold 2009, "Dynamic daylight glare evaluation" (eDGP); the dissertation's 3.2.4 to 3.2.6,
+whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky without the sun.
 """
 
 from __future__ import annotations
@@ -14,15 +15,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.glare import indices
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, annual_glare, figures, full_picture
 from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
-from mitsuba_cfs.glare.simplified import DIRECT_DEPTH, simplified_dgp
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress, part, silent
 
+DIRECT_DEPTH = 2  # segments of a direct-only path behind what the eye sees: to window, to sky
 State = ArrayLike | None  # [G, L] of each window group in each hour, or [L] of all; None: the first
 
 
@@ -95,7 +97,8 @@ def pictures(
 def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
     nothing = np.full(len(eye), np.nan)
     rest = {name: nothing for name in FIGURES[2:]}
-    return AnnualGlare(dgp=simplified_dgp(eye), Ev=np.asarray(eye, dtype=float), **rest)
+    dgp = np.array([indices.simplified_dgp(E) for E in eye.tolist()])
+    return AnnualGlare(dgp=dgp, Ev=np.asarray(eye, dtype=float), **rest)
 
 
 def _of_paths(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.lit_room import System
+from mitsuba_cfs.trace.lit_room import PathOptics
 from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 
 
@@ -29,7 +29,7 @@ class SystemOptics(Protocol):
         """How the five-phase method's sun passes it."""
 
     @property
-    def paths(self) -> System:
+    def paths(self) -> PathOptics:
         """What paths meet, from either side."""
 
 
@@ -54,7 +54,7 @@ class BsdfOptics:
         return sun_scattering(self._fine)
 
     @cached_property
-    def paths(self) -> System:
+    def paths(self) -> PathOptics:
         """See `SystemOptics`."""
         return lit_system(self._fine)
 
@@ -65,7 +65,7 @@ class GivenOptics:
 
     transmission: NDArray[np.float64] | None = None  # [K, K]
     scattering: Scattering | None = None
-    paths: System | None = None
+    paths: PathOptics | None = None
 
 
 def hourly_states(state: ArrayLike | None, groups: int, hours: int) -> NDArray[np.int64]:

@@ -22,7 +22,7 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.annual_pictures import FivePhasePictures
 from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.picture_outdoors import Outdoors, outdoors
+from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients, outdoors
 from mitsuba_cfs.trace.picture_sun import PictureSun
 
 SUN_BATCHES = 4  # of C_ds
@@ -37,7 +37,7 @@ class PhaseSystems:
         if len(systems) != len(traced.scene.groups):
             raise ValueError(f"systems of {len(systems)} groups for {len(traced.scene.groups)}")
         self.traced, self.systems = traced, systems
-        self._seen: dict[tuple[int, ...], tuple[PictureSun, Outdoors]] = {}
+        self._seen: dict[tuple[int, ...], tuple[PictureSun, OutdoorCoefficients]] = {}
         self.straight = StraightViews(traced, systems)
 
     @property
@@ -64,7 +64,7 @@ class PhaseSystems:
             found += self.straight.coefficients(g, min(state, len(self.systems[g]) - 1))
         return found[: len(self.traced.scene.points)]
 
-    def seen_sun(self, state: tuple[int, ...]) -> tuple[PictureSun, Outdoors]:
+    def seen_sun(self, state: tuple[int, ...]) -> tuple[PictureSun, OutdoorCoefficients]:
         """The sun and the outdoors in the view's pixels, with each group in a state."""
         if state not in self._seen:
             scene, chosen = self.traced.scene, self.traced.sampling
@@ -282,7 +282,7 @@ class PhaseLight:
             found.append(
                 direct_sun_matrix(
                     scene.interior, scene.exterior, scene.groups, ways, *scene.sensors(),
-                    self.sky.direction[shining],
+                    suns=self.sky.direction[shining],
                     window_points=max(chosen.sun_points // SUN_BATCHES, 1),
                     stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
                     progress=lambda _, done, j=j: self.progress("daylight", (j + done) / count),

@@ -97,7 +97,7 @@ class PhaseScene:
             cache=self.cache,
         )
         lights = map(CellLight, scene.groups, cells, found)
-        return Parts.of_cells(subdivided(light, chosen.window_parts) for light in lights)
+        return Parts.of_cells(subdivided(light, chosen.window_parts or None) for light in lights)
 
     @cached_property
     def daylight(self) -> Estimate:

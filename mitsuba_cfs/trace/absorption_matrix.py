@@ -15,6 +15,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.random_walk import PathStarts, diffuse_direction
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
@@ -23,14 +24,11 @@ from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 def _absorption_kernel(
     tracer: TracedScene,
     matrix: mi.Float64,  # [K * (F + G)], accumulated in place
-    row: mi.UInt32,  # patch that each path starts in
-    position: mi.Point3f,  # on the window
-    direction: mi.Vector3f,  # into the room
-    generator: mi.PCG32,
-    max_depth: mi.UInt32,
-    active: mi.Bool,
+    starts: PathStarts,  # on the window, into the room; rows are its patches
 ) -> None:
     """Random walk of a unit of flux: each surface and window takes what it does not reflect."""
+    row, position, direction = starts.row, starts.position, starts.direction
+    generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     F = mi.UInt32(tracer.surface_count)
     width = mi.UInt32(tracer.surface_count + len(tracer.groups))
     beta = mi.Float(1.0)
@@ -39,22 +37,17 @@ def _absorption_kernel(
         ray = mi.Ray3f(position, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         active &= hit.is_valid()
-        prim = hit.prim_index
-        group = dr.gather(mi.Int32, tracer.group, prim, active)
-        surface = dr.gather(mi.UInt32, tracer.surface, prim, active)
-        reflectance = dr.gather(mi.Float, tracer.reflectance, prim, active)
+        group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
+        surface = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, active)
+        position, face, reflectance = tracer.surface_at(hit, position, direction, active)
         last = depth + 1 >= max_depth
         slot = row * width + dr.select(group == OPAQUE, surface, F + mi.UInt32(group))
         absorbed = dr.select(last, 1.0, 1 - reflectance)
         dr.scatter_add(matrix, mi.Float64(beta * absorbed), slot, active)
         active &= ~last
 
-        face = dr.gather(mi.Vector3f, tracer.normal, prim, active)
-        face = dr.mulsign(face, -dr.dot(face, direction))
-        position = mi.Point3f(position + direction * hit.t + face * tracer.epsilon)
         beta *= reflectance
-        u = mi.Point2f(generator.next_float32(), generator.next_float32())
-        direction = mi.Frame3f(face).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        direction = diffuse_direction(face, generator)
         depth += 1
         survival = dr.select(depth > 3, dr.minimum(beta * 4.0, 1.0), 1.0)
         active &= (generator.next_float32() < survival) & (beta > 0)
@@ -98,10 +91,11 @@ def absorption_matrix(
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         normal = mi.Vector3f(*map(float, groups[paths.group].frame[2]))
         position = mi.Point3f(paths.position - normal * tracer.epsilon)
-        _absorption_kernel(
-            tracer, matrix, paths.patch, position, -paths.outward,
-            paths.generator, dr.opaque(mi.UInt32, max_depth), mi.Bool(True),
-        )  # fmt: skip
+        depth = dr.opaque(mi.UInt32, max_depth)
+        starts = PathStarts(
+            paths.patch, position, -paths.outward, paths.generator, depth, mi.Bool(True)
+        )
+        _absorption_kernel(tracer, matrix, starts)
 
     return accumulate(
         window_batches(tracer, bins, width, n, seed, follow),

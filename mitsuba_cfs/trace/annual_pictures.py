@@ -28,7 +28,7 @@ from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.image import picture_matrix_blocks
-from mitsuba_cfs.trace.picture_outdoors import Outdoors
+from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
@@ -203,9 +203,13 @@ class FivePhasePictures:
             raise ValueError(f"expected {expected} directions and illuminances of the sun")
 
     def show_outdoors(
-        self, seen: Outdoors, daylight: ArrayLike, direct_daylight: ArrayLike, sky: ArrayLike,
+        self,
+        seen: OutdoorCoefficients,
+        daylight: ArrayLike,
+        direct_daylight: ArrayLike,
+        sky: ArrayLike,
         sun: ArrayLike,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """See the outdoors through the windows' straight beam pixel by pixel.
 
         Args:

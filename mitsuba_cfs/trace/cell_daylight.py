@@ -16,6 +16,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.estimate import Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.window_parts import Cells
@@ -72,10 +73,7 @@ def cell_daylight(
         x, y, z = (dr.gather(mi.Vector3f, axis, cell) for axis in axes)
         local = bins.sample(patch, lattice_2d(sample, stream, 0))
         u = lattice_2d(sample, stream, 2)
-        add_daylight_paths(
-            tracer,
-            sky,
-            matrix,
+        starts = PathStarts(
             row,
             mi.Point3f(place + first * u.x + second * u.y + z * tracer.epsilon),
             x * local.x + y * local.y + z * local.z,
@@ -83,6 +81,7 @@ def cell_daylight(
             dr.opaque(mi.UInt32, max_depth),
             mi.Bool(True),
         )
+        add_daylight_paths(tracer, sky, matrix, starts)
         return matrix.numpy().reshape(C, K, P) / n
 
     stopping = Stopping(batches=BATCHES)

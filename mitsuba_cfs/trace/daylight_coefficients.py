@@ -46,7 +46,9 @@ def daylight_coefficients(
         raise ValueError("a room needs a `key` before its matrix can be kept in a cache")
     sky = PatchSky(subdivision)
     return accumulate(
-        sensor_batches(room, sky, points, directions, samples, max_depth, seed),
+        sensor_batches(
+            room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed
+        ),
         stopping=stopping,
         label="daylight coefficients",
         progress=progress,

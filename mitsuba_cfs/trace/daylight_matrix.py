@@ -18,6 +18,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.random_walk import PathStarts, diffuse_direction, roulette
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
@@ -28,15 +29,12 @@ def add_daylight_paths(
     tracer: TracedScene,
     sky: SkyBins,
     matrix: mi.Float64,  # [rows * P], accumulated in place
-    row: mi.UInt32,  # row of the matrix that each path adds to
-    position: mi.Point3f,  # on the window or the sensor
-    direction: mi.Vector3f,  # outdoors
-    generator: mi.PCG32,
-    max_depth: mi.UInt32,
-    active: mi.Bool,
+    starts: PathStarts,  # on the window or the sensor, outdoors
     weight: mi.Float | None = None,  # of each path, 1 by default
 ) -> None:
     """Follow each path to the sky, where the patch it meets gains the product of reflectances."""
+    row, position, direction = starts.row, starts.position, starts.direction
+    generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     weight = mi.Float(1.0 if weight is None else weight)
     beta = mi.Float(1.0)
     depth = mi.UInt32(0)
@@ -48,16 +46,11 @@ def add_daylight_paths(
         dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
 
-        face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
-        face = dr.mulsign(face, -dr.dot(face, direction))
-        position = mi.Point3f(position + direction * hit.t + face * tracer.epsilon)
-        beta *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)
-        u = mi.Point2f(generator.next_float32(), generator.next_float32())
-        direction = mi.Frame3f(face).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        position, face, reflectance = tracer.surface_at(hit, position, direction, active)
+        direction = diffuse_direction(face, generator)
         depth += 1
-        survival = dr.select(depth > 2, dr.minimum(beta * 2.0, 0.95), 1.0)
-        active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
-        beta /= dr.maximum(survival, 1e-6)
+        alive, beta = roulette(beta * reflectance, depth, generator)
+        active &= alive & (depth < max_depth)
 
 
 def daylight_matrix(
@@ -97,12 +90,13 @@ def daylight_matrix(
     n = int(samples)
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+        depth = dr.opaque(mi.UInt32, max_depth)
         clear = tracer.outward(mi.Int32(paths.group), mi.Bool(True)) if something else 0.0
-        add_daylight_paths(
-            tracer, sky, matrix, paths.patch, mi.Point3f(paths.position + clear), paths.outward,
-            paths.generator,
-            dr.opaque(mi.UInt32, max_depth), mi.Bool(True),
-        )  # fmt: skip
+        place = mi.Point3f(paths.position + clear)
+        starts = PathStarts(
+            paths.patch, place, paths.outward, paths.generator, depth, mi.Bool(True)
+        )
+        add_daylight_paths(tracer, sky, matrix, starts)
 
     return accumulate(
         window_batches(tracer, bins, sky.size, n, seed, follow),
@@ -160,10 +154,7 @@ def sky_irradiance_matrix(
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
         stream = mi.sample_tea_32(sensor, key)[0]
         local = accepted.sample(lattice_2d(path - sensor * count, stream, 0))
-        add_daylight_paths(
-            tracer,
-            sky,
-            matrix,
+        starts = PathStarts(
             sensor,
             mi.Point3f(dr.gather(mi.Point3f, place, sensor)),
             mi.Frame3f(dr.gather(mi.Vector3f, normal, sensor)).to_world(local),
@@ -171,6 +162,7 @@ def sky_irradiance_matrix(
             dr.opaque(mi.UInt32, max_depth),
             mi.Bool(True),
         )
+        add_daylight_paths(tracer, sky, matrix, starts)
         return matrix.numpy().reshape(S, P) * (accepted.total / n)
 
     return accumulate(

@@ -90,6 +90,17 @@ class PluginScattering:
 
 
 @dataclass(frozen=True)
+class _SunScene:
+    """Both sides of the windows, the sensors and the suns."""
+
+    inside: TracedScene
+    outside: TracedScene
+    place: mi.Point3f  # [S]
+    normal: mi.Vector3f  # [S]
+    towards: mi.Vector3f  # [Q]
+
+
+@dataclass(frozen=True)
 class _Points:
     """Points on one group's windows shared by all sensors and suns of a batch."""
 
@@ -106,8 +117,8 @@ def direct_sun_matrix(
     scattering: Sequence[Scattering | None],
     points: ArrayLike,
     directions: ArrayLike,
-    suns: ArrayLike,
     *,
+    suns: ArrayLike,
     window_points: int = 256,
     stopping: Stopping | None = None,
     seed: int = 0,
@@ -144,18 +155,22 @@ def direct_sun_matrix(
         raise ValueError("a BSDF plugin needs a `key` before its matrix can be kept in a cache")
     inside = TracedScene(interior, groups)
     outside = TracedScene(exterior, groups, windows_block=False)
-    place = mi.Point3f((points - inside.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
-    towards = mi.Vector3f(suns.T.astype(np.float32))
+    around = _SunScene(
+        inside,
+        outside,
+        mi.Point3f((points - inside.centre).T.astype(np.float32)),
+        mi.Vector3f(directions.T.astype(np.float32)),
+        mi.Vector3f(suns.T.astype(np.float32)),
+    )
 
     def batch(number: int) -> NDArray[np.float64]:
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
-        found = _through(inside, outside, scattering, place, normal, towards, key)
+        found = _through(around, scattering, key)
         for g, way in enumerate(scattering):
             if way is None:
                 continue
-            shared = _window_points(inside, outside, g, place, normal, towards, window_points, key)
-            found[g] += _scattered(inside, g, way, shared, towards, len(points))
+            shared = _window_points(around, g, window_points, key)
+            found[g] += _scattered(inside, g, way, shared, around.towards, len(points))
         if not by_group:
             found = [sum(found)]
         values = np.stack([mi.Float(part * SUN_SOLID_ANGLE).numpy() for part in found])
@@ -196,17 +211,9 @@ def patch_beams(scattering: Sequence[Scattering | None], basis: KlemsBasis) -> N
     return np.stack([np.broadcast_to(beam, basis.size) for beam in beams]).astype(float)
 
 
-def _window_points(
-    inside: TracedScene,
-    outside: TracedScene,
-    group: int,
-    place: mi.Point3f,
-    normal: mi.Vector3f,
-    towards: mi.Vector3f,
-    count: int,
-    key: mi.UInt32,
-) -> _Points:
+def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) -> _Points:
     """Points on a group, what each sensor sees of them, and which suns reach them."""
+    inside, place, towards = around.inside, around.place, around.towards
     j = dr.arange(mi.UInt32, count)
     stream = mi.sample_tea_32(mi.UInt32(group), key)[0]
     position = inside.sample_group(group, lattice_2d(j, stream, 0))
@@ -220,7 +227,7 @@ def _window_points(
     distance = dr.sqrt(distance2)
     omega = to_point / distance
     outward = inside.to_local(mi.Int32(group), omega, mi.Bool(True))
-    cosine = dr.dot(dr.gather(mi.Vector3f, normal, sensor), omega)
+    cosine = dr.dot(dr.gather(mi.Vector3f, around.normal, sensor), omega)
     seen = (cosine > 0) & (outward.z > 1e-4)
     shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
     seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
@@ -232,7 +239,7 @@ def _window_points(
         on_disc(dr.gather(mi.Vector3f, towards, sun), point, stream),
     )
     before = dr.dot(ray.d, mi.Vector3f(*map(float, inside.groups[group].frame[2]))) > 0
-    lit = before & ~outside.scene.ray_test(ray, coherent=False, active=before)
+    lit = before & ~around.outside.scene.ray_test(ray, coherent=False, active=before)
     result = _Points(position, weight, outward, dr.select(lit, mi.Float(1), mi.Float(0)))
     dr.eval(result.position, result.weight, result.outward, result.sunlit)
     return result
@@ -267,29 +274,24 @@ def _scattered(
 
 
 def _through(
-    inside: TracedScene,
-    outside: TracedScene,
-    scattering: Sequence[Scattering | None],
-    place: mi.Point3f,
-    normal: mi.Vector3f,
-    towards: mi.Vector3f,
-    key: mi.UInt32,
+    around: _SunScene, scattering: Sequence[Scattering | None], key: mi.UInt32
 ) -> list[mi.Float]:
     """Mean over the visible disc of cos(sensor) tau(sun) through each group [S * Q]."""
+    inside, place, towards = around.inside, around.place, around.towards
     total = [dr.zeros(mi.Float, dr.width(place) * dr.width(towards)) for _ in scattering]
     sensor, sun = _pairs(dr.width(place), dr.width(towards))
     start = dr.gather(mi.Point3f, place, sensor)
     stream = mi.sample_tea_32(sensor, key)[0]
     for stratum in range(DISC_STRATA):
         direction = on_disc(dr.gather(mi.Vector3f, towards, sun), mi.UInt32(stratum), stream)
-        cosine = dr.dot(dr.gather(mi.Vector3f, normal, sensor), direction)
+        cosine = dr.dot(dr.gather(mi.Vector3f, around.normal, sensor), direction)
         ray = mi.Ray3f(start, direction)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=cosine > 0)
         active = (cosine > 0) & hit.is_valid()
         group = dr.gather(mi.Int32, inside.group, hit.prim_index, active)
         active &= group != OPAQUE
         beyond = mi.Ray3f(mi.Point3f(start + direction * hit.t), direction)
-        active &= ~outside.scene.ray_test(beyond, coherent=False, active=active)
+        active &= ~around.outside.scene.ray_test(beyond, coherent=False, active=active)
         local = inside.to_local(group, direction, active)
         active &= local.z > 0
         for g, system in enumerate(scattering):

@@ -15,6 +15,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.random_walk import PathStarts, diffuse_direction, roulette
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
@@ -76,11 +77,7 @@ def escaped_view(
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
         stream = mi.sample_tea_32(sensor, key ^ mi.UInt32(0x1F83D9AB))[0]
         local = mi.warp.square_to_cosine_hemisphere(lattice_2d(path - sensor * count, stream, 0))
-        _add_escapes(
-            tracer,
-            box[0],
-            box[1],
-            sums,
+        starts = PathStarts(
             sensor,
             mi.Point3f(dr.gather(mi.Point3f, place, sensor)),
             mi.Frame3f(dr.gather(mi.Vector3f, normal, sensor)).to_world(local),
@@ -88,6 +85,7 @@ def escaped_view(
             dr.opaque(mi.UInt32, max_depth),
             mi.Bool(True),
         )
+        _add_escapes(tracer, *box, sums, starts)
         return sums.numpy().reshape(shape) / n
 
     found = accumulate(
@@ -119,14 +117,11 @@ def _add_escapes(
     low: mi.Point3f,  # corners of the box round the room
     high: mi.Point3f,
     sums: mi.Float64,  # [rows * 6 * 4], accumulated in place
-    row: mi.UInt32,
-    position: mi.Point3f,
-    direction: mi.Vector3f,
-    generator: mi.PCG32,
-    max_depth: mi.UInt32,
-    active: mi.Bool,
+    starts: PathStarts,
 ) -> None:
     """Follow each path until it meets a window or nothing, is absorbed or too long."""
+    row, position, direction = starts.row, starts.position, starts.direction
+    generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     beta = mi.Float(1.0)  # product of reflectances
     depth = mi.UInt32(0)  # bounces so far
     while active:
@@ -156,13 +151,8 @@ def _add_escapes(
         active &= hit.is_valid()
         group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
         active &= group == OPAQUE
-        face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
-        face = dr.mulsign(face, -dr.dot(face, direction))
-        position = mi.Point3f(position + direction * hit.t + face * tracer.epsilon)
-        beta *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)
-        u = mi.Point2f(generator.next_float32(), generator.next_float32())
-        direction = mi.Frame3f(face).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        position, face, reflectance = tracer.surface_at(hit, position, direction, active)
+        direction = diffuse_direction(face, generator)
         depth += 1
-        survival = dr.select(depth > 2, dr.minimum(beta * 2.0, 0.95), 1.0)
-        active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
-        beta /= dr.maximum(survival, 1e-6)
+        alive, beta = roulette(beta * reflectance, depth, generator)
+        active &= alive & (depth < max_depth)

@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache, State
+from mitsuba_cfs.matrices.cache import BatchMean, CacheEntry, MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 
 LEAST_BATCHES = 4  # before an error is believed
@@ -108,7 +108,9 @@ def accumulate(
             spread = spread + step * (values - mean)
             sum_spread = sum_spread + step.sum(axis=-1) * (values - mean).sum(axis=-1)
             count += 1
-            state = State(count, mean, spread, sum_spread, before + time.monotonic() - start, False)
+            state = BatchMean(
+                count, mean, spread, sum_spread, before + time.monotonic() - start, False
+            )
             fraction = _fraction_done(state, stopping)
             finished = fraction >= 1.0 or count >= stopping.max_batches
             if not finished:
@@ -145,12 +147,12 @@ class _Keeper:
         self._saved = (count, False)
         self._next = time.monotonic() + SAVE_SECONDS
 
-    def offer(self, state: State) -> None:
+    def offer(self, state: BatchMean) -> None:
         """Save the state if the last one is old enough."""
         if time.monotonic() >= self._next:
             self.save(state)
 
-    def save(self, state: State | None) -> None:
+    def save(self, state: BatchMean | None) -> None:
         """Save the state unless it is saved already."""
         if self._entry is None or state is None or (state.count, state.finished) == self._saved:
             return
@@ -161,7 +163,7 @@ class _Keeper:
         self._next = end + max(SAVE_SECONDS, SAVE_SHARE * (end - start))
 
 
-def _estimate(state: State) -> Estimate:
+def _estimate(state: BatchMean) -> Estimate:
     """Mean and standard error of the batches so far."""
     pairs = (state.count - 1) * state.count
     error = np.sqrt(np.maximum(state.spread.astype(float), 0) / pairs)
@@ -169,7 +171,7 @@ def _estimate(state: State) -> Estimate:
     return Estimate(state.mean, error, sum_error, state.count, state.seconds)
 
 
-def _fraction_done(state: State, stopping: Stopping) -> float:
+def _fraction_done(state: BatchMean, stopping: Stopping) -> float:
     """How near the batches are to the first of the stopping conditions, 1 when it holds."""
     if stopping.time_limit is None and stopping.target_error is None:
         return state.count / stopping.batches

@@ -80,7 +80,7 @@ def picture_matrix_blocks(
     shown = np.flatnonzero(counts.reshape(-1))
     for start in range(0, len(shown), size):
         pixels = shown[start : start + size]
-        matrix = _block(tracer, bins, view, pixels, samples, max_depth, seed)
+        matrix = _block(tracer, bins, view, pixels, samples=samples, max_depth=max_depth, seed=seed)
         yield pixels, matrix.reshape(len(pixels), *shape)
         progress("picture", (start + len(pixels)) / len(shown))
 
@@ -90,6 +90,7 @@ def _block(
     bins: DirectionBins,
     view: View,
     pixels: NDArray[np.int64],
+    *,
     samples: int,
     max_depth: int,
     seed: int,
@@ -109,10 +110,10 @@ def _block(
             eye,
             mi.Vector3f(directions.T.astype(np.float32)),
             mi.Bool(exists),
-            number,
-            dr.opaque(mi.UInt32, j),
-            dr.opaque(mi.UInt32, (seed * 1_000_003 + j) & 0xFFFFFFFF),
-            dr.opaque(mi.UInt32, max_depth),
+            pixel=number,
+            sample=dr.opaque(mi.UInt32, j),
+            key=dr.opaque(mi.UInt32, (seed * 1_000_003 + j) & 0xFFFFFFFF),
+            max_depth=dr.opaque(mi.UInt32, max_depth),
         )
         dr.eval(matrix)
     return (matrix.numpy() / samples).astype(np.float32)
@@ -125,6 +126,7 @@ def _picture_paths(
     eye: mi.Point3f,
     direction: mi.Vector3f,
     active: mi.Bool,
+    *,
     pixel: mi.UInt32,
     sample: mi.UInt32,
     key: mi.UInt32,
@@ -145,20 +147,19 @@ def _picture_paths(
     slot = row * width + mi.UInt32(group) * K + bins.index(local)
     dr.scatter_add(matrix, mi.Float64(1.0), slot, glazed)
 
-    face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
-    face = dr.mulsign(face, -dr.dot(face, direction))
-    reflectance = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)
+    position, face, reflectance = tracer.surface_at(hit, eye, direction, active)
     add_view_paths(
         tracer,
         bins,
         matrix,
         row,
-        mi.Point3f(eye + direction * hit.t + face * tracer.epsilon),
+        position,
         face,
-        reflectance * dr.inv_pi,
-        sample,
-        mi.sample_tea_32(pixel, mi.UInt32(0x1F123BB5))[0],
-        path_generator(pixel, key),
-        max_depth,
-        active,
+        beta=reflectance * dr.inv_pi,
+        sample=sample,
+        stream=mi.sample_tea_32(pixel, mi.UInt32(0x1F123BB5))[0],
+        generator=path_generator(pixel, key),
+        max_depth=max_depth,
+        active=active,
+        carried=None,
     )

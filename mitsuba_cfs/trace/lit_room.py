@@ -49,7 +49,7 @@ class PatchBeam:
         return self._bins.between(self._values, outward)
 
 
-class System:
+class PathOptics:
     """How a window group passes light: a straight beam, mirrors, and a BSDF for the rest."""
 
     def __init__(
@@ -128,7 +128,7 @@ class LitRoom:
         interior: Surfaces,
         exterior: Surfaces,
         groups: Sequence[WindowGroup],
-        systems: Sequence[System],
+        systems: Sequence[PathOptics],
     ) -> None:
         """Build both scenes; they share the origin of their coordinates."""
         if len(systems) != len(groups):

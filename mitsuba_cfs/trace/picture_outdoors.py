@@ -22,6 +22,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, pixel_places
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
@@ -31,7 +32,7 @@ MAX_DEPTH = 16
 
 
 @dataclass(frozen=True)
-class Outdoors:
+class OutdoorCoefficients:
     """Luminance of the pixels through the windows' straight beam, per unit luminance of the sky."""
 
     sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows itself
@@ -50,7 +51,7 @@ def outdoors(
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 8,
     seed: int = 0,
-) -> Outdoors:
+) -> OutdoorCoefficients:
     """Trace every pixel through the windows to the sky; arguments as for `direct_sun_matrix`.
 
     Args:
@@ -67,9 +68,9 @@ def outdoors(
         block = pixels[start : start + size]
         lanes = _through_windows(inside, scattering, view, block, samples)
         for rows, depth in ((free, 1), (whole, MAX_DEPTH)):
-            rows.append(_rows(inside, outside, sky, lanes, len(block), samples, depth, seed))
+            rows.append(_rows(outside, sky, lanes, len(block), depth, seed))
     free, whole = (sparse.csr_array(sparse.vstack(rows)) for rows in (free, whole))
-    return Outdoors(free, (whole - free).maximum(0), _beams(scattering, basis))
+    return OutdoorCoefficients(free, (whole - free).maximum(0), _beams(scattering, basis))
 
 
 def _through_windows(
@@ -106,7 +107,7 @@ def _through_windows(
     return row[lit], keys, np.concatenate([place, directions[lit].T]), weight[lit]
 
 
-def _rows(inside, outside, sky, lanes, count, samples, depth, seed) -> sparse.csr_array:
+def _rows(outside, sky, lanes, count, depth, seed) -> sparse.csr_array:
     """Rows [count, P] of a block."""
     row, keys, way, weight = lanes
     if not len(row):
@@ -114,12 +115,16 @@ def _rows(inside, outside, sky, lanes, count, samples, depth, seed) -> sparse.cs
     used, place = np.unique(row, return_inverse=True)
     matrix = dr.zeros(mi.Float64, len(used) * sky.size)
     origin, direction = way[:3].astype(np.float32), way[3:].astype(np.float32)
-    add_daylight_paths(
-        outside, sky, matrix, mi.UInt32(place.astype(np.uint32)), mi.Point3f(origin),
+    key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+    starts = PathStarts(
+        mi.UInt32(place.astype(np.uint32)),
+        mi.Point3f(origin),
         mi.Vector3f(direction),
-        path_generator(mi.UInt32(keys.astype(np.uint32)), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)),
-        dr.opaque(mi.UInt32, depth), mi.Bool(True),
-    )  # fmt: skip
+        path_generator(mi.UInt32(keys.astype(np.uint32)), key),
+        dr.opaque(mi.UInt32, depth),
+        mi.Bool(True),
+    )
+    add_daylight_paths(outside, sky, matrix, starts)
     values = matrix.numpy().reshape(len(used), sky.size)
     mean = np.bincount(place, weight) / np.bincount(place)
     found = sparse.csr_array((values * mean[:, None]).astype(np.float32))

@@ -27,6 +27,7 @@ from mitsuba_cfs.trace.lit_room import LitRoom, Sky
 from mitsuba_cfs.trace.picture_disc import disc_rays, disc_reach
 from mitsuba_cfs.trace.picture_sharing import SharedLight, Tiles, face_numbers
 from mitsuba_cfs.trace.point_in_time import (
+    Vertex,
     add_paths,
     leave,
     on_disc,
@@ -34,6 +35,7 @@ from mitsuba_cfs.trace.point_in_time import (
     sun_at,
     window_parts,
 )
+from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixel_places
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
@@ -68,7 +70,9 @@ def point_in_time_picture(
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
     picture = np.zeros(view.height * view.width)
-    kernel = _Kernel(room, sky, view, numbers, tiles, samples, max_depth, seed)
+    kernel = _Kernel(
+        room, sky, view, numbers, tiles, samples=samples, max_depth=max_depth, seed=seed
+    )
     pairs, rows = [], []
     size = max(1, BLOCK // samples)
     for start in range(0, len(shown), size):
@@ -206,6 +210,7 @@ class _Kernel:
         view: View,
         faces: _Faces,
         tiles: Tiles,
+        *,
         samples: int,
         max_depth: int,
         seed: int,
@@ -277,16 +282,16 @@ class _Kernel:
         behind = dr.dot(normal, direction) > 0
         normal = dr.select(behind, -normal, normal)
         rho = dr.gather(mi.Float, inside.reflectance, hit.prim_index, opaque) * dr.inv_pi
-        vertex = mi.Point3f(point + normal * inside.epsilon)
-        sharp = mi.Float64(rho * sun_at(room, sky, vertex, normal, indoors, u_sun, opaque))
+        vertex = Vertex(mi.Point3f(point + normal * inside.epsilon), normal, indoors)
+        sharp = mi.Float64(rho * sun_at(room, sky, vertex, u_sun, opaque))
         sharp = dr.select(opaque, sharp, 0.0)
-        away, aimed = leave(room, sky, vertex, normal, indoors, u, choice, opaque)
+        away, aimed = leave(room, sky, vertex, u, choice, opaque)
         cosine = dr.select(opaque, dr.dot(away, normal), 0.0)
 
         # ----- A window: the sun scattered in it, and a path through what scatters -----
         towards = on_disc(sky, u_sun)
         scattered, straight, mirrored, mirror, rest, onwards = window_parts(
-            room, group, direction, towards, u, choice, glazed
+            room, group, direction, towards, u=u, choice=choice, glazed=glazed
         )
         step = inside.outward(group, glazed)
         outer, inner = mi.Point3f(point + step), mi.Point3f(point - step)
@@ -298,11 +303,15 @@ class _Kernel:
 
         # ----- The paths whose light is shared -----
         found = dr.zeros(mi.Float64, dr.width(lane))
-        origin = dr.select(opaque, vertex, dr.select(outward, outer, inner))
+        origin = dr.select(opaque, vertex.position, dr.select(outward, outer, inner))
+        starts = PathStarts(
+            lane, mi.Point3f(origin), dr.select(opaque, away, onwards), mi.PCG32(generator),
+            self._depth, (opaque & (cosine > 0)) | (glazed & (rest > 0)),
+        )  # fmt: skip
         add_paths(
-            room, sky, found, lane, mi.Point3f(origin), dr.select(opaque, away, onwards), cosine,
-            aimed & opaque, dr.select(opaque, 1.0, rest), mi.PCG32(generator), self._depth,
-            (opaque & (cosine > 0)) | (glazed & (rest > 0)), outward,
+            room, sky, found, starts,
+            cosine=cosine, aimed=aimed & opaque, beta=dr.select(opaque, 1.0, rest),
+            outdoors=outward,
         )  # fmt: skip
         face = self._faces.inside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(group))
@@ -316,9 +325,12 @@ class _Kernel:
             shared.append(light)
         if self._mirrors:
             seen = dr.zeros(mi.Float64, dr.width(lane))
+            starts = PathStarts(
+                lane, inner, mirror, mi.PCG32(generator), self._depth, glazed & (mirrored > 0)
+            )
             add_paths(
-                room, sky, seen, lane, inner, mirror, mi.Float(0), mi.Bool(False), mirrored,
-                mi.PCG32(generator), self._depth, glazed & (mirrored > 0), mi.Bool(False),
+                room, sky, seen, starts,
+                cosine=mi.Float(0), aimed=mi.Bool(False), beta=mirrored, outdoors=mi.Bool(False),
             )  # fmt: skip
             sharp += seen
         return sharp, shared
@@ -355,19 +367,24 @@ class _Kernel:
         normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, opaque)
         behind = dr.dot(normal, direction) > 0
         normal = dr.select(behind, -normal, normal)
-        vertex = mi.Point3f(origin + direction * hit.t + normal * room.inside.epsilon)
+        place = mi.Point3f(origin + direction * hit.t + normal * room.inside.epsilon)
+        vertex = Vertex(place, normal, outdoors)
         rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, opaque) * dr.inv_pi
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
-        sun = sun_at(room, sky, vertex, normal, outdoors, u_sun, opaque)
+        sun = sun_at(room, sky, vertex, u_sun, opaque)
         sharp += dr.select(opaque, mi.Float64(straight * rho * sun), 0.0)
-        away, _ = leave(room, sky, vertex, normal, outdoors, u, mi.Float(1), opaque)
+        away, _ = leave(room, sky, vertex, u, mi.Float(1), opaque)
         # a surface's irradiance is pi times the mean by cosine; another window is looked into
         found = dr.zeros(mi.Float64, dr.width(lane))
+        starts = PathStarts(
+            lane, dr.select(opaque, place, origin), dr.select(opaque, away, direction),
+            mi.PCG32(generator), self._depth,
+            mi.Bool(active),  # a copy: the loop changes what it is given
+        )  # fmt: skip
         add_paths(
-            room, sky, found, lane, dr.select(opaque, vertex, origin),
-            dr.select(opaque, away, direction), mi.Float(0), mi.Bool(False),
-            dr.select(opaque, dr.pi, 1.0), mi.PCG32(generator), self._depth,
-            mi.Bool(active), outdoors,  # a copy: the loop changes what it is given
+            room, sky, found, starts,
+            cosine=mi.Float(0), aimed=mi.Bool(False), beta=dr.select(opaque, dr.pi, 1.0),
+            outdoors=outdoors,
         )  # fmt: skip
         face = self._faces.outside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(self._faces.windows - 1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -14,6 +15,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.lit_room import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import path_generator
 from mitsuba_cfs.trace.scene import OPAQUE
 
@@ -22,6 +24,14 @@ CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that pa
 # cosine.  After a reflection they must be few: weights grow by 1 / rest each time, and their mean
 # square stays finite only where rest > reflectance^2
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
+
+
+class Vertex(NamedTuple):
+    """A point of a diffuse surface that a path goes on from."""
+
+    position: mi.Point3f
+    normal: mi.Vector3f  # towards where the path came from
+    outdoors: mi.Bool
 
 
 def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
@@ -69,29 +79,19 @@ def straight_to_sky(
     return dr.select(free, tau, 0.0)
 
 
-def sun_at(
-    room: LitRoom,
-    sky: Sky,
-    position: mi.Point3f,
-    normal: mi.Vector3f,
-    outdoors: mi.Bool,
-    u: mi.Point2f,
-    active: mi.Bool,
-) -> mi.Float:
+def sun_at(room: LitRoom, sky: Sky, vertex: Vertex, u: mi.Point2f, active: mi.Bool) -> mi.Float:
     """Irradiance straight from the sun: outdoors, or in the room through a window's beam."""
     towards = on_disc(sky, u)
-    cosine = dr.dot(normal, towards)
+    cosine = dr.dot(vertex.normal, towards)
     active = active & (cosine > 0) & (sky.sun_radiance > 0)
-    tau = straight_to_sky(room, position, towards, outdoors, active)
+    tau = straight_to_sky(room, vertex.position, towards, vertex.outdoors, active)
     return dr.select(active, cosine * tau * sky.sun_radiance * float(SUN_SOLID_ANGLE), 0.0)
 
 
 def leave(
     room: LitRoom,
     sky: Sky,
-    position: mi.Point3f,
-    normal: mi.Vector3f,
-    outdoors: mi.Bool,
+    vertex: Vertex,
     u: mi.Point2f,
     choice: mi.Float,
     active: mi.Bool,
@@ -104,10 +104,10 @@ def leave(
     `later`: fewer, as from a path's vertices after its first.
     """
     window_share, sun_share = TO_WINDOW[later], TO_SUN[later]
-    choice = dr.select(outdoors, 1.0, choice)
-    cosine = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
-    point, _ = room.inside.sample_window(u, active & ~outdoors)
-    to_window = dr.normalize(mi.Vector3f(point - position))
+    choice = dr.select(vertex.outdoors, 1.0, choice)
+    cosine = mi.Frame3f(vertex.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
+    point, _ = room.inside.sample_window(u, active & ~vertex.outdoors)
+    to_window = dr.normalize(mi.Vector3f(point - vertex.position))
     to_sun = mi.Frame3f(sky.sun).to_world(mi.warp.square_to_uniform_cone(u, CONE_COSINE))
     aimed = choice < window_share
     direction = dr.select(aimed, to_window, cosine)
@@ -121,6 +121,7 @@ def _density(
     cosine: mi.Float,
     direction: mi.Vector3f,
     distance: mi.Float,
+    *,
     glass_cosine: mi.Float,  # of the window that was met, 0 for none
     later: mi.Bool,
 ) -> mi.Float:
@@ -147,6 +148,7 @@ def window_parts(
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
+    *,
     u: mi.Point2f,
     choice: mi.Float,
     glazed: mi.Bool,
@@ -190,7 +192,7 @@ def _at_window(
     """
     u = mi.Point2f(generator.next_float32(), generator.next_float32())
     scattered, straight, mirrored, mirror, rest, away = window_parts(
-        room, group, direction, towards, u, generator.next_float32(), glazed
+        room, group, direction, towards, u=u, choice=generator.next_float32(), glazed=glazed
     )
     whole = straight + mirrored + rest
     mark = generator.next_float32() * whole
@@ -204,21 +206,19 @@ def add_paths(
     room: LitRoom,
     sky: Sky | PatchSky,
     result: mi.Float64,  # [rows], or [rows * P] of a `PatchSky`, accumulated in place
-    row: mi.UInt32,
-    origin: mi.Point3f,
-    direction: mi.Vector3f,
+    starts: PathStarts,
+    *,
     cosine: mi.Float,  # at the room's diffuse vertex that the path starts on; 0 where it is none
     aimed: mi.Bool,  # whether the first direction aims at a window
-    beta: mi.Float,
-    generator: mi.PCG32,
-    max_depth: mi.UInt32,
-    active: mi.Bool,
+    beta: mi.Float,  # what the path carries when it starts
     outdoors: mi.Bool,  # where the path starts
 ) -> None:
     """Follow each path and add what it carries from sun, sky and ground to its row.
 
     The sun's disc itself is not seen at the end of a path, only where it scatters or shines.
     """
+    row, origin, direction = starts.row, starts.position, starts.direction
+    generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     diffuse = cosine > 0  # the ray left a diffuse vertex in the room: its density is to be applied
     depth = mi.UInt32(0)
     while active:
@@ -243,7 +243,9 @@ def add_paths(
         active &= ~glazed | facing
         glazed &= facing
         glass_cosine = dr.select(glazed & ~outdoors, local.z, 0.0)
-        density = _density(room, sky, cosine, direction, t, glass_cosine, depth > 0)
+        density = _density(
+            room, sky, cosine, direction, t, glass_cosine=glass_cosine, later=depth > 0
+        )
         beta *= dr.select(diffuse & ~outdoors, cosine / dr.maximum(density, 1e-12), 1.0)
         point = mi.Point3f(origin + direction * t)
 
@@ -270,13 +272,11 @@ def add_paths(
         rho_in = dr.gather(mi.Float, room.inside.reflectance, prim, opaque & ~outdoors)
         rho_out = dr.gather(mi.Float, room.outside.reflectance, prim, opaque & outdoors)
         beta_face = beta * dr.select(outdoors, rho_out, rho_in) * dr.inv_pi
-        vertex = mi.Point3f(point + face * room.inside.epsilon)
-        sun = sun_at(room, sky, vertex, face, outdoors, u_sun, opaque)
+        vertex = Vertex(mi.Point3f(point + face * room.inside.epsilon), face, outdoors)
+        sun = sun_at(room, sky, vertex, u_sun, opaque)
         dr.scatter_add(result, mi.Float64(beta_face * sun), row, opaque)
         u_away = mi.Point2f(generator.next_float32(), generator.next_float32())
-        away, aimed = leave(
-            room, sky, vertex, face, outdoors, u_away, generator.next_float32(), opaque, later=True
-        )
+        away, aimed = leave(room, sky, vertex, u_away, generator.next_float32(), opaque, later=True)
         cosine = dr.select(opaque, dr.dot(away, face), 0.0)
         beta_face *= dr.select(outdoors, dr.pi, 1.0)  # outdoors the cosine cancels at once
 
@@ -285,7 +285,7 @@ def add_paths(
         outward = glazed & (crossing > 0)
         offset = room.inside.outward(group, glazed)
         leaving = mi.Point3f(point + dr.select(outward, offset, -offset))
-        origin = dr.select(opaque, vertex, leaving)
+        origin = dr.select(opaque, vertex.position, leaving)
         direction = dr.select(opaque, away, next_direction)
         beta = dr.select(opaque, beta_face, beta * next_beta)
         diffuse = opaque & ~outdoors
@@ -318,7 +318,9 @@ def point_in_time(
         points, directions: [S, 3] sensor positions [m] and normals.
         samples: paths for each sensor in each batch.
     """
-    batch = sensor_batches(room, sky, points, directions, samples, max_depth, seed)
+    batch = sensor_batches(
+        room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed
+    )
     return accumulate(
         lambda number: batch(number)[:, 0],
         stopping=stopping,
@@ -332,6 +334,7 @@ def sensor_batches(
     sky: Sky | PatchSky,
     points: ArrayLike,
     directions: ArrayLike,
+    *,
     samples: int,
     max_depth: int,
     seed: int,
@@ -352,19 +355,18 @@ def sensor_batches(
         generator = path_generator(path, key)
         origin = mi.Point3f(dr.gather(mi.Point3f, place, sensor))
         normal = dr.gather(mi.Vector3f, normals, sensor)
-        outdoors = mi.Bool(False)
+        vertex = Vertex(origin, normal, mi.Bool(False))
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
-        sun = sun_at(room, sky, origin, normal, outdoors, u, mi.Bool(True))
+        sun = sun_at(room, sky, vertex, u, mi.Bool(True))
         dr.scatter_add(result, mi.Float64(sun), sensor)
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
-        away, aimed = leave(
-            room, sky, origin, normal, outdoors, u, generator.next_float32(), mi.Bool(True)
-        )
+        away, aimed = leave(room, sky, vertex, u, generator.next_float32(), mi.Bool(True))
         cosine = dr.dot(away, normal)
         depth = dr.opaque(mi.UInt32, max_depth)
+        starts = PathStarts(sensor, origin, away, generator, depth, cosine > 0)
         add_paths(
-            room, sky, result, sensor, origin, away, cosine, aimed, mi.Float(1), generator, depth,
-            cosine > 0, outdoors,
+            room, sky, result, starts,
+            cosine=cosine, aimed=aimed, beta=mi.Float(1), outdoors=vertex.outdoors,
         )  # fmt: skip
         return result.numpy().reshape(S, sky.columns) / n
 

@@ -134,6 +134,19 @@ class TracedScene:
         root = dr.sqrt(dr.maximum(1 - u.x, 0))
         return a * (1 - root) + b * (root * (1 - u.y)) + c * (root * u.y)
 
+    def surface_at(
+        self,
+        hit: mi.PreliminaryIntersection3f,
+        origin: mi.Point3f,
+        direction: mi.Vector3f,
+        active: mi.Bool,
+    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
+        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance."""
+        face = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
+        face = dr.mulsign(face, -dr.dot(face, direction))
+        point = mi.Point3f(origin + direction * hit.t + face * self.epsilon)
+        return point, face, dr.gather(mi.Float, self.reflectance, hit.prim_index, active)
+
     def to_local(self, group: mi.Int32, v: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
         """World vector in the frame of a window group (z is the exterior normal)."""
         x, y, z = (dr.gather(mi.Vector3f, row, group, active) for row in self._frame_rows)

@@ -32,6 +32,7 @@ def indirect_rows(
     bins: DirectionBins,
     place: mi.Point3f,  # [C]
     normal: mi.Vector3f,  # [C]
+    *,
     hits: int,
     paths: int,
     max_depth: int,
@@ -69,12 +70,12 @@ def indirect_rows(
         hit,
         dr.gather(mi.Point3f, position, hit),
         dr.gather(mi.Vector3f, face, hit),
-        dr.opaque(mi.Float, 1 / paths),
-        path - hit * count,
-        mi.sample_tea_32(hit, key ^ mi.UInt32(0x3C6EF372))[0],
-        path_generator(path, key ^ mi.UInt32(0xA54FF53A)),
-        dr.opaque(mi.UInt32, max_depth - 1),
-        dr.gather(mi.Float, weight, hit) > 0,
+        beta=dr.opaque(mi.Float, 1 / paths),
+        sample=path - hit * count,
+        stream=mi.sample_tea_32(hit, key ^ mi.UInt32(0x3C6EF372))[0],
+        generator=path_generator(path, key ^ mi.UInt32(0xA54FF53A)),
+        max_depth=dr.opaque(mi.UInt32, max_depth - 1),
+        active=dr.gather(mi.Float, weight, hit) > 0,
         carried=dr.gather(mi.Float, weight, hit),
     )
     return (exchange * share) @ rows.numpy().reshape(M, -1)
@@ -95,10 +96,7 @@ def _hits(
     hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=True)
     opaque = hit.is_valid()
     opaque &= dr.gather(mi.Int32, tracer.group, hit.prim_index, opaque) == OPAQUE
-    face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, opaque)
-    face = dr.mulsign(face, -dr.dot(face, direction))
-    position = mi.Point3f(start + direction * hit.t + face * tracer.epsilon)
-    weight = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, opaque)
+    position, face, weight = tracer.surface_at(hit, start, direction, opaque)
     dr.eval(position, face, weight)
     return position, face, weight
 

@@ -21,6 +21,7 @@ from mitsuba_cfs.trace.bins import SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import TracedScene
 
@@ -77,18 +78,15 @@ def straight_view_matrix(
         seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
         weight = cosine * local.z / dr.square(distance) * way.through(local)
         step = mi.Vector3f(*map(float, groups[g].frame[2])) * outside.epsilon
-        add_daylight_paths(
-            outside,
-            sky,
-            matrix,
+        starts = PathStarts(
             sensor,
             mi.Point3f(target + step),
             omega,
             path_generator(lane, key),
             dr.opaque(mi.UInt32, max_depth),
             seen & (weight > 0),
-            weight,
         )
+        add_daylight_paths(outside, sky, matrix, starts, weight)
         return matrix.numpy().reshape(S, sky.size) * (groups[g].area / n)
 
     def batch(number: int) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering, Scattering
-from mitsuba_cfs.trace.lit_room import PatchBeam, System
+from mitsuba_cfs.trace.lit_room import PatchBeam, PathOptics
 
 WINDOW_UP = (0, 1, 0)  # of a plugin that is asked in the window's own frame
 
@@ -27,19 +27,19 @@ def sun_scattering(bsdf: Bsdf) -> Scattering:
     return KlemsScattering(bsdf.basis_in, peak.scattered, peak.transmittance)
 
 
-def lit_system(bsdf: Bsdf) -> System:
+def lit_system(bsdf: Bsdf) -> PathOptics:
     """A system for paths that cross it either way, its through beam kept apart.
 
     The beam towards the room stands for that of the other direction too.
     """
     if isinstance(bsdf, TensorTreeBsdf):
         scattering, beam = _without_beam(bsdf), TreeBeam(bsdf) if _has_beams(bsdf) else None
-        return System(_loaded(tensor_tree_plugin(scattering)), beam)
+        return PathOptics(_loaded(tensor_tree_plugin(scattering)), beam)
     full = bsdf.filled()
     front = through_peak(full.transmission_front, bsdf.basis_in)
     back = through_peak(full.transmission_back, bsdf.basis_in)
     rest = replace(full, transmission_front=front.scattered, transmission_back=back.scattered)
-    return System(_loaded(klems_plugin(rest)), PatchBeam(bsdf.basis_in, front.transmittance))
+    return PathOptics(_loaded(klems_plugin(rest)), PatchBeam(bsdf.basis_in, front.transmittance))
 
 
 class TreeBeam:

@@ -78,17 +78,19 @@ def view_matrix(
     def batch(number: int) -> NDArray[np.float64]:
         matrix = dr.zeros(mi.Float64, int(np.prod(shape)))
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
-        _add_direct(tracer, bins, matrix, place, normal, n, key)
+        _add_direct(tracer, bins, matrix, place, normal, samples=n, key=key)
         values = matrix.numpy().reshape(S, -1)
         for block, sensors in enumerate(blocks if max_depth > 1 else []):
+            hits, paths = shares(len(sensors), n)
             rows = indirect_rows(
                 tracer,
                 bins,
                 dr.gather(mi.Point3f, place, mi.UInt32(sensors)),
                 dr.gather(mi.Vector3f, normal, mi.UInt32(sensors)),
-                *shares(len(sensors), n),
-                max_depth,
-                mi.sample_tea_32(key, mi.UInt32(block))[0],
+                hits=hits,
+                paths=paths,
+                max_depth=max_depth,
+                key=mi.sample_tea_32(key, mi.UInt32(block))[0],
             )
             values[sensors] += rows
         return values.reshape(shape)
@@ -111,6 +113,7 @@ def _add_direct(
     matrix: mi.Float64,
     place: mi.Point3f,
     normal: mi.Vector3f,
+    *,
     samples: int,
     key: mi.UInt32,
 ) -> None:
@@ -133,9 +136,9 @@ def _add_direct(
             sensor,
             dr.gather(mi.Point3f, place, sensor),
             dr.gather(mi.Vector3f, normal, sensor),
-            view - sensor * T,
-            cell - view * bins.size,
-            lane - cell * dr.opaque(mi.UInt32, strata),
-            dr.opaque(mi.UInt32, strata),
-            mi.Point2f(generator.next_float32(), generator.next_float32()),
+            triangle=view - sensor * T,
+            patch=cell - view * bins.size,
+            stratum=lane - cell * dr.opaque(mi.UInt32, strata),
+            strata=dr.opaque(mi.UInt32, strata),
+            u=mi.Point2f(generator.next_float32(), generator.next_float32()),
         )

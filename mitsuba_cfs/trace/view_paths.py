@@ -20,13 +20,14 @@ def add_view_paths(
     row: mi.UInt32,  # row of the matrix that each path adds to
     position: mi.Point3f,  # where the path starts
     normal: mi.Vector3f,  # direction that the irradiance is measured about
+    *,
     beta: mi.Float,  # weight of the irradiance at the start
     sample: mi.UInt32,  # number of the path in its stream
     stream: mi.UInt32,  # key of the stratified stream
     generator: mi.PCG32,
     max_depth: mi.UInt32,
     active: mi.Bool,
-    carried: mi.Float | None = None,
+    carried: mi.Float | None,  # no default: `dr.syntax` loses those of keywords
 ) -> None:
     """Add beta * d(irradiance at the start) / d(radiance of each patch) to the matrix.
 
@@ -35,7 +36,7 @@ def add_view_paths(
     which reflects to the room what its triangle's reflectance says.
 
     Args:
-        carried: share of light that Russian roulette starts with; without it roulette starts late.
+        carried: share of light that Russian roulette starts with; None: roulette starts late.
     """
     K = mi.UInt32(bins.size)
     width = mi.UInt32(bins.size * len(tracer.groups))
@@ -87,11 +88,7 @@ def add_view_paths(
         dr.scatter_add(matrix, mi.Float64(beta * value), slot, glazed)
 
         # ----- Bounce: E(x) gains rho E(hit); Russian roulette -----
-        face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, active)
-        face = dr.mulsign(face, -dr.dot(face, direction))
-        position = mi.Point3f(position + direction * hit.t + face * tracer.epsilon)
-        normal = face
-        rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, active)
+        position, normal, rho = tracer.surface_at(hit, position, direction, active)
         beta *= rho
         carried *= rho
         depth += 1

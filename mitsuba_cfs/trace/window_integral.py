@@ -20,6 +20,7 @@ def add_window_light(
     row: mi.UInt32,  # row of the matrix that each lane adds to
     position: mi.Point3f,
     normal: mi.Vector3f,  # direction that the irradiance is measured about
+    *,
     triangle: mi.UInt32,  # of the windows
     patch: mi.UInt32,
     stratum: mi.UInt32,  # of the patch's azimuths

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenes.calibration.costs import Calibration, Work
+from scenes.calibration.costs import Calibration, Workload
 from scenes.calibration.durations import spoken_time
 
 # Relative root mean square error of DGP against measurement: the dissertation's Table 13
@@ -37,7 +37,7 @@ BLURRED, SPECULAR = ("three-phase",), ("point-in-time", "DGP")
 class Demand:
     """What is asked for."""
 
-    work: Work
+    work: Workload
     time_budget: float  # [s]
     dgp_error: float  # relative
     fine: bool  # every system has a tensor tree, or a matrix with its straight beam apart
@@ -45,7 +45,7 @@ class Demand:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class MethodChoice:
     """A method, a glare metric, and the reason in a sentence or two."""
 
     method: str
@@ -55,7 +55,7 @@ class Choice:
     why: str
 
 
-def choose(demand: Demand, calibration: Calibration) -> Choice:
+def choose(demand: Demand, calibration: Calibration) -> MethodChoice:
     """The method and metric for a demand on the machine of a calibration.
 
     Where nothing meets both the error and the time, the nearest that the time allows is taken, or
@@ -85,7 +85,7 @@ def choose(demand: Demand, calibration: Calibration) -> Choice:
     return _choice(taken, seconds, demand, data + words)
 
 
-def _choice(pair, seconds: dict, demand: Demand, words: str) -> Choice:
+def _choice(pair, seconds: dict, demand: Demand, words: str) -> MethodChoice:
     method, metric = pair
     time, error = seconds[pair], ERRORS[pair]
     why = (
@@ -98,4 +98,4 @@ def _choice(pair, seconds: dict, demand: Demand, words: str) -> Choice:
         why += "; OVER the time budget"
     if error > demand.dgp_error:
         why += "; NOT the error asked for"
-    return Choice(method, metric, time, error, why)
+    return MethodChoice(method, metric, time, error, why)

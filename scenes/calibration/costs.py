@@ -19,7 +19,7 @@ HEAT = ("any method", "heat")  # gains, temperatures and comfort of a room
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class Workload:
     """How much there is to compute."""
 
     scenes: int  # rooms
@@ -42,7 +42,7 @@ class Calibration:
         """Methods and glare metrics that were measured."""
         return [(c.method, c.metric) for c in self.costs if c.metric in GLARE]
 
-    def seconds(self, method: str, metric: str, work: Work) -> float:
+    def seconds(self, method: str, metric: str, work: Workload) -> float:
         """Predicted time of a study: glare, illuminance by the same method, and heat [s]."""
         total = 0.0
         parts = ((method, metric, work.steps), (method, "illuminance", work.lit), (*HEAT, work.lit))

@@ -16,10 +16,11 @@ from scenes.calibration.costs import GLARE, HEAT, Calibration, machine_name
 from scenes.cost.measure import Cost
 from scenes.cost.reference import reference_costs
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.job.inputs import read_system, read_weather
-from scenes.job.options import RoomOptions
-from scenes.job.room import compute_room, skies_for
-from scenes.job.windows import everywhere
+from scenes.fenestration.systems import read_system
+from scenes.room.options import RoomOptions
+from scenes.room.room import compute_room, skies_for
+from scenes.room.windows import in_all_windows
+from scenes.run.inputs import read_weather
 
 PHASES = ("three-phase", "five-phase")
 
@@ -54,12 +55,12 @@ def room_costs(progress: Progress = silent, options: RoomOptions | None = None) 
     systems = (system, system, replace(system, visible=darker))
     for number, method in enumerate(PHASES):
         chosen = replace(options, method=method)
-        skies = skies_for(weather, chosen)
+        skies = skies_for(weather, method, chosen.sampling)
         with tempfile.TemporaryDirectory() as folder:
             cold, warm = MatrixCache(Path(folder) / "cold"), MatrixCache(Path(folder) / "warm")
             timed = [
                 compute_room(
-                    building, space, everywhere(space, each), weather, chosen,
+                    building, space, in_all_windows(space, each), weather, chosen,
                     skies=skies, cache=cache, pictures=False,
                 ).seconds
                 for each, cache in zip(systems, (cold, warm, warm), strict=True)

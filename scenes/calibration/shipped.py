@@ -13,22 +13,15 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
+from scenes.calibration import speed
 from scenes.calibration.costs import Calibration, calibration_file
 from scenes.cost.measure import Cost
 
 FILE = Path(__file__).with_name("shipped.json")
 PATHS = "point-in-time"
-
-
-@dataclass(frozen=True, slots=True)
-class Speed:
-    """Elapsed seconds of the two tests of a machine's speed, the least of several."""
-
-    tracing: float  # [s] V and D of an eye, on all cores or the GPU
-    rating: float  # [s] of one picture's glare
 
 
 def this_machines_costs() -> Calibration:
@@ -40,12 +33,9 @@ def this_machines_costs() -> Calibration:
     return Calibration.read(file) if file.is_file() else scaled_costs()
 
 
-def scaled_costs(here: Speed | None = None) -> Calibration:
+def scaled_costs(here: speed.Speed | None = None) -> Calibration:
     """The shipped costs for a machine of that speed; this one's, tested now, by default."""
-    if here is None:
-        from scenes.calibration.speed import measured_speed
-
-        here = measured_speed()
+    here = speed.measured_speed() if here is None else here
     there, costs = shipped_costs()
     tracing, rating = here.tracing / there.tracing, here.rating / there.rating
     origin = (
@@ -66,25 +56,24 @@ def _scaled(cost: Cost, tracing: float, rating: float) -> Cost:
     )
 
 
-def shipped_costs() -> tuple[Speed, Calibration]:
+def shipped_costs() -> tuple[speed.Speed, Calibration]:
     """The costs as they were measured, and the speed of the machine that they are of."""
     table = json.loads(FILE.read_text(encoding="utf-8"))
-    return Speed(**table.pop("speed")), Calibration.of(table)
+    return speed.Speed(**table.pop("speed")), Calibration.of(table)
 
 
 def main() -> None:
     """Measure this machine, its speed before and after, and write the file that ships."""
     from scenes.calibration.measure import calibrated
-    from scenes.calibration.speed import measured_speed
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--size", type=int, default=300, help="pixels of a side")
     size = parser.parse_args().size
-    before = measured_speed()
+    before = speed.measured_speed()
     found = calibrated(size)
-    after = measured_speed()
-    speed = {name: min(getattr(before, name), getattr(after, name)) for name in asdict(before)}
-    table = {"speed": speed} | asdict(found)
+    after = speed.measured_speed()
+    least = {name: min(getattr(before, name), getattr(after, name)) for name in asdict(before)}
+    table = {"speed": least} | asdict(found)
     FILE.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import fisheye
-from scenes.calibration.shipped import Speed
 from scenes.cost.reference import reference_costs
 
 TRACED = {"methods": ["three-phase"], "metrics": ["sDGP"], "size": 48}  # V and D of one eye
 SIDE = 200  # [px]
 TRACINGS, RATINGS = 4, 100  # how often: the least counts, which other work disturbs least
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """Elapsed seconds of the two tests of a machine's speed, the least of several."""
+
+    tracing: float  # [s] V and D of an eye, on all cores or the GPU
+    rating: float  # [s] of one picture's glare
 
 
 def measured_speed() -> Speed:

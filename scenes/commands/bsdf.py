@@ -15,6 +15,7 @@ from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, replacing, write_table
+from scenes.commands.room_options import seed_option
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
@@ -36,6 +37,10 @@ class Number(click.FloatRange):
 ANGLES = (Number(), Number())
 LENGTH, SHARE = Number(min=0, min_open=True), Number(0, 1)
 PERIOD = (LENGTH, LENGTH)
+BAND_OPTION = click.option(
+    "--band", default="Visible", show_default=True, help="Of the file: Visible or Solar."
+)
+INCIDENT = {"type": ANGLES, "metavar": "THETA PHI", "help": "To the light; in degrees."}
 
 
 @click.group("bsdf")
@@ -114,18 +119,21 @@ def _description(data: BsdfFile) -> list[str]:
 @command.command("eval")
 @click.argument("file", type=FILE)
 @click.argument("pairs", required=False, type=click.Choice(["-"]))
-@click.option("--in", "incident", type=ANGLES, metavar="THETA PHI", help="To the light [degrees].")
-@click.option("--out", "outgoing", type=ANGLES, metavar="THETA PHI", help="It leaves to [degrees].")
-@click.option("--band", default="Visible", show_default=True)
+@click.option(
+    "--incident", type=ANGLES, metavar="THETA PHI",
+    help="To the light [degrees]; together with --outgoing.",
+)  # fmt: skip
+@click.option("--outgoing", type=ANGLES, metavar="THETA PHI", help="It leaves to [degrees].")
+@BAND_OPTION
 def evaluate(file: Path, pairs: str | None, incident, outgoing, band: str) -> None:
     """Print the BSDF [1/sr] of FILE, angles in Radiance's frame.
 
-    With `-` instead of --in and --out: one `theta_in phi_in theta_out phi_out` a line from standard
-    input, answered by the same with the value last.  Radiance's frame has z into the room, x to
-    the left seen from outside and y up; both directions point away from the window.
+    With `-` instead of --incident and --outgoing: one `theta_in phi_in theta_out phi_out` a line
+    from standard input, answered by the same with the value last.  Radiance's frame has z into the
+    room, x to the left seen from outside and y up; both directions point away from the window.
     """
     if (pairs is None) == (incident is None or outgoing is None):
-        raise click.UsageError("give either --in THETA PHI --out THETA PHI, or -")
+        raise click.UsageError("give either --incident THETA PHI --outgoing THETA PHI, or -")
     bsdf = read_bsdf_xml(file, energy_limit=np.inf).bands.get(band)
     if bsdf is None:
         raise DataError(f"has no {band} band", file=file)
@@ -168,18 +176,18 @@ def _from_radiance(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @command.command()
 @click.argument("file", type=FILE)
-@click.option("--in", "incident", type=ANGLES, required=True, metavar="THETA PHI")
-@click.option("--band", default="Visible", show_default=True)
-@click.option("--out", "output", type=FILE, required=True, help="PNG, PDF or SVG to write.")
-def plot(file: Path, incident: tuple[float, float], band: str, output: Path) -> None:
+@click.option(
+    "--incident", type=ANGLES, required=True, metavar="THETA PHI", help="To the light [degrees]."
+)
+@BAND_OPTION
+@click.option("--out", type=FILE, required=True, help="PNG, PDF or SVG to write.")
+def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> None:
     """Draw both hemispheres for the light from one direction (Radiance's frame, degrees)."""
     from matplotlib.backend_bases import FigureCanvasBase
 
-    if output.suffix.lstrip(".").lower() not in FigureCanvasBase.get_supported_filetypes():
-        raise click.UsageError(
-            f"--out {output}: expected a file name that ends in .png, .pdf, .svg"
-        )
-    check_file(output, inputs=[file])
+    if out.suffix.lstrip(".").lower() not in FigureCanvasBase.get_supported_filetypes():
+        raise click.UsageError(f"--out {out}: expected a file name that ends in .png, .pdf, .svg")
+    check_file(out, inputs=[file])
     data = read_bsdf_xml(file, energy_limit=np.inf)
     if band not in data.bands:
         raise DataError(f"has no {band} band", file=file)
@@ -188,7 +196,7 @@ def plot(file: Path, incident: tuple[float, float], band: str, output: Path) -> 
     from scenes.bsdf_plots import plot_hemispheres
 
     figure = plot_hemispheres(data.bands[band], direction, title)
-    with replacing(output) as part:
+    with replacing(out) as part:
         figure.savefig(part)
 
 
@@ -219,40 +227,40 @@ def plot(file: Path, incident: tuple[float, float], band: str, output: Path) -> 
 @click.option(
     "--paths", type=click.IntRange(min=1), default=32_768, help="For each direction and side."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0)
+@seed_option
 @click.option("--name", default="", help="Name to write into the file.")
-@click.option("--out", "output", type=FILE, required=True, help="XML file to write.")
-def generate(output: Path, **options) -> None:
+@click.option("--out", type=FILE, required=True, help="XML file to write.")
+def generate(out: Path, **options) -> None:
     """Trace the BSDF of a blind, screen or Radiance geometry and write it."""
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
 
-    check_file(output, inputs=[options["geometry"]])
+    check_file(out, inputs=[options["geometry"]])
     with ProgressBar() as progress:
         file, exact = generated_file(progress=progress, **options)
-    write_bsdf_xml(file, output)
-    click.echo(f"{output}: {exact}")
+    write_bsdf_xml(file, out)
+    click.echo(f"{out}: {exact}")
 
 
 @command.command()
 @click.argument("layers", nargs=-1, required=True, type=FILE, metavar="OUTER.xml ... INNER.xml")
 @click.option("--name", default="", help="Name to write into the file.")
 @click.option("--absorptances", type=FILE, help="CSV file: what each layer absorbs, by patch.")
-@click.option("--out", "output", type=FILE, required=True, help="XML file to write.")
-def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, output: Path) -> None:
+@click.option("--out", type=FILE, required=True, help="XML file to write.")
+def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out: Path) -> None:
     """Combine layers, the exterior one first, by Klems matrix algebra.
 
     Inter-reflections are all counted; gaps between the files are taken to be empty.
     """
     from scenes.bsdf_combination import combined_file
 
-    for option, path in (("--out", output), ("--absorptances", absorptances)):
+    for option, path in (("--out", out), ("--absorptances", absorptances)):
         if path is not None:
             check_file(path, field=option, inputs=layers)
     file, table = combined_file(layers, name)
-    write_bsdf_xml(file, output)
+    write_bsdf_xml(file, out)
     if absorptances is not None:
         write_table(table, absorptances, index=False, float_format="%.6g")
     for band in file.bands:
         tau = direct_hemispherical(file.band(band), "transmission_front", [0.0, 0.0, 1.0])[0]
-        click.echo(f"{output}: {band}: transmittance at normal incidence {tau:.4f}")
+        click.echo(f"{out}: {band}: transmittance at normal incidence {tau:.4f}")

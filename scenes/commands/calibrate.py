@@ -6,12 +6,11 @@ from pathlib import Path
 
 import click
 
+from scenes.commands.room_options import size_option
+
 
 @click.command()
-@click.option(
-    "--size", type=click.IntRange(64, 2000), default=300, show_default=True,
-    help="Pixels of a side of the pictures; costs are scaled to those of a study.",
-)  # fmt: skip
+@size_option("size", 300, "costs are scaled to those of a study")
 @click.option(
     "--out", type=click.Path(path_type=Path, dir_okay=False),
     help="Where to keep it; default: where `cfs study` looks.",

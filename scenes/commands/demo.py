@@ -8,7 +8,7 @@ import click
 
 from scenes.commands.run import run_to_folder
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.job.options import JobOptions
+from scenes.run.options import JobOptions
 
 
 @click.command()

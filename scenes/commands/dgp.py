@@ -10,9 +10,18 @@ from scenes import quick
 from scenes.commands.parameters import IFC_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    eye_height_option,
     join_option,
+    method_option,
+    out_folder_option,
     room_files,
+    samples_option,
+    seed_option,
+    size_option,
+    space_option,
+    subdivide_option,
     system_option,
+    view_option,
     weather_option,
 )
 from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
@@ -24,13 +33,10 @@ _DEFAULT = YearOptions(Path(), Path())
 @click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
 @weather_option
 @system_option
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
-@click.option("--space", help="Name or GUID of the room; default: the first with a window.")
+@out_folder_option
+@space_option("space", "default: the first with a window", several=False)
 @join_option
-@click.option(
-    "--view", "views", multiple=True, metavar="'-vta ...'|FILE.vf",
-    help="View in Radiance's syntax, or a file of them; default: the room's middle, to its window.",
-)  # fmt: skip
+@view_option("views", "or a file of them", several=True)
 @click.option(
     "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."
 )
@@ -38,23 +44,14 @@ _DEFAULT = YearOptions(Path(), Path())
     "--directions", type=click.IntRange(1, 64), default=_DEFAULT.directions, show_default=True,
     help="Directions of every eye, the first to the biggest window.",
 )  # fmt: skip
-@click.option(
-    "--eye-height", type=click.FloatRange(0.3, 3), default=_DEFAULT.eye_height, show_default=True,
-    help="Above the floor [m].",
-)  # fmt: skip
-@click.option("--method", type=click.Choice(METHODS), default=_DEFAULT.method, show_default=True)
+@eye_height_option
+@method_option(METHODS, "by paths there are single pictures, cfs picture", default=_DEFAULT.method)
 @click.option(
     "--metric", type=click.Choice(METRICS), default=_DEFAULT.metric, show_default=True,
     help="DGP; enhanced simplified (sources of direct light); simplified (illuminance alone).",
 )  # fmt: skip
-@click.option(
-    "--size", type=click.IntRange(64, 4096), default=_DEFAULT.size, show_default=True,
-    help="Pixels of a side.",
-)  # fmt: skip
-@click.option(
-    "--samples", type=click.IntRange(1, 4096), default=_DEFAULT.samples, show_default=True,
-    help="Paths of a pixel.",
-)  # fmt: skip
+@size_option("size", _DEFAULT.size, "as evalglare wants them")
+@samples_option(_DEFAULT.samples, "for all hours together")
 @click.option(
     "--memory", "memory_gb", type=click.FloatRange(0.01, 1024), default=_DEFAULT.memory_gb,
     show_default=True, help="Of a view's matrices [GiB]; above it they lie on disk.",
@@ -68,7 +65,8 @@ _DEFAULT = YearOptions(Path(), Path())
     help="Pictures of each view's worst hours.",
 )  # fmt: skip
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
-@click.option("--seed", type=int, default=_DEFAULT.seed, show_default=True)
+@subdivide_option
+@seed_option
 @quick_option
 def command(
     building: Path | None, weather: Path | None, system: Path | None, out: Path, **chosen

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.parameters import FILE, IFC_FILE
-from scenes.commands.room_options import join_option
+from scenes.commands.room_options import join_option, space_option, u_option
 from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
@@ -39,12 +39,12 @@ def command() -> None:
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--csv", "table", type=click.Path(path_type=Path), help="Also write the problems.")
+@click.option("--csv", "problems", type=click.Path(path_type=Path), help="Also write the problems.")
 @join_option
-def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
+def check(building: Path, join: tuple[str, ...], problems: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
-    if table is not None:
-        check_file(table, field="--csv", inputs=[building])
+    if problems is not None:
+        check_file(problems, field="--csv", inputs=[building])
     from rich.console import Console
 
     from bim.ifc.building import read_ifc
@@ -61,19 +61,19 @@ def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
         f"{len(read.windows)} windows, {sum(w.area for w in read.windows):.1f} m2 of glass, "
         f"{len(read.problems)} problems"
     )
-    if table is not None:
+    if problems is not None:
         import pandas as pd
 
         rows = [(p.where, p.what, p.consequence) for p in read.problems]
         columns = ["where", "what", "consequence"]
-        write_table(pd.DataFrame(rows, columns=columns), table, index=False)
+        write_table(pd.DataFrame(rows, columns=columns), problems, index=False)
 
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--window", "windows", multiple=True, metavar="GUID", help="A window or door.")
 @click.option("--type", "types", multiple=True, metavar="NAME", help="Windows of a type.")
-@click.option("--room", "rooms", multiple=True, metavar="NAME", help="Windows of a room.")
+@space_option("rooms", "its windows")
 @click.option("--storey", "storeys", multiple=True, metavar="NAME", help="Windows of a storey.")
 @click.option(
     "--facade", "facades", multiple=True, metavar="N|E|S|W|FROM-TO",
@@ -89,9 +89,9 @@ def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
 )  # fmt: skip
 @click.option(
     "--g", "g_value", metavar="NUMBER|FILE.csv",
-    help="g at normal incidence, or a CSV: polar_deg, g and maybe azimuth_deg.",
+    help="g at normal incidence; or a CSV: polar_deg, g and maybe azimuth_deg.",
 )  # fmt: skip
-@click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
+@u_option
 @click.option("--state", default="", help="Name of the shading state; default: the usual one.")
 @click.option("--reference", is_flag=True, help="Name the BSDF file instead of copying it.")
 @click.option(
@@ -100,6 +100,7 @@ def check(building: Path, join: tuple[str, ...], table: Path | None) -> None:
 )  # fmt: skip
 def attach(
     building: Path,
+    *,
     bsdf: Path | None,
     g_value: str | None,
     u_value: float | None,
@@ -110,13 +111,13 @@ def attach(
 ) -> None:
     """Write BSDF, U, g, thermal closure and the place of the shade into an IFC file's windows.
 
-    --room, --storey, --facade and --type narrow each other; one of them given twice widens.
+    --space, --storey, --facade and --type narrow each other; one of them given twice widens.
     """
     if bsdf is None and g_value is None and u_value is None:
         raise click.UsageError("nothing to attach: give --bsdf, --g or --u")
     # g may be a number, which no file is; the building may be written back
     check_file(out, inputs=[bsdf, None if g_value is None else Path(g_value)])
-    from scenes.job.state_to_attach import state_to_attach
+    from scenes.fenestration.state_to_attach import state_to_attach
 
     one, notes = state_to_attach(
         bsdf, name=state, u_value=u_value, g_value=g_value, copy_bsdf=not reference
@@ -134,21 +135,22 @@ def attach(
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--space", "names", multiple=True, help="Name or GUID; default: all.")
+@space_option("spaces", "default: all")
 @join_option
 @click.option(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
-    help="Folder; one folder inside for each room with a window.",
+    help="Folder of Radiance scenes; one folder inside for each room with a window.",
 )  # fmt: skip
 @click.option(
     "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
-    help="Folder; one folder inside for each room with a window.",
+    help="Folder of Mitsuba scenes; one folder inside for each room with a window.",
 )  # fmt: skip
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 def export(
     building: Path,
-    names: tuple[str, ...],
+    *,
+    spaces: tuple[str, ...],
     join: tuple[str, ...],
     radiance: Path | None,
     mitsuba: Path | None,
@@ -180,12 +182,12 @@ def export(
     from bim.to_radiance import write_radiance
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
-    from scenes.job.inputs import named_spaces
+    from scenes.run.inputs import named_spaces
 
     with ProgressBar() as progress:
         read = read_ifc(building, join=join, progress=progress)
-    spaces = named_spaces(read, names, building)
-    known = known_fenestration(spaces, building)
+    chosen = named_spaces(read, spaces, building)
+    known = known_fenestration(chosen, building)
 
     def radiance_room(space: Space, building: Building, folder: Path) -> None:
         write_radiance(space, building, folder, filled=known.groups(space))
@@ -204,17 +206,17 @@ def export(
 
         with folder.replaced(gone=of_these) as place:
             written += _export_rooms(
-                read, spaces, place, [writers[option] for option in formats[parent]]
+                read, chosen, place, [writers[option] for option in formats[parent]]
             )
         for name in written:
             click.echo(parent / name)
     assumed: tuple[str, ...] = ()
     if epjson is not None:
         u_and_g, assumed = known.u_and_g()
-        write_epjson(read, epjson, spaces=spaces, known=u_and_g)
+        write_epjson(read, epjson, spaces=chosen, known=u_and_g)
         click.echo(epjson)
     if gltf is not None:
-        write_gltf(replace(read, spaces=tuple(spaces)), gltf)
+        write_gltf(replace(read, spaces=tuple(chosen)), gltf)
         click.echo(gltf)
     notes = known.notes() if folders or epjson is not None else ()
     for note in (*notes, *assumed):
@@ -232,9 +234,7 @@ def _export_rooms(
         try:
             for write in writers if space.windows else ():
                 write(space, building, place / name)
-        except ValueError as error:  # a void too low for a work plane or an eye
-            if isinstance(error, DataError):
-                raise
+        except RoomError as error:  # a void too low for a work plane or an eye
             click.echo(f"{space.label}: left out: {error}", err=True)
             shutil.rmtree(place / name, ignore_errors=True)
             continue
@@ -244,11 +244,11 @@ def _export_rooms(
 
 @command.command()
 @click.argument("files", type=FILE, nargs=-1, required=True, metavar="BUILDING.ifc...")
-@click.option("--markdown", "out", type=click.Path(path_type=Path), help="Also write the table.")
-def survey(files: tuple[Path, ...], out: Path | None) -> None:
+@click.option("--markdown", "table", type=click.Path(path_type=Path), help="Also write the table.")
+def survey(files: tuple[Path, ...], table: Path | None) -> None:
     """Check and convert many IFC files: rooms, windows, quantities, seconds and memory of each."""
-    if out is not None:
-        check_file(out, field="--markdown", inputs=files)
+    if table is not None:
+        check_file(table, field="--markdown", inputs=files)
     from bim.ifc.survey import markdown
     from bim.ifc.survey import survey as surveyed
     from scenes.commands.progress_bar import ProgressBar
@@ -260,8 +260,8 @@ def survey(files: tuple[Path, ...], out: Path | None) -> None:
             rows.append(row)
             if len(rows) < len(files):
                 progress(Stage("", "file", len(rows) + 1, len(files)), 0.0)
-            if out is not None:  # what is done is kept if the rest is broken off
-                write_text(out, markdown(rows) + "\n")
+            if table is not None:  # what is done is kept if the rest is broken off
+                write_text(table, markdown(rows) + "\n")
     click.echo(markdown(rows))
 
 

@@ -10,9 +10,15 @@ import click
 from mitsuba_cfs.files import check_file
 from scenes.commands.parameters import IFC_FILE
 from scenes.commands.room_options import (
+    eye_height_option,
     join_option,
     room_files,
+    samples_option,
+    seed_option,
+    size_option,
+    space_option,
     system_option,
+    view_option,
     weather_option,
 )
 from scenes.picture_options import SUFFIXES, PictureOptions
@@ -25,32 +31,23 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @click.option(
     "--at", required=True, metavar="'MM-DD HH:MM'", help="The hour of the weather that holds it."
 )
-@click.option("--space", help="Name or GUID of the room; default: the first with a window.")
+@space_option("space", "default: the first with a window", several=False)
 @join_option
-@click.option(
-    "--view", metavar="'-vta ...'|FILE.vf",
-    help="View in Radiance's syntax, not parallel; default: the room's middle, to its window.",
-)  # fmt: skip
-@click.option("--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True)
-@click.option(
-    "--size", type=click.IntRange(16, 4096), default=800, show_default=True,
-    help="Pixels of the longer side.",
-)  # fmt: skip
-@click.option(
-    "--samples", type=click.IntRange(1, 4096), default=16, show_default=True,
-    help="Paths of a pixel.",
-)  # fmt: skip
+@view_option("view", "not parallel", several=False)
+@eye_height_option
+@size_option("size", 800, "as evalglare wants them")
+@samples_option(16, "for the one hour")
 @click.option("--tone", is_flag=True, help="PNG tone-mapped for the eye, not in falsecolour.")
-@click.option("--seed", type=int, default=0, show_default=True)
+@seed_option
 @click.option(
-    "--out", "files", type=click.Path(dir_okay=False, path_type=Path), multiple=True, required=True,
+    "--out", type=click.Path(dir_okay=False, path_type=Path), multiple=True, required=True,
     help=f"File to write ({', '.join(SUFFIXES)}); may be repeated.",
 )  # fmt: skip
 def command(
     building: Path | None,
     weather: Path | None,
     system: Path | None,
-    files: tuple[Path, ...],
+    out: tuple[Path, ...],
     tone: bool,
     **chosen,
 ) -> None:
@@ -59,7 +56,7 @@ def command(
     What fills the windows without --cfs: the BSDF attached to them or their types in the IFC, else
     the transmittance that it states.  Without BUILDING the demo's office.
     """
-    for file in files:
+    for file in out:
         if file.suffix not in SUFFIXES:
             raise click.UsageError(f"--out {file}: expected one of {', '.join(SUFFIXES)}")
         check_file(file)
@@ -67,19 +64,14 @@ def command(
 
     start = time.perf_counter()
     options = PictureOptions(*room_files(building, weather, system), **chosen)
-    try:
-        read = read_files(options)  # before anything heavy is loaded
-        from mitsuba_cfs.glare.evaluation import evaluate
-        from scenes.commands.progress_bar import ProgressBar
-        from scenes.view_picture import room_picture, write_picture
+    read = read_files(options)  # before anything heavy is loaded
+    from mitsuba_cfs.glare.evaluation import evaluate
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.view_picture import room_picture, write_picture
 
-        with ProgressBar() as progress:
-            found = room_picture(options, progress, read)
-    except ValueError as error:
-        if type(error) is not ValueError:
-            raise
-        raise click.UsageError(str(error)) from None
-    for file in files:
+    with ProgressBar() as progress:
+        found = room_picture(options, progress, read)
+    for file in out:
         write_picture(found, file, print_like=tone)
     view, lit = found.view, found.luminance
     says = f"{found.room}, {found.time:%d %B %H:%M}: {view.width} x {view.height} pixels"

@@ -14,18 +14,25 @@ if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
 from scenes.commands.quick_option import quick_option
+from scenes.commands.room_options import (
+    needed_weather_option,
+    no_cache_option,
+    out_folder_option,
+    seed_option,
+)
 
 
 @click.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
+@needed_weather_option
 @click.option("--study", "study_file", required=True, type=FILE, help="TOML file, docs/pv.md.")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
-@click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
+@out_folder_option
+@seed_option
+@no_cache_option
 @quick_option
 def command(
     building: Path,
+    *,
     weather: Path,
     study_file: Path,
     out: Path,
@@ -38,7 +45,7 @@ def command(
     Modules are found by material, type, name or GUID; shade and reflections by everything in the
     model are traced, the sun as its exact disc.
     """
-    from mitsuba_cfs.sky.weather import read_epw
+    from mitsuba_cfs.sky.epw import read_epw
     from scenes.photovoltaics.study_file import read_pv_study
     from scenes.result_folder import ResultFolder
 

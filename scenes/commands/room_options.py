@@ -1,7 +1,12 @@
-"""Options that every command which reads rooms has, and the demo's room where none is given."""
+"""The options that commands share, each spelled, typed and explained once; the demo's room.
+
+What a command means by one of them beside that stands behind a semicolon in its help:
+`tests/scenes/test_option_names.py` holds every command to it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
@@ -9,11 +14,18 @@ import click
 from scenes.commands.parameters import FILE
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 
+Option = Callable[[Callable], Callable]
+
+out_folder_option = click.option(
+    "--out", required=True, type=click.Path(path_type=Path), help="Folder of results."
+)
 join_option = click.option(
     "--join", multiple=True, metavar="'ROOM + ROOM'",
     help="Rooms open to each other that are to be one.",
 )  # fmt: skip
-
+needed_weather_option = click.option(
+    "--weather", required=True, type=FILE, help="EPW file, hourly."
+)
 weather_option = click.option(
     "--weather", type=FILE, help="EPW file, hourly; needed with a building of your own."
 )
@@ -21,6 +33,63 @@ system_option = click.option(
     "--cfs", "system", type=FILE,
     help="BSDF XML file of every window, Klems full or tensor tree; default: what the IFC holds.",
 )  # fmt: skip
+u_option = click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
+eye_height_option = click.option(
+    "--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True,
+    help="Of the eye above the floor [m].",
+)  # fmt: skip
+seed_option = click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the random numbers.",
+)  # fmt: skip
+subdivide_option = click.option(
+    "--subdivide", "window_parts", type=click.IntRange(1, 64), default=0, metavar="N",
+    help="Parts of each window group; default: as many as what stands outdoors asks for.",
+)  # fmt: skip
+no_cache_option = click.option(
+    "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."
+)
+
+
+def space_option(name: str, what: str, *, several: bool = True) -> Option:
+    """`--space` into the parameter `name`; `what` it is for, or which room without it."""
+    text = f"Name or GUID of a room; {what}."
+    return click.option("--space", name, multiple=several, metavar="NAME", help=text)
+
+
+def method_option(methods: Sequence[str], what: str, *, default: str | None = None) -> Option:
+    """`--method`, of the methods that the command has."""
+    return click.option(
+        "--method", type=click.Choice(methods), default=default, show_default=default is not None,
+        help=f"How light is computed; {what}.",
+    )  # fmt: skip
+
+
+def size_option(name: str, default: int, why: str) -> Option:
+    """`--size` of pictures into the parameter `name`; `why` it is that by default."""
+    return click.option(
+        "--size", name, type=click.IntRange(16, 4096), default=default, show_default=True,
+        help=f"Pixels of a picture's longer side; {why}.",
+    )  # fmt: skip
+
+
+def samples_option(default: int, why: str) -> Option:
+    """`--samples` of pictures; `why` they are that many by default."""
+    return click.option(
+        "--samples", type=click.IntRange(1, 4096), default=default, show_default=True,
+        help=f"Paths of a pixel; {why}.",
+    )  # fmt: skip
+
+
+def view_option(name: str, what: str, *, several: bool) -> Option:
+    """`--view` into the parameter `name`."""
+    return click.option(
+        "--view", name, multiple=several, metavar="'-vta ...'|FILE.vf",
+        help=f"View in Radiance's syntax; {what}, default: the room's middle, to its window.",
+    )  # fmt: skip
 
 
 def room_files(

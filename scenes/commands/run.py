@@ -2,48 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import click
 
+from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.quick_option import given, quick_option
-from scenes.commands.room_options import join_option, system_option
-from scenes.job.options import METHODS, JobOptions
+from scenes.commands.room_options import (
+    join_option,
+    method_option,
+    needed_weather_option,
+    no_cache_option,
+    out_folder_option,
+    seed_option,
+    size_option,
+    space_option,
+    subdivide_option,
+    system_option,
+    u_option,
+)
+from scenes.room.options import RoomOptions
+from scenes.run.options import JobOptions
 
 LOADS = ("heating", "cooling", "lighting")
-_DEFAULT = JobOptions(Path(), Path())
+_DEFAULT = RoomOptions()
 
 
 @click.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--weather", required=True, type=FILE, help="EPW file, hourly.")
+@needed_weather_option
 @system_option
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
-@click.option(
-    "--method", type=click.Choice(METHODS), default=_DEFAULT.method, show_default=True,
-    help="How light is computed: see docs/daylight.md.",
-)  # fmt: skip
-@click.option("--space", "spaces", multiple=True, help="Name or GUID; default: all with a window.")
-@click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U-value [W/(m2 K)].")
+@out_folder_option
+@method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
+@space_option("spaces", "default: all with a window")
+@u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @join_option
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
+@size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
 @click.option(
-    "--picture-size", type=click.IntRange(64, 4096), default=_DEFAULT.picture_size,
-    show_default=True, help="Pixels of a side.",
-)  # fmt: skip
-@click.option(
-    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.sensor_spacing,
+    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.grid.spacing,
     show_default=True, help="Sensor spacing [m].",
 )  # fmt: skip
 @click.option(
-    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.sensor_height,
+    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.grid.height,
     show_default=True, help="Work plane above the floor [m].",
 )  # fmt: skip
 @click.option(
@@ -55,14 +62,21 @@ _DEFAULT = JobOptions(Path(), Path())
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
 @click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the random numbers.")
-@click.option("--no-cache", is_flag=True, help="Trace everything anew; keep nothing.")
+@subdivide_option
+@seed_option
+@no_cache_option
 @quick_option
 def command(
     building: Path,
+    *,
     weather: Path,
     system: Path | None,
     out: Path,
+    spaces: tuple[str, ...],
+    u_value: float | None,
+    g_value: float | None,
+    join: tuple[str, ...],
+    operation: Path | None,
     no_cache: bool,
     quick: bool,
     **chosen,
@@ -70,17 +84,20 @@ def command(
     """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
-    options = JobOptions(building, weather, system, cache=not no_cache, quick=quick, **chosen)
     if quick:
-        options = replace(options, **quick_run.picks(quick_run.ROOM, given()))
+        chosen |= quick_run.picks(quick_run.ROOM, given())
+    options = JobOptions(
+        building, weather, system, operation, spaces, join, u_value, g_value,
+        cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen),
+    )  # fmt: skip
     run_to_folder(options, out)
 
 
 def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     """Run the job with a progress bar, say what comes out room by room, and write its files."""
     from mitsuba_cfs.matrices.cache import default_folder
-    from scenes.job.files import read_files
     from scenes.result_folder import ResultFolder
+    from scenes.run.files import read_files
 
     inputs = (options.building, options.weather, options.system, options.operation)
     folder = ResultFolder(out, command, inputs=inputs)
@@ -89,14 +106,14 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.job.outputs import write_results
-    from scenes.job.run import run_job
     from scenes.report import write_report
+    from scenes.run.outputs import write_results
+    from scenes.run.run import run_job
 
     if options.quick:
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress, compiled_beside():
-        result = run_job(options, progress, files, told=lambda room: click.echo(summary_line(room)))
+        result = run_job(options, progress, files, on_room=_print_summary)
         progress("results", 0.0)
         write_results(result, folder, write_report)
         progress("results", 1.0)
@@ -106,6 +123,10 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+
+
+def _print_summary(room) -> None:
+    click.echo(summary_line(room))
 
 
 def summary_line(room) -> str:

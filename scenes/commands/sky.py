@@ -38,7 +38,7 @@ format_option = click.option(
 )  # fmt: skip
 ground_option = click.option(
     "-g", "--ground", type=click.FloatRange(0, 1), default=None,
-    help="Ground reflectance [default: the weather's albedo, 0.2]",
+    help="Ground reflectance; default: the weather's albedo, 0.2.",
 )  # fmt: skip
 
 
@@ -89,7 +89,7 @@ def command() -> None:
 @sun_option
 @format_option
 def matrix(
-    weather: Path, out: Path, subdivision: str, output: str, part: str, rotate: float,
+    weather: Path, out: Path, *, subdivision: str, output: str, part: str, rotate: float,
     only_up: bool, five_phase: bool, color: tuple[float, float, float], sun_patches: int,
     measured: bool, ground: float | None, sun_model: str, kind: str,
 ) -> None:  # fmt: skip
@@ -119,14 +119,14 @@ def matrix(
             "dtype": np.float32 if kind == "float" else np.float64,
         }
         with ProgressBar() as progress:
-            coloured = _coloured_sky(hours, mf, band, part, color, options, progress)
+            coloured = _coloured_sky(hours, mf, band, part, color, progress=progress, **options)
     coloured = coloured / EFFICACY if band == "visible" else coloured
     place = f"LATLONG= {hours.latitude_deg:.8f} {hours.longitude_deg:.8f}"
     write_matrix(out, coloured, format=kind, components=3, lines=[_command_line(), place])
     click.echo(f"{out}: {coloured.shape[0]} patches x {coloured.shape[1]} time steps, {band}")
 
 
-def _coloured_sky(hours, subdivision, band, part, color, options, progress):
+def _coloured_sky(hours, subdivision, band, part, color, *, progress, **options):
     """Values [P, H], or [P, H, 3] where sky and sun have different colours."""
     from mitsuba_cfs.sky.matrix import sky_matrix
 
@@ -203,7 +203,7 @@ def wea(weather: Path, out: Path) -> None:
     help="No direct sun below this altitude [degrees].",
 )  # fmt: skip
 def measured(
-    table: Path, out: Path, latitude: float, longitude: float, timezone: float,
+    table: Path, out: Path, *, latitude: float, longitude: float, timezone: float,
     elevation: float, label: str, least_altitude: float,
 ) -> None:  # fmt: skip
     """Write measured global and diffuse irradiance as a WEA file OUT.
@@ -240,10 +240,10 @@ def measured(
 @click.option("--azimuth", type=float, default=180.0, show_default=True,
               help="Of the sun, clockwise from north [degrees].")  # fmt: skip
 @click.option("-g", "--ground", type=click.FloatRange(0, 1), default=0.2, show_default=True,
-              help="Ground reflectance.")  # fmt: skip
+              help="Ground reflectance; of the whole ground.")  # fmt: skip
 @format_option
 def cie(
-    kind_of_sky: str, out: Path, subdivision: str, horizontal: float, altitude: float,
+    kind_of_sky: str, out: Path, *, subdivision: str, horizontal: float, altitude: float,
     azimuth: float, ground: float, kind: str,
 ) -> None:  # fmt: skip
     """Write a CIE sky as a Radiance sky vector OUT (patches x 1), without its sun.
@@ -274,8 +274,8 @@ def sun_steps(weather: Weather, sun_model: str) -> np.ndarray:
 
 def read_weather(path: Path) -> Weather:
     """An EPW or a WEA file, by its first word."""
+    from mitsuba_cfs.sky.epw import read_epw
     from mitsuba_cfs.sky.wea import read_wea
-    from mitsuba_cfs.sky.weather import read_epw
 
     try:
         with open(path, "rb") as file:

@@ -9,17 +9,18 @@ import click
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import quick_option
+from scenes.commands.room_options import method_option, out_folder_option
 
 
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+@out_folder_option
 @click.option(
     "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
     help="Cases at a time on this machine; one already uses all cores.",
 )  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, such as tcp://host:8786.")
-@click.option("--method", type=click.Choice(["auto"]), help="Choose by cost and error.")
+@method_option(["auto"], "auto: by cost and error, in place of the file's")
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
 @click.option(
@@ -29,6 +30,7 @@ from scenes.commands.quick_option import quick_option
 @quick_option
 def command(
     study: Path,
+    *,
     out: Path,
     processes: int,
     scheduler: str | None,
@@ -63,7 +65,7 @@ def command(
         check_dask()
     check_files(parsed)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.job.inputs import read_weather
+    from scenes.run.inputs import read_weather
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.study import run_study, write_study
@@ -81,7 +83,7 @@ def command(
     with ProgressBar() as progress:
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
-            progress=progress, told=_tell,
+            progress=progress, on_case=_print_case,
         )  # fmt: skip
     nothing = result.failed == len(result.results)
     report = None if nothing else lambda path: write_study_report(result, path)
@@ -107,7 +109,7 @@ def command(
         )
 
 
-def _tell(case, result, ready: int, total: int) -> None:
+def _print_case(case, result, ready: int, total: int) -> None:
     """One line for each case that is ready."""
     label = f"[{ready}/{total}] {case.place}, {case.system}, {case.climate}"
     label += f", {case.orientation_deg:g} deg"

@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
 from scenes.commands.quick_option import quick_option
+from scenes.commands.room_options import out_folder_option
 
 
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+@out_folder_option
 @quick_option
 def command(study: Path, out: Path, quick: bool) -> None:
     """Gains, temperatures, loads and comfort of rooms, hour by hour.

@@ -22,8 +22,8 @@ from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
-from mitsuba_cfs.sky.weather import read_epw
 from scenes.cost import room
 from scenes.cost.measure import Cost, measure
 from scenes.demo import VENETIAN_BLIND, WEATHER

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.surfaces import Surfaces, Window, WindowGroup
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 
 WIDTH, DEPTH, HEIGHT = 3.65, 4.60, 3.00  # [m]
 WINDOW = (0.3, 3.35, 0.9, 2.6)  # left, right, sill, head in the wall y = 0 [m]
@@ -45,7 +45,7 @@ def window_groups(count: int = 1) -> list[WindowGroup]:
     groups = []
     for i, (a, b) in enumerate(pairwise(edges)):
         glass = _quad([(a, 0, z0), (b, 0, z0), (b, 0, z1), (a, 0, z1)])
-        groups.append(WindowGroup(f"window{i}", (Window(f"window{i}", glass),)))
+        groups.append(WindowGroup(f"window{i}", (WindowSurface(f"window{i}", glass),)))
     return groups
 
 

@@ -17,7 +17,7 @@ BOX = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class ChartMark:
     """One SVG path of a chart and its entry in the legend."""
 
     path: str
@@ -44,7 +44,7 @@ class Chart:
     y_label: str
     x_ticks: tuple[Tick, ...]
     y_ticks: tuple[Tick, ...]
-    marks: tuple[Mark, ...] = ()
+    marks: tuple[ChartMark, ...] = ()
     picture: str = ""  # data URI
     scale: ColourScale | None = None
     classes: tuple[tuple[str, str], ...] = ()  # colour and name: legend of a picture of classes

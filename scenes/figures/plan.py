@@ -20,7 +20,7 @@ MOST_NUMBERS = 150  # more sensors than this carry no number in the picture
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class FloorPlan:
     """A plan as SVG, with its colour scale."""
 
     title: str
@@ -94,7 +94,7 @@ def plan(
     title: str,
     explanation: str,
     digits: int = 0,
-) -> Plan:
+) -> FloorPlan:
     """The plan with a value for each sensor [S]."""
     values = np.asarray(values, dtype=float)
     if values.shape != (len(frame.points),):
@@ -111,7 +111,7 @@ def plan(
     if frame.eye is not None:
         parts.append(_eye(*frame.eye))
     view_box = " ".join(f"{UNIT * v:.0f}" for v in (x0, y0, width, height))
-    return Plan(title, explanation, view_box, width / height, "".join(parts), scale)
+    return FloorPlan(title, explanation, view_box, width / height, "".join(parts), scale)
 
 
 def _cells(frame: PlanFrame, values, scale: ColourScale, digits: int) -> list[str]:

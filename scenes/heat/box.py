@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bim.model import Building, Construction, MaterialLayer
 from bim.shoebox import WindowRectangle, shoebox
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, RoomError
 from scenes.heat.study_file import BoxTable
 
 
@@ -30,5 +30,5 @@ def box_building(box: BoxTable) -> Building:
             adjacency=box.adjacency or None,
             constructions=constructions or None,
         )
-    except ValueError as error:
+    except RoomError as error:
         raise DataError(str(error), field="box") from error

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.study_file import StudyFile
-from scenes.job.files import check_names
-from scenes.job.inputs import Given, System, read_weather
-from scenes.job.operation import read_state
-from scenes.job.thermal_system import checked_system
+from scenes.room.operation import read_state
+from scenes.run.files import check_names
+from scenes.run.inputs import read_weather
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +18,7 @@ class HeatFiles:
     """What the files of a study hold, all but a building's."""
 
     weather: Weather
-    systems: tuple[System, ...]  # by shading state
+    systems: tuple[FenestrationSystem, ...]  # by shading state
     given: Given  # the same as what the study file gives for all windows
 
 

@@ -16,17 +16,18 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, item
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration import fill_windows, source_notes, window_sources
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import States
+from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import hourly_table, year_summary
-from scenes.job.drawn_shades import traced_building
-from scenes.job.inputs import States, chosen_spaces, named_spaces
-from scenes.job.room import Room, skies_for
-from scenes.job.thermal_system import thermal_system
-from scenes.job.zone import RoomZone, balances, coupled
+from scenes.room.drawn_shades import traced_building
+from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.zone import RoomZone, balances, coupled
+from scenes.run.inputs import chosen_spaces, named_spaces
 from thermal.balance import ZoneResult
 from thermal.zone import Zone
 
@@ -62,11 +63,11 @@ def run_study(
     notes |= dict.fromkeys(note for t in noted for note in t.notes)
     variants.activate()
     options, trace = study.options, study.trace
-    skies, cache = skies_for(weather, options), MatrixCache.of_user()
+    skies, cache = skies_for(weather, options.method, options.sampling), MatrixCache.of_user()
     rooms, radiants = [], []
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)
-        room = Room(
+        room = RoomSimulation(
             building, space, in_windows, weather, options,
             operation=study, skies=skies, cache=cache, progress=steps,
         )  # fmt: skip

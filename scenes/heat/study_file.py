@@ -11,15 +11,16 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods import METHODS
-from scenes.job.operation_tables import OperationTables, Positive, Share, SystemTable, Table
-from scenes.job.options import RoomOptions
+from scenes.fenestration.tables import StateTable
 from scenes.quick import HEAT, picks
-from scenes.toml_file import read_table, validated
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
+from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 RUN = RoomOptions()  # what is not stated otherwise is as in `cfs run`
 
 
-class LayerTable(Table):
+class LayerTable(TomlTable):
     """A layer of a construction."""
 
     name: str = "layer"
@@ -29,7 +30,7 @@ class LayerTable(Table):
     heat_capacity: Positive  # [J/(kg K)]
 
 
-class WindowTable(Table):
+class WindowTable(TomlTable):
     """A rectangular opening of the box."""
 
     x: float
@@ -40,7 +41,7 @@ class WindowTable(Table):
     frame: Annotated[float, Field(ge=0)] = 0.0
 
 
-class BoxTable(Table):
+class BoxTable(TomlTable):
     """A box-shaped room in place of a building file."""
 
     width: Positive
@@ -57,7 +58,7 @@ class BoxTable(Table):
     construction: dict[str, tuple[LayerTable, ...]] = Field(default_factory=dict)
 
 
-class ComfortTable(Table):
+class ComfortTable(TomlTable):
     """The person, for PMV and SET."""
 
     metabolic_rate: Annotated[float, Field(ge=0.7, le=4)] = 1.2  # [met]
@@ -67,21 +68,21 @@ class ComfortTable(Table):
     mean_radiant: Literal["view factors", "room centre", "area"] = "view factors"
 
 
-class TraceTable(Table):
-    """How the light is computed: as the same options of `RoomOptions`, with fewer rays."""
+class TraceTable(TomlTable):
+    """How the light is computed: as the choices of those names of a run, with fewer rays."""
 
     method: Literal[METHODS] = RUN.method
     patch_samples: Annotated[int, Field(ge=64)] = 8192
     sensor_samples: Annotated[int, Field(ge=64)] = 16384
-    sun_points: Annotated[int, Field(ge=16)] = RUN.sun_points
-    path_samples: Annotated[int, Field(ge=16)] = RUN.path_samples
+    sun_points: Annotated[int, Field(ge=16)] = RUN.sampling.sun_points
+    path_samples: Annotated[int, Field(ge=16)] = RUN.sampling.hour_samples
     sky_subdivision: Literal[1, 2, 4, 6] = 1
-    sensor_spacing: Positive = RUN.sensor_spacing  # [m]
-    sensor_height: Positive = RUN.sensor_height  # above the floor [m]
-    sensor_margin: Annotated[float, Field(ge=0)] = RUN.sensor_margin  # from the walls [m]
-    picture_size: Annotated[int, Field(ge=64)] = RUN.picture_size  # for `limit_dgp`
-    picture_samples: Annotated[int, Field(ge=1)] = RUN.picture_samples
-    seed: int = RUN.seed
+    sensor_spacing: Positive = RUN.grid.spacing  # [m]
+    sensor_height: Positive = RUN.grid.height  # above the floor [m]
+    sensor_margin: Annotated[float, Field(ge=0)] = RUN.grid.margin  # from the walls [m]
+    picture_size: Annotated[int, Field(ge=64)] = RUN.outputs.picture_size  # for `limit_dgp`
+    picture_samples: Annotated[int, Field(ge=1)] = RUN.sampling.view_samples
+    seed: int = RUN.sampling.seed
     view_factors: bool = True  # of the room's surfaces, for longwave and the person
 
 
@@ -94,7 +95,7 @@ class StudyFile(OperationTables):
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     couple: bool = False  # heat flows through the walls between the rooms
     box: BoxTable | None = None
-    system: tuple[SystemTable, ...] = ()  # states; none: what the building's file holds
+    system: tuple[StateTable, ...] = ()  # states; none: what the building's file holds
     comfort: ComfortTable = ComfortTable()
     trace: TraceTable = TraceTable()
     step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10
@@ -102,7 +103,7 @@ class StudyFile(OperationTables):
     @property
     def options(self) -> RoomOptions:
         """How a room of the study is computed."""
-        return RoomOptions(
+        return RoomOptions.of(
             **self.trace.model_dump(exclude={"view_factors"}), heat_step_s=60.0 * self.step_minutes
         )
 

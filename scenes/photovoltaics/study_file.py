@@ -67,6 +67,6 @@ def read_pv_study(path: str | Path) -> PvStudy:
     study = validated(PvStudy, read_table(path), path)
     try:
         fitted_cell(study.module.datasheet())
-    except ValueError as error:
-        raise DataError(str(error), file=path, field="module") from None
+    except DataError as error:
+        raise DataError(error.message, file=path, field="module") from None
     return study

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.errors import DataError
+
 BOLTZMANN = 8.617333262e-5  # k / q [V/K]
 STANDARD_TEMPERATURE = 298.15  # of the datasheet's standard test conditions [K]
 STANDARD_IRRADIANCE = 1000.0  # [W/m2]
@@ -42,11 +44,11 @@ class Datasheet:
 
     def __post_init__(self) -> None:
         if not 0 < self.current < self.short_circuit_current:
-            raise ValueError("current: expected less than the short-circuit current, above 0")
+            raise DataError("current: expected less than the short-circuit current, above 0")
         if not 0 < self.voltage < self.open_circuit_voltage:
-            raise ValueError("voltage: expected less than the open-circuit voltage, above 0")
+            raise DataError("voltage: expected less than the open-circuit voltage, above 0")
         if self.cells < 1 or not self.shunt > 0:
-            raise ValueError("cells and shunt: expected positive numbers")
+            raise DataError("cells and shunt: expected positive numbers")
 
     @property
     def power(self) -> float:
@@ -72,7 +74,7 @@ def fitted_cell(sheet: Datasheet) -> Cell:
     For a given R_s the short circuit, the open circuit and the point of maximum power are linear in
     I_ph, I_01 and I_02; R_s follows from dP/dV = 0 at maximum power.
 
-    Raises: `ValueError` where no cell with positive parameters has these points.
+    Raises: `DataError` where no cell with positive parameters has these points.
     """
     from scipy.optimize import brentq
 
@@ -106,7 +108,7 @@ def fitted_cell(sheet: Datasheet) -> Cell:
                 float(photo), float(first), float(second), float(series), sheet.shunt,
                 sheet.current_coefficient,
             )  # fmt: skip
-    raise ValueError(
+    raise DataError(
         "no two-diode cell has these currents and voltages: check them and the number of cells"
     )
 

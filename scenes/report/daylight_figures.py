@@ -6,7 +6,7 @@ import numpy as np
 
 from scenes.figures.carpet import carpet
 from scenes.figures.chart import Chart
-from scenes.figures.plan import Plan, plan, plan_frame
+from scenes.figures.plan import FloorPlan, plan, plan_frame
 from scenes.figures.scale import ColourScale, round_limits
 from scenes.report.headline import sensor_column
 from scenes.report.names import quantity
@@ -16,7 +16,7 @@ from scenes.results import RoomYear, RunResult
 DARK_LX = 1.0  # less than this is night, left empty
 
 
-def plans(room: RoomYear) -> tuple[Plan, ...]:
+def plans(room: RoomYear) -> tuple[FloorPlan, ...]:
     """Plans of daylight autonomy, useful illuminance, daylight factor, direct sun and the mean."""
     daylight, view = room.daylight, room.glare.view
     eye = (np.asarray(view.position), np.asarray(view.direction)) if room.glare.pictures else None

@@ -76,12 +76,12 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
         found.append(("Fenestration", sources))
     found.append(("Glare", _glare(result)))
     found.append(("Heat", _heat(result)))
-    twins = [room.space.label for room in rooms if room.like]
+    twins = [room.space.label for room in rooms if room.template]
     if twins:
         found.append(
             (
-                "Rooms alike",
-                f"Of rooms alike in shape, orientation, materials, windows and surroundings one is "
+                "Equal rooms",
+                f"Of rooms equal in shape, orientation, materials, windows and surroundings one is "
                 f"computed; its results are given for the others too ({', '.join(twins)}).",
             )
         )

@@ -26,7 +26,7 @@ STEPS = 32000  # of the 16-bit coordinates over the model's half size
 
 
 @dataclass(frozen=True, slots=True)
-class Layer:
+class ColourLayer:
     """A colouring of the sensors."""
 
     key: str
@@ -43,7 +43,7 @@ class Model3D:
     unit: float  # metres per integer step
     batches: tuple[dict, ...]  # room index (-1 outdoors), kind, triangles, edges
     sensors: dict  # room of each, corners, values by layer
-    layers: tuple[Layer, ...]
+    layers: tuple[ColourLayer, ...]
     rooms: tuple[str, ...]
     left_out: int
 
@@ -138,7 +138,7 @@ def outline_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return points[keys[(count == 1) | ~smooth]]
 
 
-def layers(result: RunResult) -> tuple[Layer, ...]:
+def layers(result: RunResult) -> tuple[ColourLayer, ...]:
     """The colourings that every room has: daylight autonomy, useful illuminance and so on."""
     wanted = [
         sensor_column(result.spaces[0], "da300", "da_300", "da"),
@@ -154,12 +154,12 @@ def layers(result: RunResult) -> tuple[Layer, ...]:
     return (*found, _layer("annual_mean", np.concatenate(mean)))
 
 
-def _layer(key: str, values: NDArray) -> Layer:
+def _layer(key: str, values: NDArray) -> ColourLayer:
     q = quantity(key)
     whole = q.unit == "%" and q.digits == 0
     high = 100.0 if whole else top_of_scale(values)
     scale = ColourScale(0.0, high, q.label, q.unit)
-    return Layer(key, scale, colour_bytes(scale, values), q.digits)
+    return ColourLayer(key, scale, colour_bytes(scale, values), q.digits)
 
 
 def colour_bytes(scale: ColourScale, values: NDArray) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from scenes.figures.carpet import carpet, class_carpet
-from scenes.figures.chart import Chart, Mark, Readout, box
+from scenes.figures.chart import Chart, ChartMark, Readout, box
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
 from scenes.report.headline import occupied
 from scenes.report.names import quantity
@@ -65,7 +65,7 @@ def loads_chart(room: RoomYear) -> Chart | None:
                 x_range, y_range)
             for i, v in enumerate(monthly[name])
         )  # fmt: skip
-        marks.append(Mark(path, LOADS[name], quantity(name).label, filled=True))
+        marks.append(ChartMark(path, LOADS[name], quantity(name).label, filled=True))
     ticks = tuple(
         Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)
         for i, m in enumerate(monthly.index)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from scenes.figures.chart import Chart
-from scenes.figures.plan import Plan
+from scenes.figures.plan import FloorPlan
 from scenes.report import (
     daylight_figures,
     glare_figures,
@@ -31,7 +31,7 @@ class RoomPage:
     name: str
     facts: tuple[tuple[str, str], ...]
     cards: tuple[Card, ...]
-    plans: tuple[Plan, ...]
+    plans: tuple[FloorPlan, ...]
     light: Chart
     daylight_tables: tuple[tables.Table, ...]
     error_words: str
@@ -57,7 +57,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
     return RoomPage(
         anchor=f"room-{number}",
         name=room.space.label,
-        facts=facts(room.space, room.like),
+        facts=facts(room.space, room.template),
         cards=cards(result, room),
         plans=daylight_figures.plans(room),
         light=daylight_figures.illuminance_carpet(result, room),
@@ -93,7 +93,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
     )
 
 
-def facts(space: Space, like: str = "") -> tuple[tuple[str, str], ...]:
+def facts(space: Space, template: str = "") -> tuple[tuple[str, str], ...]:
     """Size and windows of the room in words."""
     glass = sum(window.area for window in space.windows)
     count = len(space.windows)
@@ -106,8 +106,8 @@ def facts(space: Space, like: str = "") -> tuple[tuple[str, str], ...]:
     ]
     if space.storey:
         rows.append(("Storey", space.storey))
-    if like:
-        rows.append(("Results of", f"{like}, which is alike"))
+    if template:
+        rows.append(("Results of", f"{template}, an equal room"))
     return tuple(rows)
 
 

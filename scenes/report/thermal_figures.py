@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from scenes.figures.carpet import carpet, class_carpet
-from scenes.figures.chart import Chart, Mark, Readout, box, line
+from scenes.figures.chart import Chart, ChartMark, Readout, box, line
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
 from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, occupied
 from scenes.report.names import quantity
@@ -74,9 +74,11 @@ def duration_curve(room: RoomYear) -> Chart:
     share = np.linspace(0, 1, 241)
     sorted_curves = {name: np.quantile(v, 1 - share) for name, v in curves.items()}
     x_range = (0.0, hours)
-    marks = [Mark(line(x_range, (WARM_C, WARM_C), x_range, y_range), "limit", f"{WARM_C:.0f} °C")]
+    marks = [
+        ChartMark(line(x_range, (WARM_C, WARM_C), x_range, y_range), "limit", f"{WARM_C:.0f} °C")
+    ]
     marks += [
-        Mark(line(share * hours, v, x_range, y_range), CURVES[name], quantity(name).label)
+        ChartMark(line(share * hours, v, x_range, y_range), CURVES[name], quantity(name).label)
         for name, v in sorted_curves.items()
     ]
     above = float((curves["operative_c"] > WARM_C).mean()) * hours if "operative_c" in curves else 0
@@ -125,7 +127,7 @@ def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
     x = (part.index - start) / pd.Timedelta(days=1)
     y_range = round_limits(np.concatenate(list(curves.values())))
     marks = [
-        Mark(line(x, v, (0, 7), y_range), CURVES.get(name, "limit"), quantity(name).label)
+        ChartMark(line(x, v, (0, 7), y_range), CURVES.get(name, "limit"), quantity(name).label)
         for name, v in curves.items()
     ]
     days = [start + pd.Timedelta(days=i) for i in range(7)]
@@ -138,7 +140,7 @@ def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
         "Temperature [°C]",
         tuple(ticks),
         axis_ticks(*y_range),
-        (Mark(_midnights(y_range), "grid"), *marks),
+        (ChartMark(_midnights(y_range), "grid"), *marks),
         readout=_readout([f"{t:%d %b %H:%M}" for t in part.index], curves),
     )
 
@@ -169,7 +171,7 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
         path = "".join(
             box(i + 0.14, i + 0.86, 0, v, x_range, y_range) for i, v in enumerate(monthly[incident])
         )
-        marks.append(Mark(path, "incident", quantity(incident).label, filled=True))
+        marks.append(ChartMark(path, "incident", quantity(incident).label, filled=True))
     base = np.zeros(len(monthly))
     for number, name in enumerate(parts):
         top = base + monthly[name].to_numpy()
@@ -177,7 +179,7 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
             box(i + 0.2, i + 0.8, a, b, x_range, y_range)
             for i, (a, b) in enumerate(zip(base, top, strict=True))
         )
-        marks.append(Mark(path, f"part{min(number, 3)}", quantity(name).label, filled=True))
+        marks.append(ChartMark(path, f"part{min(number, 3)}", quantity(name).label, filled=True))
         base = top
     ticks = tuple(
         Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)

@@ -8,18 +8,19 @@ import numpy as np
 
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.sky.sun import is_up, sun_directions
-from scenes.calibration.choice import Choice, Demand, choose
-from scenes.calibration.costs import Calibration, Work
+from scenes.calibration.choice import Demand, MethodChoice, choose
+from scenes.calibration.costs import Calibration, Workload
 from scenes.calibration.shipped import this_machines_costs
-from scenes.job.inputs import System, read_system, read_weather
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.run.inputs import read_weather
 from scenes.study.case import AUTO, Case, with_method
 from scenes.study.one_case import case_systems
-from scenes.study.plan import Plan
+from scenes.study.plan import StudyPlan
 from scenes.study.study_file import Study
 from thermal.comfort import hours_between
 
 
-def settled(study: Study, plan: Plan, calibration: Calibration | None = None) -> Plan:
+def settled(study: Study, plan: StudyPlan, calibration: Calibration | None = None) -> StudyPlan:
     """The plan with a method for every case; those of rooms with mirrors have their own.
 
     Args: calibration: this machine's by default, measured or scaled.
@@ -31,7 +32,7 @@ def settled(study: Study, plan: Plan, calibration: Calibration | None = None) ->
         return plan
     calibration = calibration or this_machines_costs()
     calibration = calibration.scaled(study.options.picture_size)
-    chosen: dict[bool, Choice] = {}
+    chosen: dict[bool, MethodChoice] = {}
     for specular in {case.specular for case in open_cases}:
         cases = [case for case in open_cases if case.specular == specular]
         budget = study.auto.time_budget * len(cases) / len(open_cases)
@@ -49,7 +50,7 @@ def settled(study: Study, plan: Plan, calibration: Calibration | None = None) ->
     return replace(plan, cases=tuple(cases), predicted=predicted)
 
 
-def work_of(cases: list[Case]) -> Work:
+def work_of(cases: list[Case]) -> Workload:
     """Rooms, systems, and for each pair the rated hours of all orientations and climates."""
     scenes = len({case.scene for case in cases})
     systems = len({case.system for case in cases})
@@ -57,14 +58,14 @@ def work_of(cases: list[Case]) -> Work:
     for case in cases:
         if case.weather not in hours:
             weather = read_weather(case.weather.path)
-            used = hours_between(*case.options.occupied, hours=len(weather.times))
+            used = hours_between(*case.options.occupancy.hours, hours=len(weather.times))
             up = is_up(sun_directions(weather))
             hours[case.weather] = np.array([np.count_nonzero(used & up), np.count_nonzero(up)])
     rated, lit = sum(hours[case.weather] for case in cases) / (scenes * systems)
-    return Work(scenes, systems, round(rated), round(lit))
+    return Workload(scenes, systems, round(rated), round(lit))
 
 
-def _fine(cases: list[Case], plan: Plan) -> bool:
+def _fine(cases: list[Case], plan: StudyPlan) -> bool:
     """Whether every system is known finely enough for the sun's disc."""
     files = {case.bsdf.path for case in cases if case.bsdf is not None}
     systems = [read_system(path) for path in files]
@@ -75,7 +76,7 @@ def _fine(cases: list[Case], plan: Plan) -> bool:
     return all(map(keeps_the_sun, {id(system): system for system in systems}.values()))
 
 
-def keeps_the_sun(system: System) -> bool:
+def keeps_the_sun(system: FenestrationSystem) -> bool:
     """A tensor tree, or a Klems matrix that has the straight beam on its diagonal."""
     if system.tree is not None:
         return True

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
-from scenes.job.options import RoomOptions
+from scenes.room.options import RoomOptions
 
 if TYPE_CHECKING:
     from scenes.heat.study_file import BoxTable
@@ -18,14 +18,14 @@ AUTO = "auto"
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class InputFile:
     """An input file as it was when the study was planned."""
 
     path: Path
     sha256: str
 
     @classmethod
-    def of(cls, path: Path) -> Source:
+    def of(cls, path: Path) -> InputFile:
         """The file with the hash of its bytes."""
         with open(path, "rb") as file:
             return cls(path, hashlib.file_digest(file, "sha256").hexdigest())
@@ -38,22 +38,22 @@ class Case:
     room: str  # name of the [[room]] entry
     space: str  # GUID
     space_name: str
-    building: Source | BoxTable
+    building: InputFile | BoxTable
     specular: bool
     system: str
-    bsdf: Source | None  # None: what the building's file holds
-    thermal: Source | None  # the .toml file beside the BSDF
+    bsdf: InputFile | None  # None: what the building's file holds
+    thermal: InputFile | None  # the .toml file beside the BSDF
     u_value: float | None
     g_value: float | None
     climate: str
-    weather: Source
+    weather: InputFile
     orientation_deg: float  # the model is turned clockwise by it
     options: RoomOptions  # the method with them
-    operation: Source | None  # the file of the room's control, gains and set points
+    operation: InputFile | None  # the file of the room's control, gains and set points
     program: str  # `program_version()` of the plan
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
-    referenced: tuple[Source, ...] = ()  # BSDF files that the building's names, and those beside
+    referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
 
     @property
     def key(self) -> str:
@@ -66,13 +66,13 @@ class Case:
             self.u_value,
             self.g_value,
             self.orientation_deg % 360.0,
-            _plain(asdict(self.options)),
+            _plain(self.options.named()),
             self.glare,
             [source.sha256 for source in self.referenced],
         )[:32]
 
     @property
-    def files(self) -> tuple[Source | BoxTable | None, ...]:
+    def files(self) -> tuple[InputFile | BoxTable | None, ...]:
         """What it is read from; the building last."""
         own = (self.bsdf, self.thermal, self.weather, self.operation)
         return (*own, *self.referenced, self.building)
@@ -86,7 +86,7 @@ class Case:
     def scene(self) -> str:
         """A hash of the room alone: cases that have it share traced matrices."""
         building = self.building
-        source = building.sha256 if isinstance(building, Source) else building.model_dump_json()
+        source = building.sha256 if isinstance(building, InputFile) else building.model_dump_json()
         return digest(source, self.space)[:32]
 
 

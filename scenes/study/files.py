@@ -8,11 +8,12 @@ from pathlib import Path
 from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.systems import read_system
+from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.box import box_building
-from scenes.job.files import check_names
-from scenes.job.inputs import read_system, read_weather
-from scenes.job.operation import check_states, read_operation
-from scenes.job.thermal_system import checked_system
+from scenes.room.operation import check_states, read_operation
+from scenes.run.files import check_names
+from scenes.run.inputs import read_weather
 from scenes.study.study_file import Study
 
 

@@ -16,17 +16,19 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration import fill_windows, source_notes, window_sources
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import Given, States, read_system
 from scenes.heat.box import box_building
-from scenes.job.drawn_shades import traced_building
-from scenes.job.inputs import Given, States, read_system, read_weather
-from scenes.job.operation import check_states, read_operation
-from scenes.job.room import compute_room, skies_for
 from scenes.results import RoomYear
-from scenes.study.case import Case, Source, program_version
+from scenes.room.drawn_shades import traced_building
+from scenes.room.operation import check_states, read_operation
+from scenes.room.room import compute_room, skies_for
+from scenes.run.inputs import read_weather
+from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
 from thermal.comfort import hours_between
 
@@ -38,7 +40,7 @@ ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have 
 def compute_case(case: Case) -> CaseResult:
     """Figures and arrays of a case.
 
-    Raises: `DataError` for a file that has changed or cannot be used, `ValueError` for a room that
+    Raises: `DataError` for a file that has changed or cannot be used, `RoomError` for a room that
     cannot be computed.
     """
     with ALONE:
@@ -50,19 +52,19 @@ def _computed(case: Case) -> CaseResult:
     if case.program != program_version():
         raise DataError("this process runs another version of the program than the study's")
     for source in case.files:
-        if isinstance(source, Source) and Source.of(source.path) != source:
+        if isinstance(source, InputFile) and InputFile.of(source.path) != source:
             raise DataError("is not the file that it was when the study began", file=source.path)
     variants.activate()
     building, space = _room(case)
     systems = case_systems(case, space)
     building = traced_building(building, systems)
     weather = _weather(case.weather, case.orientation_deg)
-    skies = _skies(case.weather, case.orientation_deg, case.options)
+    skies = _skies(case.weather, case.orientation_deg, case.options.method, case.options.sampling)
     cache = MatrixCache.of_user()
     operation = None if case.operation is None else read_operation(case.operation.path)
     if operation is not None:
         check_states(operation, max(map(len, systems.values())))
-    hours = _rated_hours(weather, case.options.occupied)
+    hours = _rated_hours(weather, case.options.occupancy.hours)
     room = compute_room(
         building, space, systems, weather, case.options,
         operation=operation,
@@ -71,7 +73,7 @@ def _computed(case: Case) -> CaseResult:
     )  # fmt: skip
     figures, arrays = room_figures(room)
     if room.dgp is not None:
-        figures |= glare_figures(room.dgp, weather, case.options.occupied)
+        figures |= glare_figures(room.dgp, weather, case.options.occupancy.hours)
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
         arrays["dgp"][hours] = room.dgp
     if case.bsdf is None:  # else the table says it: names are no part of a case's key
@@ -82,12 +84,12 @@ def _computed(case: Case) -> CaseResult:
 
 
 @lru_cache(maxsize=4)
-def _building(source: Source) -> Building:
+def _building(source: InputFile) -> Building:
     return read_ifc(source.path)
 
 
 def _room(case: Case) -> tuple[Building, Space]:
-    if isinstance(case.building, Source):
+    if isinstance(case.building, InputFile):
         building = _building(case.building)
     else:
         building = box_building(case.building)
@@ -95,21 +97,17 @@ def _room(case: Case) -> tuple[Building, Space]:
 
 
 @lru_cache(maxsize=4)
-def _read_weather(source: Source) -> Weather:
+def _read_weather(source: InputFile) -> Weather:
     return read_weather(source.path)
 
 
-def _weather(source: Source, angle: float) -> Weather:
+def _weather(source: InputFile, angle: float) -> Weather:
     return _read_weather(source).turned(angle)
 
 
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
-def _skies_of(source: Source, angle: float, subdivision: int, options) -> AnnualSky:
-    return skies_for(_weather(source, angle), options)
-
-
-def _skies(source: Source, angle: float, options) -> AnnualSky:
-    return _skies_of(source, angle, options.sky_subdivision, options)
+def _skies(source: InputFile, angle: float, method: str, sampling: Sampling) -> AnnualSky:
+    return skies_for(_weather(source, angle), method, sampling)
 
 
 def case_systems(case: Case, space: Space) -> dict[str, States]:
@@ -118,7 +116,7 @@ def case_systems(case: Case, space: Space) -> dict[str, States]:
     if case.bsdf is not None:
         given = {"u_value": case.u_value, "g_value": case.g_value}
         states = (read_system(case.bsdf.path, **given),)
-    file = case.building.path if isinstance(case.building, Source) else None
+    file = case.building.path if isinstance(case.building, InputFile) else None
     return fill_windows(space.windows, Given(states, ask="a [[system]]"), file)
 
 

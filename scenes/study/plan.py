@@ -10,9 +10,9 @@ from bim.ifc.building import read_ifc
 from bim.ifc.fenestration_read import read_fenestration
 from bim.model import Building, Space
 from scenes.heat.box import box_building
-from scenes.job.inputs import chosen_spaces
-from scenes.job.options import RoomOptions
-from scenes.study.case import AUTO, Case, Source, program_version
+from scenes.room.options import RoomOptions
+from scenes.run.inputs import chosen_spaces
+from scenes.study.case import AUTO, Case, InputFile, program_version
 from scenes.study.study_file import RoomTable, Study
 
 AS_HELD = "as in the building's file"  # the system of a study that names none
@@ -20,7 +20,7 @@ NOTHING_GIVEN = {"u_value": None, "g_value": None}
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class StudyPlan:
     """A study's grid, and the rooms in it."""
 
     cases: tuple[Case, ...]
@@ -28,7 +28,7 @@ class Plan:
     predicted: float | None = None  # time of the cases whose method `auto` chose [s]
 
 
-def plan_of(study: Study) -> Plan:
+def plan_of(study: Study) -> StudyPlan:
     """The grid of a study, ordered so that neighbours share most.
 
     Raises: `DataError` for a file that cannot be read or has no such room.
@@ -39,20 +39,20 @@ def plan_of(study: Study) -> Plan:
         systems.append(
             {
                 "system": system.name,
-                "bsdf": Source.of(system.bsdf),
-                "thermal": Source.of(beside) if beside.is_file() else None,
+                "bsdf": InputFile.of(system.bsdf),
+                "thermal": InputFile.of(beside) if beside.is_file() else None,
                 "u_value": system.u_value,
                 "g_value": system.g_value,
             }
         )
     systems = systems or [{"system": AS_HELD, "bsdf": None, "thermal": None} | NOTHING_GIVEN]
-    climates = [{"climate": c.name, "weather": Source.of(c.weather)} for c in study.climate]
-    operation = None if study.operation is None else Source.of(study.operation)
+    climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
+    operation = None if study.operation is None else InputFile.of(study.operation)
     found: list[Case] = []
     rooms = {}
     for room in study.room:
         building, spaces = rooms_of(room)
-        source = room.box if room.box is not None else Source.of(room.building)
+        source = room.box if room.box is not None else InputFile.of(room.building)
         referenced = () if study.system else _referenced(room.building)
         for space in spaces:
             about = {
@@ -67,7 +67,7 @@ def plan_of(study: Study) -> Plan:
             of_space = list(_of_space(study, about, systems, climates))
             rooms[of_space[0].scene] = building, space
             found += of_space
-    return Plan(tuple(found), rooms)
+    return StudyPlan(tuple(found), rooms)
 
 
 def _of_space(
@@ -86,19 +86,19 @@ def _of_space(
                         **system,
                         **climate,
                         orientation_deg=angle,
-                        options=RoomOptions(**options),
+                        options=RoomOptions.of(**options),
                         program=program_version(),
                         glare=study.glare,
                         chosen=AUTO if method == AUTO else "",
                     )
 
 
-def _referenced(building: Path) -> tuple[Source, ...]:
+def _referenced(building: Path) -> tuple[InputFile, ...]:
     """The BSDF files that a building's file names, and the `.toml` files beside them."""
     held = read_fenestration(building).values()
     named = {state.file for states in held for state in states if state.file is not None}
     beside = (file.with_suffix(".toml") for file in sorted(named))
-    return tuple(Source.of(file) for file in (*sorted(named), *beside) if file.is_file())
+    return tuple(InputFile.of(file) for file in (*sorted(named), *beside) if file.is_file())
 
 
 def rooms_of(room: RoomTable) -> tuple[Building, list[Space]]:

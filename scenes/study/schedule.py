@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from importlib.util import find_spec
-from multiprocessing import get_context
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.processes import process_pool
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
 from scenes.user_errors import one_line, user_message
@@ -58,8 +58,6 @@ def attempted(compute: Compute, case: Case) -> CaseResult:
 def said(error: BaseException) -> str:
     """A failure in one line: the message of an expected one, what is known of another."""
     message = user_message(error)
-    if message is None and isinstance(error, ValueError):  # a room that cannot be computed
-        message = one_line(str(error))
     fault = f"fault of the program: {one_line(repr(error))}; cfs -vv tells where"
     return message or fault
 
@@ -79,8 +77,7 @@ def _beside_each_other(
     cases: Sequence[Case], compute: Compute, processes: int
 ) -> Iterator[CaseResult]:
     leaders, followers = _waves(cases)
-    # a fresh interpreter each: Dr.Jit does not survive a fork
-    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
+    pool = process_pool(processes)
     try:
         waiting: dict[Future, Case] = {}
 

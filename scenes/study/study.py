@@ -18,7 +18,7 @@ from scenes.report.glare_figures import compass
 from scenes.study.automatic import settled
 from scenes.study.case import Case
 from scenes.study.one_case import compute_case
-from scenes.study.plan import Plan, plan_of
+from scenes.study.plan import StudyPlan, plan_of
 from scenes.study.schedule import Compute, computed
 from scenes.study.store import CaseResult, Store
 from scenes.study.study_file import Study
@@ -29,7 +29,7 @@ class StudyResult:
     """The cases of a study with their results, in the grid's order."""
 
     title: str
-    plan: Plan
+    plan: StudyPlan
     results: tuple[CaseResult, ...]  # of each case of the plan
     reused: int  # cases that an earlier run had finished
     seconds: float
@@ -91,12 +91,12 @@ def run_study(
     study: Study,
     store: Store | str | PathLike[str],
     *,
-    plan: Plan | None = None,
+    plan: StudyPlan | None = None,
     processes: int = 1,
     scheduler: str | None = None,
     compute: Compute = compute_case,
     progress: Progress = silent,
-    told: Callable[[Case, CaseResult, int, int], None] | None = None,
+    on_case: Callable[[Case, CaseResult, int, int], None] | None = None,
 ) -> StudyResult:
     """Compute what the folder does not have yet; `write_study` writes what comes of it.
 
@@ -106,7 +106,7 @@ def run_study(
         store: the folder of the finished cases.
         plan: of the study, with the methods that `auto` chose; made here by default.
         processes, scheduler: see `scenes.study.schedule.computed`.
-        told: called with each case that is ready, how many are, and of how many.
+        on_case: called with each case that is ready, how many are, and of how many.
     """
     start = time.monotonic()
     plan = plan or settled(study, plan_of(study))
@@ -127,8 +127,8 @@ def run_study(
             store.save(result)
         found[result.key] = result
         under_way()
-        if told is not None:
-            told(cases[result.key], result, len(found), total)
+        if on_case is not None:
+            on_case(cases[result.key], result, len(found), total)
     results = tuple(found[case.key] for case in plan.cases)
     seconds = round(time.monotonic() - start, 3)
     return StudyResult(study.title, plan, results, reused, seconds, study.quick)
@@ -177,7 +177,7 @@ def _status(result: CaseResult) -> str:
     return "failed" if result.error else "done"
 
 
-def manifest(study: Study, plan: Plan) -> dict:
+def manifest(study: Study, plan: StudyPlan) -> dict:
     """What makes the same table again: the study, and the hashes of its files."""
     files = {}
     for case in plan.cases:

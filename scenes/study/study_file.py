@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     BaseModel,
@@ -19,10 +18,10 @@ from pydantic import (
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
-from scenes.job.operation import read_operation
-from scenes.job.operation_tables import Hours
-from scenes.job.options import RoomOptions
 from scenes.quick import ROOM, picks
+from scenes.room.operation import read_operation
+from scenes.room.operation_tables import Hours
+from scenes.room.options import RoomOptions, named_types
 from scenes.toml_file import read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
@@ -76,14 +75,14 @@ class AutoTable(_Table):
 
 def _options_table() -> type[BaseModel]:
     """The options of a room without those that the study has keys for; no number is negative."""
-    hints = get_type_hints(RoomOptions)
+    kinds = named_types()
     columns: dict[str, Any] = {}
-    for field in fields(RoomOptions):
-        if field.name not in OF_THE_GRID:
-            kind = Hours if field.name == "occupied" else hints[field.name]
+    for name, default in RoomOptions().named().items():
+        if name not in OF_THE_GRID:
+            kind = Hours if name == "occupied" else kinds[name]
             if kind in (int, float):
                 kind = Annotated[kind, Field(ge=0)]
-            columns[field.name] = (kind, field.default)
+            columns[name] = (kind, default)
     return create_model("options", __base__=_Table, **columns)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from bim.ifc.results_write import SET_NAME, write_results
 from bim.model import Problem, Space
 from mitsuba_cfs.files import replacing
-from scenes.study.case import Case, Source
+from scenes.study.case import Case, InputFile
 from scenes.study.files import one_building
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
@@ -22,7 +22,7 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
     A set is named after its case, "CFS results: system, climate, angle, method".
     """
     buildings = (case.building for case in study.plan.cases)
-    source = one_building(one.path if isinstance(one, Source) else None for one in buildings)
+    source = one_building(one.path if isinstance(one, InputFile) else None for one in buildings)
     done = [
         (case, result)
         for case, result in zip(study.plan.cases, study.results, strict=True)

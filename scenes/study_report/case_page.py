@@ -9,7 +9,7 @@ import pandas as pd
 
 from scenes.figures.carpet import carpet
 from scenes.figures.chart import Chart
-from scenes.figures.plan import Plan
+from scenes.figures.plan import FloorPlan
 from scenes.figures.scale import ColourScale
 from scenes.report import daylight_figures, tables, thermal_figures
 from scenes.report.names import quantity
@@ -32,7 +32,7 @@ class CasePage:
     label: str
     method: str
     why: str
-    plans: tuple[Plan, ...]
+    plans: tuple[FloorPlan, ...]
     error_words: str
     light: Chart
     glare: Chart | None

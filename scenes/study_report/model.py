@@ -8,7 +8,7 @@ import numpy as np
 
 from bim.model import Building, Space
 from scenes.figures.scale import ColourScale
-from scenes.report.model3d import Layer, Model3D, colour_bytes, model3d
+from scenes.report.model3d import ColourLayer, Model3D, colour_bytes, model3d
 from scenes.report.names import quantity
 from scenes.results import RoomYear, RunResult
 from scenes.study.case import Case
@@ -74,7 +74,7 @@ def _moved_room(room: RoomYear, offset: np.ndarray) -> RoomYear:
     return replace(room, space=space, daylight=daylight)
 
 
-def _layers(study: StudyResult, scenes: list[str]) -> tuple[Layer, ...]:
+def _layers(study: StudyResult, scenes: list[str]) -> tuple[ColourLayer, ...]:
     """A colouring for each case but its room, with the values of every room that has that case."""
     groups: dict[tuple, dict[str, tuple[Case, CaseResult]]] = {}
     for case, result in zip(study.plan.cases, study.results, strict=True):
@@ -90,5 +90,5 @@ def _layers(study: StudyResult, scenes: list[str]) -> tuple[Layer, ...]:
             q = quantity(column)
             values = np.concatenate([members[s][1].arrays[f"sensor/{column}"] for s in scenes])
             scale = ColourScale(0.0, 100.0, f"{q.label}: {label}", "%")
-            found.append(Layer(column, scale, colour_bytes(scale, values), 0))
+            found.append(ColourLayer(column, scale, colour_bytes(scale, values), 0))
     return tuple(found[:MOST_LAYERS])

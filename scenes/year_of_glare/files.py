@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from mitsuba_cfs.sky.weather import Weather
-from scenes.job.files import check_names
-from scenes.job.inputs import Given, given_light, read_weather
+from scenes.fenestration.systems import Given, given_light
+from scenes.run.files import check_names
+from scenes.run.inputs import read_weather
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import rated_views
 

@@ -26,7 +26,7 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import format_view
 from scenes.figures.carpet import day_grid
 from scenes.pictures import write_check_picture, write_falsecolour
-from scenes.year_of_glare.year import ViewYear, Year, used_dgp
+from scenes.year_of_glare.year import GlareYear, ViewYear, used_dgp
 
 KEPT = "ratings"  # folder of the finished ratings, inside that of the results
 LOWEST, HIGHEST = 0.15, 0.60  # ends of the heat map's scale
@@ -37,7 +37,7 @@ COLOURS = LinearSegmentedColormap.from_list(
 )  # fmt: skip
 
 
-def write_view(year: Year, rated: ViewYear, folder: Path) -> dict[str, object]:
+def write_view(year: GlareYear, rated: ViewYear, folder: Path) -> dict[str, object]:
     """Write a view's ratings, heat map and pictures; its row of `views.csv`."""
     name = rated.view.name
     write_table(rated.ratings, folder / f"{name}.parquet")
@@ -54,7 +54,7 @@ def write_view(year: Year, rated: ViewYear, folder: Path) -> dict[str, object]:
     return row
 
 
-def view_row(year: Year, rated: ViewYear) -> dict[str, object]:
+def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
     """What a year of a view comes to; shares are of the hours of use."""
     dgp = used_dgp(year, rated.ratings.dgp.to_numpy())
     view = rated.view.view
@@ -75,7 +75,7 @@ def view_row(year: Year, rated: ViewYear) -> dict[str, object]:
     }  # fmt: skip
 
 
-def write_heat_map(path: Path, year: Year, rated: ViewYear) -> None:
+def write_heat_map(path: Path, year: GlareYear, rated: ViewYear) -> None:
     """DGP by hour of the day and day of the year (PNG); dark hours are grey."""
     times = year.weather.midpoints
     whole = np.full(len(times), np.nan)
@@ -112,7 +112,7 @@ def write_heat_map(path: Path, year: Year, rated: ViewYear) -> None:
         figure.savefig(part)
 
 
-def write_summary(year: Year, rows: list[dict[str, object]], folder: Path) -> pd.DataFrame:
+def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) -> pd.DataFrame:
     """Write the table of views and what the run was made from; the table."""
     table = pd.DataFrame(rows)
     write_table(table, folder / "views.csv", index=False)

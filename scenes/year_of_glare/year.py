@@ -31,8 +31,8 @@ from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.source_code import code_version
-from scenes.job.inputs import sha256
-from scenes.job.seen_room import read_seen_room
+from scenes.run.inputs import sha256
+from scenes.run.viewed_room import read_viewed_room
 from scenes.year_of_glare.files import YearFiles, read_files
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.views import NamedView, chosen_views
@@ -52,7 +52,7 @@ class ViewYear:
 
 
 @dataclass(frozen=True, slots=True)
-class Year:
+class GlareYear:
     """What all views share."""
 
     options: YearOptions
@@ -70,7 +70,7 @@ class Year:
 
 def read_year(
     options: YearOptions, progress: Progress = silent, files: YearFiles | None = None
-) -> Year:
+) -> GlareYear:
     """Read and check all inputs, the building last; `DataError` where one cannot be used.
 
     Args: files: what `read_files` has read of the options; read now without.
@@ -80,12 +80,14 @@ def read_year(
     progress("inputs", 0.1)
     views: list[NamedView] = []
 
-    def look(space: Space) -> View:
+    def view_of(space: Space) -> View:
         views.extend(chosen_views(space, options))
         return views[0].view
 
     steps = part(progress, 0.1, 0.6)
-    seen = read_seen_room(options.building, options.space, options.join, files.given, look, steps)
+    viewed = read_viewed_room(
+        options.building, options.space, options.join, files.given, view_of, steps
+    )
     variants.activate()
     sampling = sampling_of(options)
     sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
@@ -95,24 +97,27 @@ def read_year(
     corrections = corrections_file(options.building)
     hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
     # not of files: the model may name others, which change by themselves
-    hashes.append(content_digest(*([s.visible, s.fine] for s in seen.systems)))
+    hashes.append(content_digest(*([s.visible, s.fine] for s in viewed.systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
-    digest = hashlib.sha256(json.dumps([*chosen, seen.space.guid]).encode()).hexdigest()
+    digest = hashlib.sha256(json.dumps([*chosen, viewed.space.guid]).encode()).hexdigest()
     used = working_hours(weather, *map(float, options.occupied))
-    notes = (*seen.notes(), *weather.notes)
-    return Year(
-        options, seen.space.label, views, seen.scene, seen.optics, weather, sky, used, digest,
-        notes, seen.sources,
+    notes = (*viewed.notes(), *weather.notes)
+    return GlareYear(
+        options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
+        notes, viewed.sources,
     )  # fmt: skip
 
 
 def sampling_of(options: YearOptions) -> Sampling:
     """How finely the year is computed."""
     memory = options.memory_gb * 2**30
-    return Sampling(view_samples=options.samples, memory=memory, seed=options.seed)
+    return Sampling(
+        view_samples=options.samples, memory=memory, window_parts=options.window_parts,
+        seed=options.seed,
+    )  # fmt: skip
 
 
-def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
+def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
     """Rate one view after the other; what lies in the folder `kept` is not computed again."""
     options = year.options
     traced = PhaseScene(
@@ -144,7 +149,7 @@ def rate_views(year: Year, kept: Path, progress: Progress = silent) -> Iterator[
 
 
 def _pictures(
-    light: PhaseLight, year: Year, found: AnnualGlare
+    light: PhaseLight, year: GlareYear, found: AnnualGlare
 ) -> dict[pd.Timestamp, NDArray[np.float32]]:
     """Pictures of the worst lit hours."""
     hours = found.worst(year.options.worst)
@@ -154,7 +159,7 @@ def _pictures(
     return dict(zip(times, pictures(light, hours), strict=True))
 
 
-def used_dgp(year: Year, dgp: NDArray[np.float64]) -> NDArray[np.float64]:
+def used_dgp(year: GlareYear, dgp: NDArray[np.float64]) -> NDArray[np.float64]:
     """DGP of the hours of use [U] from those of the lit hours [L]; dark hours have no glare."""
     whole = np.full(len(year.weather.midpoints), DARK)
     whole[year.sky.lit] = dgp

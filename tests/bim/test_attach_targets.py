@@ -91,7 +91,7 @@ def test_a_type_in_a_room(tmp_path):
     ("option", "name", "message"),
     [
         ("--type", "Fixed B", "no window type 'Fixed B'; there are: Fixed A"),
-        ("--room", "Rum", "no room 'Rum'; there are: R1 Room"),
+        ("--space", "Rum", "no room 'Rum'; there are: R1 Room"),
         ("--storey", "EG", "no storey 'EG' with rooms; there are: IfcBuildingStorey"),
         ("--facade", "up", "windows face: S"),
         ("--facade", "400-20", "windows face: S"),

@@ -15,9 +15,9 @@ from bim.ifc.building import read_ifc
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_energyplus import DEFAULT_G, DEFAULT_U, write_epjson
 from bim.to_gltf import write_gltf
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.sky.weather import read_epw
 from tests.bim.small_ifc import box_room
 
 WINDOWS = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bim.defaults import FRAME_FRACTION, ROOM_REFLECTANCE
 from bim.ifc.building import read_ifc
 from bim.shell import enclosed_volume, open_edges
 from mitsuba_cfs.errors import DataError
@@ -186,3 +187,19 @@ def test_cut_off_file_is_refused_or_read_without_a_crash(tmp_path):
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(DataError, match=r"cut\.ifc"):
         read_ifc(path)
+
+
+def test_what_has_no_style_takes_no_colour_of_the_engine(tmp_path):
+    """IfcOpenShell shows unstyled products in colours of its own: windows wholly of glass."""
+    model = box_room()
+    for styled in model.by_type("IfcStyledItem"):
+        model.remove(styled)
+    building = read(tmp_path, model)
+    (space,) = building.spaces
+    _, _, width, height = OPENING
+    # 1e-5: the frame's width comes from an iteration
+    glass = (1 - FRAME_FRACTION) * width * height
+    assert building.windows[0].area == pytest.approx(glass, rel=1e-5)
+    assert "face(s) without a colour default reflectance" in texts(building)
+    found = {face.kind: face.reflectance("visible") for face in space.faces}
+    assert found == {kind: ROOM_REFLECTANCE[kind] for kind in found}

@@ -7,7 +7,7 @@ import ifcopenshell.api.pset
 import pytest
 
 from bim.ifc.building import read_ifc
-from tests.bim.small_ifc import DEPTH, WALL, WIDTH, box_room
+from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_room
 from tests.bim.test_joining import THICK, two_rooms
 
 
@@ -46,3 +46,27 @@ def test_area_of_no_definition_is_reported(tmp_path):
     building = read_ifc(path)
     assert building.spaces[0].area_to_middles is None
     assert "states 30.00 m2 floor area, drawn 24.00 m2" in texts(building)
+
+
+@pytest.mark.parametrize(
+    ("unit", "height", "stated", "said"),
+    [
+        ("MILLIMETRE", HEIGHT, HEIGHT, "1000 times the drawn one"),
+        ("MILLIMETRE", HEIGHT + 0.5, None, "times its height of 3500 in another unit (3.50 m)"),
+        ("METRE", HEIGHT + 0.5, HEIGHT + 0.5, "drawn 72.00 m3"),  # a volume, and a wrong one
+    ],
+)
+def test_volume_of_area_times_height_in_mixed_units(tmp_path, unit, height, stated, said):
+    """Revit's GrossVolume: m2 times the file's unit of length, and the level's height at that."""
+    path = tmp_path / "model.ifc"
+    model = box_room(unit=unit)
+    space = model.by_type("IfcSpace")[0]
+    floor, high = WIDTH * DEPTH, height * (1000.0 if unit == "MILLIMETRE" else 1.0)
+    quantities = {"NetFloorArea": floor, "Height": high, "GrossVolume": floor * high}
+    pset = ifcopenshell.api.pset.add_qto(model, product=space, name="BaseQuantities")
+    ifcopenshell.api.pset.edit_qto(model, qto=pset, properties=quantities)
+    model.write(str(path))
+    building = read_ifc(path)
+    expected = None if stated is None else pytest.approx(floor * stated, rel=1e-6)
+    assert building.spaces[0].stated_volume == expected
+    assert said in texts(building)

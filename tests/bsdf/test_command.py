@@ -48,7 +48,7 @@ def test_eval_answers_in_the_frame_of_radiance(blind):
     ours = np.array([float(line.rsplit(" ", 1)[1]) for line in answer])
     theirs = radiance.query(blind, incident, outgoing)
     np.testing.assert_allclose(ours, theirs, rtol=radiance.LARGEST_FACTOR)
-    options = ["--in", *angles[0, :2], "--out", *angles[0, 2:]]
+    options = ["--incident", *angles[0, :2], "--outgoing", *angles[0, 2:]]
     assert float(run("eval", blind, *options).stdout) == pytest.approx(ours[0], rel=1e-6)
 
 
@@ -57,7 +57,7 @@ def test_eval_of_nothing_and_of_nonsense(blind):
     with pytest.raises(DataError, match="line 2: expected four angles"):
         run("eval", blind, "-", text="1 2 3 4\n1 2 x 4\n")
     with pytest.raises(DataError, match="no Solar band"):
-        run("eval", blind, "--band", "Solar", "--in", 1, 2, "--out", 3, 4)
+        run("eval", blind, "--band", "Solar", "--incident", 1, 2, "--outgoing", 3, 4)
     assert run("eval", blind).exit_code == 2
 
 
@@ -88,12 +88,12 @@ def test_check_sees_front_and_back_that_do_not_fit(real_data):
 @pytest.mark.parametrize("name", ["klems_full/bcl_cl_Tn0.88_blinds", "tensortree/blinds_20deg_t45"])
 def test_plot_writes_a_picture(real_data, tmp_path, name):
     out = tmp_path / "plot.png"
-    run("plot", real_data / f"bsdf/{name}.xml", "--in", 140, 90, "--out", out)
+    run("plot", real_data / f"bsdf/{name}.xml", "--incident", 140, 90, "--out", out)
     assert out.read_bytes().startswith(b"\x89PNG") and out.stat().st_size > 20_000
 
 
 def test_a_picture_of_no_known_kind_is_refused(dummy_back, tmp_path):
-    answer = run("plot", dummy_back, "--in", 140, 90, "--out", tmp_path / "plot.xyz")
+    answer = run("plot", dummy_back, "--incident", 140, 90, "--out", tmp_path / "plot.xyz")
     assert answer.exit_code == 2 and "expected a file name that ends in .png" in answer.output
 
 

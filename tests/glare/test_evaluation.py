@@ -9,7 +9,6 @@ from glare_pictures import AHEAD, PICTURES, VIEWS, disc, room, window
 from mitsuba_cfs.glare.evaluation import (
     GlareOptions,
     Task,
-    enhanced_simplified_dgp,
     evaluate,
 )
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order, in_scan_order
@@ -83,7 +82,8 @@ def test_edgp_is_dgp_where_everything_is_direct():
     picture = PICTURES["sun in view"](AHEAD) * 0.2
     whole = evaluate(picture, AHEAD)
     direct = np.where(whole.labels > 0, picture, 0.0)
-    assert enhanced_simplified_dgp(whole.Ev, direct, AHEAD) == pytest.approx(whole.dgp, rel=1e-9)
+    found = evaluate(direct, AHEAD, illuminance=whole.Ev)
+    assert found.dgp == pytest.approx(whole.dgp, rel=1e-9)
 
 
 def test_orders_of_a_picture_are_inverse():

@@ -161,7 +161,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     import mitsuba as mi
 
     from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.picture_paths import point_in_time_picture
     from tests.trace.test_point_in_time import diffuser as diffusing_system
     from tests.trace.test_point_in_time import klems
@@ -172,7 +172,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     obstacle = rooms.obstruction() if obstructed else None
     if kind == "clear":
         way, transmission = clear(0.6), np.diag(np.full(K, 0.6))
-        system = System(None, AngularBeam(np.full(16, 0.6)))
+        system = PathOptics(None, AngularBeam(np.full(16, 0.6)))
     else:
         way, transmission = diffuser(0.5), klems(0.5).transmission_matrix()
         system = diffusing_system(0.5)

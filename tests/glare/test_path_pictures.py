@@ -14,13 +14,13 @@ pytestmark = pytest.mark.usefixtures("variant")
 
 def test_what_stands_outdoors_is_lit_by_the_sky_and_not_by_the_sun_alone():
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.picture_paths import point_in_time_picture
     from mitsuba_cfs.trace.point_in_time import point_in_time
 
     interior, groups = rooms.test_room()
     hidden = rooms.quad((-50, -4, -50), (50, -4, -50), (50, -4, 50), (-50, -4, 50))
-    system = System(None, AngularBeam(np.full(16, 0.8)))
+    system = PathOptics(None, AngularBeam(np.full(16, 0.8)))
     room = LitRoom(interior, rooms.surfaces([(hidden, 0.5)]), groups, [system])
     sky = Sky(np.full(146, 2000.0), (0.0, 0.5, 0.5), 0.0)
     view = fisheye((1.8, 2.0, 1.2), (0.0, -1.0, 0.0), 100)

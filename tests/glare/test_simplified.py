@@ -7,14 +7,14 @@ import pytest
 
 from mitsuba_cfs.glare.annual import annual_glare, full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
-from mitsuba_cfs.glare.simplified import direct_only, enhanced_simplified_dgp, simplified_dgp
+from mitsuba_cfs.glare.indices import simplified_dgp
 from tests.glare.test_annual import VIEW, made_up
 
 
 def test_edgp_takes_the_sources_of_the_picture_and_the_illuminance_given():
     pictures = made_up(4)
     own = np.array([500.0, 1500.0, 3000.0, 6000.0])
-    found = enhanced_simplified_dgp(pictures, own)
+    found = annual_glare(pictures, illuminance=own).dgp
     values = pictures.values(np.arange(4))
     for h in range(4):
         picture = full_picture(values[h], pictures.pixels, VIEW)
@@ -22,32 +22,34 @@ def test_edgp_takes_the_sources_of_the_picture_and_the_illuminance_given():
         assert found[h] == pytest.approx(alone.dgp, rel=1e-12)
     assert not np.allclose(found, annual_glare(pictures).dgp, rtol=0.01)
     with pytest.raises(ValueError, match="illuminance"):
-        enhanced_simplified_dgp(pictures, own[:3])
+        annual_glare(pictures, illuminance=own[:3])
 
 
 def test_sdgp_is_wienolds_line_and_at_most_one():
-    assert simplified_dgp([0.0, 1000.0, 20_000.0]) == pytest.approx([0.184, 0.2462, 1.0])
+    found = [simplified_dgp(E) for E in (0.0, 1000.0, 20_000.0)]
+    assert found == pytest.approx([0.184, 0.2462, 1.0])
 
 
 @pytest.mark.parametrize(("scale", "same"), [(0.0, True), (1.0, False)])
-def test_direct_only_leaves_out_what_the_room_reflects_twice(variant, scale, same):
-    from mitsuba_cfs.trace.annual_pictures import view_matrices
+def test_a_direct_view_leaves_out_what_the_room_reflects_twice(variant, scale, same):
+    """The pictures of eDGP: a part of the whole ones, pixel by pixel, as the seed is the same."""
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import DaylightScene
     from tests.trace import rooms
 
     room, groups = rooms.test_room(scale)
-    matrices = view_matrices(room, groups, VIEW, samples=4)
-    direct = direct_only(matrices)
+    scene = DaylightScene(room, rooms.NOTHING, groups, view=VIEW)
+    traced = PhaseScene(scene, Sampling(view_samples=4))
     luminance = np.ones((1, 145, 1))
-    whole, part = (m.three_phase(luminance).values(np.array([0])) for m in (matrices, direct))
+    whole, part = (
+        m.three_phase(luminance).values(np.array([0])) for m in (traced.view, traced.direct_view)
+    )
     assert np.all(part <= whole * (1 + 1e-5))
     if same:
         assert part == pytest.approx(whole, abs=1e-6)
     else:
-        one = view_matrices(room, groups, VIEW, samples=4, max_depth=1)
-        assert part.sum() == pytest.approx(
-            one.three_phase(luminance).values(np.array([0])).sum(), rel=1e-4
-        )
-        assert part.sum() < 0.97 * whole.sum()
+        assert traced.view.seen.sum() < part.sum() < 0.97 * whole.sum()
 
 
 @pytest.fixture(scope="module")

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_cfs.matrices.cache import MatrixCache, State, default_folder, digest
+from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache, default_folder, digest
 from tests.trace import rooms
 
 BY = "mitsuba_cfs.trace.estimate"  # the module that computes what these tests keep
-STATE = State(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
+STATE = BatchMean(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
 
 
 @pytest.fixture
@@ -173,7 +173,7 @@ def test_the_sun_and_what_is_absorbed_come_from_the_cache(variant, cache, monkey
     def both(tau: float, reflectance: float):
         way = direct_sun.KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
         sun = direct_sun.direct_sun_matrix(
-            room, rooms.NOTHING, groups, [way], [[1.8, 1, 0.8]], [[0, 0, 1]], [[0, -1, 0.6]],
+            room, rooms.NOTHING, groups, [way], [[1.8, 1, 0.8]], [[0, 0, 1]], suns=[[0, -1, 0.6]],
             window_points=16, stopping=few, cache=cache,
         )  # fmt: skip
         absorbed = absorption_matrix.absorption_matrix(
@@ -191,7 +191,7 @@ def test_the_sun_and_what_is_absorbed_come_from_the_cache(variant, cache, monkey
     with pytest.raises(ValueError, match="needs a `key`"):
         direct_sun.direct_sun_matrix(
             room, rooms.NOTHING, groups, [direct_sun.PluginScattering(None)],
-            [[1.8, 1, 0.8]], [[0, 0, 1]], [[0, -1, 0.6]], cache=cache,
+            [[1.8, 1, 0.8]], [[0, 0, 1]], suns=[[0, -1, 0.6]], cache=cache,
         )  # fmt: skip
 
 

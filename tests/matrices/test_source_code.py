@@ -60,7 +60,7 @@ def hash_after_a_change_of(copy: Path, file: str, modules: tuple[str, ...]) -> s
 
 @pytest.mark.parametrize(
     "file",
-    ["scenes/heat/box.py", "mitsuba_cfs/methods/phase_light.py", "scenes/job/thermal.py",
+    ["scenes/heat/box.py", "mitsuba_cfs/methods/phase_light.py", "scenes/room/thermal.py",
      "thermal/step.py", "bim/ifc/shapes.py", "mitsuba_cfs/bsdf/tensor_tree.py"],
 )  # fmt: skip
 def test_a_case_hangs_on_what_was_forgotten_once(copy, file):

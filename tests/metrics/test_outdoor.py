@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from mitsuba_cfs.metrics import en17037
 from mitsuba_cfs.metrics.schedules import daylight_hours
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
-from mitsuba_cfs.sky.weather import read_epw
 
 
 def test_median_diffuse_illuminance_of_reykjavik(real_data):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from bim.model import Element
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.photovoltaics.modules import pv_modules
 
 pytestmark = pytest.mark.usefixtures("variant")

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from bim.model import Problem
-from scenes.study.case import Case, Source
+from scenes.study.case import Case, InputFile
 from scenes.study.one_case import glare_figures, room_figures
-from scenes.study.plan import Plan
+from scenes.study.plan import StudyPlan
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.page import study_report_html
@@ -55,7 +55,7 @@ class AnyWeather:
 def study(systems: int = 2, failed: bool = True) -> StudyResult:
     """Two rooms with some systems, from the made-up run; one case without a result."""
     run = run_result(picture_size=48, pictures=1)
-    none = Source(Path("nowhere"), "0")
+    none = InputFile(Path("nowhere"), "0")
     cases, results, rooms = [], [], {}
     for room in run.spaces:
         for number in range(systems):
@@ -82,12 +82,12 @@ def study(systems: int = 2, failed: bool = True) -> StudyResult:
     if failed:
         cases.append(replace(cases[-1], system="broken"))
         results.append(CaseResult(cases[-1].key, error="broken.xml: has <no> band"))
-    return StudyResult("Blinds & shades", Plan(tuple(cases), rooms), tuple(results), 1, 12.0)
+    return StudyResult("Blinds & shades", StudyPlan(tuple(cases), rooms), tuple(results), 1, 12.0)
 
 
 def options():
     """The options of a room, without which no case is."""
-    from scenes.job.options import RoomOptions
+    from scenes.room.options import RoomOptions
 
     return RoomOptions(method="five-phase")
 

@@ -62,15 +62,15 @@ def _pv(_building, weather, _study, **_options):
 def _read_year(options, *_others):
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.metrics.schedules import working_hours
-    from mitsuba_cfs.sky.weather import read_epw
+    from mitsuba_cfs.sky.epw import read_epw
     from scenes.year_of_glare.views import NamedView
-    from scenes.year_of_glare.year import Year
+    from scenes.year_of_glare.year import GlareYear
 
     weather = read_epw(options.weather)
     views = [NamedView("eye001_1", fisheye([0, 0, 1], [0, 1, 0], 64))]
     sky = SimpleNamespace(lit=np.arange(100, 4000, 100))
     used = working_hours(weather, 8.0, 18.0)
-    return Year(options, "A", views, None, None, weather, sky, used, options.metric)
+    return GlareYear(options, "A", views, None, None, weather, sky, used, options.metric)
 
 
 def _rate_views(year, kept, _progress):
@@ -126,7 +126,7 @@ def _study_report(_result, path):
 
 
 WORK = {
-    "scenes.job.run.run_job": _run_job,
+    "scenes.run.run.run_job": _run_job,
     "scenes.heat.study.run_study": _thermal,
     "scenes.photovoltaics.study.run_pv": _pv,
     "scenes.photovoltaics.picture.view_directions": lambda _result: [],
@@ -147,7 +147,7 @@ def quick_work(give: Callable[[object, str, object], object] = setattr, among: s
     Args: among: only for modules that this command needs; the others load for long.
     """
     needs = {
-        "run": "scenes.job", "demo": "scenes.job", "thermal": "scenes.heat.study", "pv": "photovol",
+        "run": "scenes.run", "demo": "scenes.run", "thermal": "scenes.heat.study", "pv": "photovol",
         "dgp": "year_of_glare", "picture": "view_picture", "calibrate": "calibration",
         "bench": "benchmarks", "bsdf": "bsdf_generation", "study": "scenes.study",
     }  # fmt: skip

@@ -15,9 +15,9 @@ import pytest
 from mitsuba_cfs.errors import DataError
 from scenes.calibration import choice
 from scenes.calibration.choice import ERRORS, Demand, choose
-from scenes.calibration.costs import HEAT, Calibration, Work, calibration_file
-from scenes.calibration.shipped import Speed, scaled_costs, shipped_costs
-from scenes.calibration.speed import measured_speed
+from scenes.calibration.costs import HEAT, Calibration, Workload, calibration_file
+from scenes.calibration.shipped import scaled_costs, shipped_costs
+from scenes.calibration.speed import Speed, measured_speed
 from scenes.cost.measure import Cost
 
 MINUTE, DAY = 60.0, 86400.0
@@ -39,7 +39,7 @@ THEIR_MACHINE = Calibration(
 
 def asked(scenes=1, systems=1, steps=10, *, budget=30 * DAY, error=0.12, fine=True, mirror=False):
     """The choice for so much work on the dissertation's machine."""
-    work = Work(scenes, systems, steps)
+    work = Workload(scenes, systems, steps)
     return choose(Demand(work, budget, error, fine, mirror), THEIR_MACHINE)
 
 
@@ -69,7 +69,7 @@ def test_no_other_method_would_have_been_better(seed, monkeypatch):
     monkeypatch.setattr(choice, "ERRORS", errors)
     costs = tuple(Cost(*pair, *random.uniform(0, 100, 3)) for pair in errors)
     machine = Calibration("m", "now", 400, costs)
-    work = Work(*random.integers(1, 5, 3))
+    work = Workload(*random.integers(1, 5, 3))
     budget, error = float(random.uniform(10, 6000)), float(random.uniform(0.02, 0.3))
     found = choose(Demand(work, budget, error, True, False), machine)
     time_of = {pair: machine.seconds(*pair, work) for pair in errors}
@@ -114,7 +114,7 @@ def test_a_prediction_counts_each_part_as_often_as_it_comes():
         Cost("five-phase", "illuminance", 1000.0, 0.0, 0.5),
         Cost(*HEAT, 10_000.0, 0.0, 0.25),
     )
-    found = Calibration("m", "now", 400, costs).seconds("five-phase", "DGP", Work(2, 3, 5, 8))
+    found = Calibration("m", "now", 400, costs).seconds("five-phase", "DGP", Workload(2, 3, 5, 8))
     assert found == 2 * (100 + 3 * (10 + 5)) + 2 * (1000 + 3 * 4) + 2 * (10_000 + 3 * 2)
 
 
@@ -122,7 +122,7 @@ def test_a_calibration_survives_its_file(tmp_path):
     path = tmp_path / "deep" / "calibration.json"
     THEIR_MACHINE.write(path)
     assert Calibration.read(path) == THEIR_MACHINE
-    one = Work(1, 1, 1)
+    one = Workload(1, 1, 1)
     half = THEIR_MACHINE.scaled(400)
     assert half.seconds("five-phase", "DGP", one) == pytest.approx(340 * MINUTE / 4)
     assert half.seconds("point-in-time", "sDGP", one) == pytest.approx(0.1 * MINUTE)
@@ -139,7 +139,7 @@ def test_the_costs_that_ship_are_scaled_to_the_machine():
         assert new.per_scene == pytest.approx(2 * old.per_scene)
         assert new.per_system == pytest.approx(2 * old.per_system)
         assert new.per_step == pytest.approx(step * old.per_step)
-    year = Work(1, 1, 3430, 4450)
+    year = Workload(1, 1, 3430, 4450)
     times = {method: costs.seconds(method, "DGP", year) for method, _ in costs.pairs()}
     assert 0 < times["three-phase"] < times["five-phase"] < times["point-in-time"]
 
@@ -187,7 +187,7 @@ def test_this_machine_is_measured_and_found_again(tmp_path, monkeypatch, capsys)
     assert run(["calibrate", "--size", "64"]) == 0
     found = Calibration.read(calibration_file())
     assert set(found.pairs()) == {(method, metric) for method in METHODS for metric in GLARE}
-    year = Work(1, 1, 3430, 4450)
+    year = Workload(1, 1, 3430, 4450)
     times = {method: found.seconds(method, "DGP", year) for method in METHODS}
     assert 0 < times["three-phase"] < times["five-phase"] < times["point-in-time"]
     assert str(calibration_file()) in capsys.readouterr().out

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pythermalcomfort.models import adaptive_ashrae
 
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.studies import case_comfort_by_orientation as case
 from scenes.evidence.studies.systems import blind_before_glazing
 from thermal.comfort import running_mean

@@ -319,8 +319,10 @@ def test_a_mistake_is_found_before_anything_heavy_is_loaded(name: str, tmp_path:
 
 
 def test_the_demos_inputs_are_no_mistake() -> None:
-    from scenes.job.files import read_files
-    from scenes.job.options import JobOptions
+    from scenes.room.options import RoomOptions
+    from scenes.run.files import read_files
+    from scenes.run.options import JobOptions
 
-    found = read_files(JobOptions(OFFICE, WEATHER, VENETIAN_BLIND, picture_hours=("06-21 12",)))
+    room = RoomOptions.of(picture_hours=("06-21 12",))
+    found = read_files(JobOptions(OFFICE, WEATHER, VENETIAN_BLIND, room=room))
     assert found.system is not None and len(found.weather.times) == 8760

@@ -58,16 +58,17 @@ def radiance_illuminance(space, building, folder: Path) -> np.ndarray:
 def test_year_of_illuminance(name, tmp_path):
     from bim.ifc.building import read_ifc
     from mitsuba_cfs import variants
-    from scenes.job.inputs import read_system, read_weather
-    from scenes.job.options import RoomOptions
-    from scenes.job.room import compute_room
-    from scenes.job.windows import everywhere
+    from scenes.fenestration.systems import read_system
+    from scenes.room.options import RoomOptions
+    from scenes.room.room import compute_room
+    from scenes.room.windows import in_all_windows
+    from scenes.run.inputs import read_weather
 
     variants.activate()
     building = read_ifc(DEMO / "office.ifc")
     space = building.space(name)
-    options = RoomOptions(method="three-phase", sensor_spacing=SPACING)
-    systems = everywhere(space, read_system(SYSTEM))
+    options = RoomOptions.of(method="three-phase", sensor_spacing=SPACING)
+    systems = in_all_windows(space, read_system(SYSTEM))
     ours = compute_room(
         building, space, systems, read_weather(WEATHER), options, pictures=False
     ).daylight

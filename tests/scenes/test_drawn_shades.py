@@ -9,10 +9,10 @@ from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.job.drawn_shades import holds_shade
-from scenes.job.inputs import System, read_system
-from scenes.job.options import JobOptions
-from scenes.job.run import read_inputs
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.room.drawn_shades import holds_shade
+from scenes.run.options import JobOptions
+from scenes.run.run import read_inputs
 from tests.bim.small_ifc import OPENING, WALL, WIDTH, SmallIfc, box_room
 
 X, SILL, W, H = OPENING
@@ -98,5 +98,5 @@ def test_a_shade_is_known_by_the_light_that_it_scatters():
     straight = np.diag(0.7 / KLEMS_FULL.projected_solid_angles())
     none = np.zeros_like(straight)
     clear = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, straight, straight, none, none)
-    assert not holds_shade(System("clear", clear, clear))
-    assert holds_shade(System("clear", clear, clear, shading_position="internal"))
+    assert not holds_shade(FenestrationSystem("clear", clear, clear))
+    assert holds_shade(FenestrationSystem("clear", clear, clear, shading_position="internal"))

@@ -100,7 +100,8 @@ JOBS = {
     "ifc export --gltf": Job(lambda _, out: ["ifc", "export", OFFICE, "--gltf", out], "out.glb"),
     "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
     "bsdf plot": Job(
-        lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--in", 40, 0, "--out", out], "out.png"
+        lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out],
+        "out.png",
     ),
     "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
     "bsdf combine": Job(
@@ -289,7 +290,7 @@ def test_a_read_only_disk_is_found_before_the_work(name, place, small_disk, caps
     subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
     here.job = Job(lambda *_: words, folder=here.job.folder)
     begun = []
-    for module in ("scenes.job.run.run_job", "scenes.heat.study.run_study",
+    for module in ("scenes.run.run.run_job", "scenes.heat.study.run_study",
                    "scenes.study.study.run_study", "scenes.year_of_glare.year.read_year",
                    "scenes.calibration.measure.calibrated"):  # fmt: skip
         monkeypatch.setattr(module, lambda *_a, **_k: begun.append(1))

@@ -18,13 +18,13 @@ from mitsuba_cfs.files import write_text
 from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.fenestration import fill_windows
-from scenes.job.inputs import Given, System, read_system
-from scenes.job.thermal_system import thermal_system
+from scenes.fenestration.resolver import fill_windows
+from scenes.fenestration.systems import FenestrationSystem, Given, read_system
+from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
 from tests.scenes.fenestration_models import COMMON, GLAZING, STATED, grey, room, with_attached
 
-TINY = ["--quick", "--picture-size", "64", "--picture", "06-21 12", "--spacing", "2",
+TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2",
         "--method", "three-phase"]  # fmt: skip
 YEAR = ["--quick", "--size", "64", "--metric", "sDGP", "--method", "three-phase"]
 
@@ -35,13 +35,13 @@ def own_cache(tmp_path_factory, monkeypatch) -> None:
     monkeypatch.setenv("CFS_CACHE", str(tmp_path_factory.getbasetemp() / "matrices"))
 
 
-def filled(path: Path, given: Given | None = None) -> System:
+def filled(path: Path, given: Given | None = None) -> FenestrationSystem:
     """What fills the only window of a model, in its first state."""
     (states,) = fill_windows(read_ifc(path).windows, given or Given(), path).values()
     return states[0]
 
 
-def normal(system: System) -> tuple[float, float]:
+def normal(system: FenestrationSystem) -> tuple[float, float]:
     """Visible and solar transmittance at normal incidence."""
     return tuple(
         float(band.direct_hemispherical(band.transmission_front)[0])

@@ -10,11 +10,11 @@ from bim.shoebox import shoebox
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.demo import OFFICE
-from scenes.job.daylight import room_scene
-from scenes.job.holes import hole_problems, moved
-from scenes.job.inputs import read_system
-from scenes.job.options import RoomOptions
-from scenes.job.windows import everywhere, room_windows
+from scenes.fenestration.systems import read_system
+from scenes.room.daylight import room_scene
+from scenes.room.holes import hole_problems, moved_problem
+from scenes.room.options import SensorGrid
+from scenes.room.windows import in_all_windows, room_windows
 
 pytestmark = pytest.mark.usefixtures("variant")
 BLIND = OFFICE.parent / "venetian_blind.xml"
@@ -28,8 +28,8 @@ def problems_of(cache=None, *, missing: str = ""):
     """The problems of the box room, without the wall `missing`."""
     building = shoebox()
     (space,) = building.spaces
-    windows = room_windows(space, everywhere(space, read_system(BLIND)))
-    scene = room_scene(building, space, windows, RoomOptions())
+    windows = room_windows(space, in_all_windows(space, read_system(BLIND)))
+    scene = room_scene(building, space, windows, SensorGrid(), 64)
     if missing:
         room = scene.interior
         keep = room.surface != [face.name for face in space.faces].index(missing)
@@ -50,4 +50,4 @@ def test_a_missing_wall_is_named_with_its_place(tmp_path):
     assert "too dark" in problem.consequence
     assert problems_of(MatrixCache(tmp_path), missing="back")[1] == (problem,)  # from the cache
     twin = replace(space, guid="other", name="2")
-    assert moved(problem, twin, space.name).where == "other"
+    assert moved_problem(problem, twin, space.name).where == "other"

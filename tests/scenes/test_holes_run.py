@@ -7,7 +7,7 @@ import pytest
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.cli import run as main
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.job import daylight, holes
+from scenes.room import daylight, holes
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -16,9 +16,10 @@ from scenes.cli import run
 from scenes.commands import run as run_command
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat import study_file as heat_file
-from scenes.job import run as job
-from scenes.job.glare import default_hours
-from scenes.job.options import JobOptions, RoomOptions
+from scenes.room.glare import default_hours
+from scenes.room.options import RoomOptions
+from scenes.run import run as job
+from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study
 from scenes.year_of_glare.options import YearOptions
 from tests.scenes.study_files import study_file
@@ -39,7 +40,7 @@ bsdf = "{VENETIAN_BLIND}"
 def test_every_choice_is_an_option_and_none_costs_more() -> None:
     from scenes.photovoltaics.study import run_pv
 
-    defaults = {f.name: f.default for kind in (RoomOptions, YearOptions) for f in fields(kind)}
+    defaults = RoomOptions().named() | {f.name: f.default for f in fields(YearOptions)}
     defaults |= {"samples": YearOptions.__dataclass_fields__["samples"].default}
     for name, value in (quick.ROOM | quick.VIEWS).items():
         coarser = name in ("sensor_spacing", "heat_step_s")
@@ -67,11 +68,12 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list:
 
 @pytest.mark.parametrize("size", ["800", "600"])  # the second is the default of a full run
 def test_what_the_user_gives_holds_against_quick(chosen: list, size: str) -> None:
-    run([*RUN, "--quick", "--picture-size", size, "--spacing", "0.25"])
+    run([*RUN, "--quick", "--size", size, "--spacing", "0.25"])
     (options,) = chosen
-    assert (options.picture_size, options.sensor_spacing) == (int(size), 0.25)
+    named = options.room.named()
+    assert (named["picture_size"], named["sensor_spacing"]) == (int(size), 0.25)
     rest = {n: v for n, v in quick.ROOM.items() if n not in ("picture_size", "sensor_spacing")}
-    assert {name: getattr(options, name) for name in rest} == rest
+    assert {name: named[name] for name in rest} == rest
     assert options.quick
 
 
@@ -95,7 +97,7 @@ def test_what_a_study_says_holds_against_quick(tmp_path) -> None:
     study = read_study(path, quick=True)
     assert study.quick and study.options.picture_size == 96
     assert study.options.sun_points == quick.ROOM["sun_points"]
-    assert read_study(path).options.sun_points == RoomOptions().sun_points
+    assert read_study(path).options.sun_points == RoomOptions().sampling.sun_points
 
 
 def test_what_a_thermal_study_says_holds_against_quick(tmp_path) -> None:
@@ -122,8 +124,8 @@ def test_one_picture_is_the_brightest_hours() -> None:
 
 @pytest.fixture
 def three_rooms(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    """Rooms of which the third is alike to the first, each computed by a stub."""
-    rooms = [SimpleNamespace(guid=g, label=g.upper(), like="") for g in ("a", "b", "c")]
+    """Rooms of which the third equals the first, each computed by a stub."""
+    rooms = [SimpleNamespace(guid=g, label=g.upper(), template="") for g in ("a", "b", "c")]
     a, b, c = rooms
     monkeypatch.setattr(job, "template_rooms", lambda spaces: [(a, c), (b,)])
     monkeypatch.setattr(job, "same_systems", lambda *_: False)
@@ -156,11 +158,11 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, files, *, told):
-        told("the first room")
+    def half(options, progress, files, *, on_room):
+        on_room("the first room")
         raise DataError("the second failed")
 
-    monkeypatch.setattr("scenes.job.run.run_job", half)
+    monkeypatch.setattr("scenes.run.run.run_job", half)
     monkeypatch.setattr(run_command, "summary_line", lambda room: f"{room}: DGP 0.30")
     assert run([*RUN[:-1], str(tmp_path / "o"), "--quick"]) == 1
     said = capsys.readouterr()

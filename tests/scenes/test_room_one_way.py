@@ -13,17 +13,19 @@ from bim.model import Building, Element
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import silent
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.fenestration.systems import read_system
 from scenes.heat.study import rooms_of, run_study
 from scenes.heat.study_file import read_study
-from scenes.job.inputs import read_system
-from scenes.job.operation import read_operation
-from scenes.job.operation_tables import OperationTables
-from scenes.job.options import JobOptions, RoomOptions
-from scenes.job.room import Room, compute_room
-from scenes.job.run import run_job
-from scenes.job.windows import everywhere
+from scenes.room.operation import read_operation
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
+from scenes.room.room import RoomSimulation, compute_room
+from scenes.room.windows import in_all_windows
+from scenes.run.options import JobOptions
+from scenes.run.run import run_job
 from scenes.study.one_case import compute_case
 from scenes.study.plan import plan_of
 from scenes.study.study_file import read_study as read_grid
@@ -75,8 +77,8 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
         f"[options]\n{TRACE}\n"
     )
     options = JobOptions(
-        OFFICE, WEATHER, VENETIAN_BLIND, operation=operation, spaces=("A",), method=method,
-        picture_hours=("06-21 12",), **SAMPLING,
+        OFFICE, WEATHER, VENETIAN_BLIND, operation, ("A",),
+        room=RoomOptions.of(method=method, picture_hours=("06-21 12",), **SAMPLING),
     )  # fmt: skip
     (room,) = run_job(options).spaces
     (year,), _ = run_study(read_study(thermal), silent)
@@ -144,8 +146,9 @@ def test_states_switch_in_the_same_hours(variant, tmp_path, weather, rule) -> No
     (year,), _ = run_study(study, silent)
     building, (space,) = rooms_of(study)
     found = compute_room(
-        building, space, everywhere(space, *operation.systems), weather, RoomOptions(**SAMPLING),
-        operation=operation, pictures=False, cache=MatrixCache.of_user(),
+        building, space, in_all_windows(space, *operation.systems), weather,
+        RoomOptions.of(**SAMPLING), operation=operation, pictures=False,
+        cache=MatrixCache.of_user(),
     )  # fmt: skip
     ran = found.operation.hours
     assert 0 < ran["shading_state"].mean() < 1
@@ -163,7 +166,7 @@ def test_sun_on_the_windows_is_reflected_by_solar_reflectances(variant, weather)
     def irradiance(visible: float, solar: float) -> np.ndarray:
         opposite = Element("w", "wall", "IfcWall", wall, visible, solar)
         building = replace(box, elements=(opposite,))
-        room = office(building, weather, RoomOptions(**SAMPLING))
+        room = office(building, weather, RoomOptions.of(**SAMPLING))
         assert room.scene.groups  # light is asked for as well, as in `cfs run`
         return room.sun.irradiance
 
@@ -177,7 +180,7 @@ def test_a_room_without_windows_has_a_zone_in_the_dark(variant, weather) -> None
     box = shoebox(3.0, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5),))
     blind = replace(box, spaces=(replace(box.spaces[0], windows=()),))
     tables = OperationTables.model_validate({"control": {"rule": "glare"}})
-    zone = office(blind, weather, RoomOptions(**SAMPLING), tables).zone
+    zone = office(blind, weather, RoomOptions.of(**SAMPLING), tables).zone
     assert not zone.solar.inside.any() and zone.daylight is None and not zone.state.any()
     assert zone.solar.facade.max() > 100  # the sun still warms its walls
 
@@ -187,12 +190,12 @@ def office(
     weather: Weather,
     options: RoomOptions,
     tables: OperationTables | None = None,
-) -> Room:
+) -> RoomSimulation:
     """The building's only room with the demo's blind."""
     (space,) = building.spaces
-    systems = everywhere(space, read_system(VENETIAN_BLIND))
+    systems = in_all_windows(space, read_system(VENETIAN_BLIND))
     cache = MatrixCache.of_user()
-    return Room(building, space, systems, weather, options, operation=tables, cache=cache)
+    return RoomSimulation(building, space, systems, weather, options, operation=tables, cache=cache)
 
 
 def test_heat_is_computed_in_one_place() -> None:

@@ -17,7 +17,7 @@ DEMO = Path(str(files("scenes") / "demo"))
 OFFICE = DEMO / "office.ifc"
 WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
 SYSTEM = DEMO / "venetian_blind.xml"
-QUICK = ["--quick", "--picture-size", "96", "--picture", "06-21 12", "--space", "A"]
+QUICK = ["--quick", "--size", "96", "--picture", "06-21 12", "--space", "A"]
 
 
 def call(out, *options, building=OFFICE, weather=WEATHER, system=SYSTEM) -> int:

@@ -18,14 +18,14 @@ from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.progress import silent
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.job.attached import g_by_patch
-from scenes.job.inputs import read_system
-from scenes.job.options import JobOptions
-from scenes.job.run import read_inputs, used_systems
-from scenes.job.thermal_system import thermal_system
+from scenes.fenestration.attached import g_by_patch
+from scenes.fenestration.systems import read_system
+from scenes.fenestration.thermal_system import thermal_system
+from scenes.run.options import JobOptions
+from scenes.run.run import read_inputs, used_systems
 
 QUICK = [
-    "--quick", "--picture-size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
+    "--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
     "--method", "three-phase",
 ]  # fmt: skip
 TABLES = ("daylight_metrics.csv", "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv")

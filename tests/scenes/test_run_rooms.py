@@ -1,4 +1,4 @@
-"""The main job on a small box: methods against each other, states, kept matrices, rooms alike."""
+"""The main job on a small box: methods against each other, states, kept matrices, equal rooms."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.job.alike import as_room, same_light, same_systems
-from scenes.job.annual import worst_hours
-from scenes.job.control import shading_states
-from scenes.job.inputs import System, read_system
-from scenes.job.operation import check_states, read_operation
-from scenes.job.options import JobOptions, RoomOptions
-from scenes.job.room import compute_room, skies_for
-from scenes.job.windows import everywhere, room_windows
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.room.annual import worst_hours
+from scenes.room.control import shading_states
+from scenes.room.equal_rooms import moved_result, same_light, same_systems
+from scenes.room.operation import check_states, read_operation
+from scenes.room.options import RoomOptions
+from scenes.room.room import compute_room, skies_for
+from scenes.room.windows import in_all_windows, room_windows
+from scenes.run.options import JobOptions
 
 HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
-SMALL = RoomOptions(
+SMALL = RoomOptions.of(
     sensor_spacing=1.0, sensor_samples=8192, patch_samples=4096, sun_points=512,
     path_samples=16384, picture_size=96, picture_samples=8, sky_subdivision=1,
 )  # fmt: skip
@@ -41,36 +43,36 @@ def weather() -> Weather:
 
 
 @pytest.fixture(scope="module")
-def blind() -> System:
+def blind() -> FenestrationSystem:
     return read_system(VENETIAN_BLIND)
 
 
 @pytest.fixture(scope="module")
-def glass() -> System:
+def glass() -> FenestrationSystem:
     return clear("clear", 0.8)
 
 
-def clear(name: str, tau: float) -> System:
+def clear(name: str, tau: float) -> FenestrationSystem:
     """A pane that passes the share `tau` of all light straight on and reflects a tenth."""
     omega = KLEMS_FULL.projected_solid_angles()
     through, back = np.diag(tau / omega), np.diag(0.1 / omega)
     klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, back, back)
-    return System(name, klems, klems, u_value=2.0, g_value=min(tau + 0.05, 0.87))
+    return FenestrationSystem(name, klems, klems, u_value=2.0, g_value=min(tau + 0.05, 0.87))
 
 
 @pytest.fixture(scope="module")
-def milk() -> System:
+def milk() -> FenestrationSystem:
     """A pane that scatters the same to all sides."""
     even = np.full((KLEMS_FULL.size, KLEMS_FULL.size), 0.5 / np.pi)
     nothing = np.zeros_like(even)
     klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, even, even, nothing, nothing)
-    return System("milk", klems, klems, u_value=2.0)
+    return FenestrationSystem("milk", klems, klems, u_value=2.0)
 
 
 @pytest.fixture(scope="module")
 def skies(weather) -> AnnualSky:
     """The skies of a few hours, as if the others were dark."""
-    return only(skies_for(weather, SMALL), HOURS)
+    return only(skies_for(weather, SMALL.method, SMALL.sampling), HOURS)
 
 
 def only(skies: AnnualSky, hours: tuple[int, ...]) -> AnnualSky:
@@ -86,10 +88,10 @@ BOX = shoebox(
 ROOM = BOX.spaces[0]
 
 
-def light(method: str, system: System, weather, skies, **more) -> np.ndarray:
+def light(method: str, system: FenestrationSystem, weather, skies, **more) -> np.ndarray:
     """Illuminance [hours, S] by a method."""
     result = compute_room(
-        BOX, ROOM, everywhere(ROOM, system), weather, replace(SMALL, method=method),
+        BOX, ROOM, in_all_windows(ROOM, system), weather, replace(SMALL, method=method),
         skies=skies, pictures=False, **more,
     )  # fmt: skip
     print(method, result.daylight.relative_error)
@@ -126,10 +128,10 @@ def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, 
     """The same pictures from the file; a broken file is traced anew."""
     from mitsuba_cfs.methods import phase_scene
 
-    options = replace(SMALL, picture_hours=("12-19 12",), sensor_samples=1024, patch_samples=1024)
+    options = SMALL.changed(picture_hours=("12-19 12",), sensor_samples=1024, patch_samples=1024)
 
     def seen(cache: MatrixCache | None) -> np.ndarray:
-        systems = everywhere(ROOM, glass)
+        systems = in_all_windows(ROOM, glass)
         found = compute_room(BOX, ROOM, systems, weather, options, skies=skies, cache=cache)
         return found.glare.pictures[0].luminance
 
@@ -154,9 +156,9 @@ def test_windows_with_their_own_systems(variant, weather, skies, blind, glass) -
     space = both.spaces[0]
     left, right = (window.guid for window in space.windows)
     dark = clear("dark", 1e-9)
-    options = replace(SMALL, method="five-phase", sensor_samples=2048)
+    options = SMALL.changed(method="five-phase", sensor_samples=2048)
 
-    def sensors(one: System, other: System) -> np.ndarray:
+    def sensors(one: FenestrationSystem, other: FenestrationSystem) -> np.ndarray:
         systems = {left: (one,), right: (other,)}
         found = compute_room(both, space, systems, weather, options, skies=skies, pictures=False)
         assert len(room_windows(space, systems).groups) == 2
@@ -203,11 +205,11 @@ def test_states_switch_light_and_heat_together(
     day = ", ".join("0" if hour < 12 else "1" for hour in range(24))
     operation = read_operation(operation_file(tmp_path, OPERATION.format(day)))
     operation = replace(operation, systems=(glass, blind))
-    options = replace(SMALL, method="five-phase", sensor_samples=2048)
+    options = SMALL.changed(method="five-phase", sensor_samples=2048)
 
-    def run(*states: System, operation=None):
+    def run(*states: FenestrationSystem, operation=None):
         return compute_room(
-            BOX, ROOM, everywhere(ROOM, *states), weather, options, operation=operation,
+            BOX, ROOM, in_all_windows(ROOM, *states), weather, options, operation=operation,
             skies=skies, pictures=False,
         )  # fmt: skip
 
@@ -286,25 +288,27 @@ def moved(building: Building, offset: tuple[float, float, float], name: str):
     return replace(space, faces=faces, windows=windows, guid=f"{name}-guid", name=name)
 
 
-def test_a_room_alike_has_the_results_of_its_twin(variant, weather, skies, glass, blind) -> None:
+def test_an_equal_room_has_the_results_of_its_template(
+    variant, weather, skies, glass, blind
+) -> None:
     """Shifted, the room is computed anew to the same numbers; what shades one alone tells them."""
     twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
     building = replace(BOX, spaces=(ROOM, twin))
-    systems = everywhere(ROOM, glass) | everywhere(twin, glass)
+    systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
     assert same_systems(ROOM, twin, systems)
-    assert not same_systems(ROOM, twin, everywhere(ROOM, glass) | everywhere(twin, blind))
-    assert same_light(building, ROOM, twin, SMALL, None)
+    assert not same_systems(ROOM, twin, in_all_windows(ROOM, glass) | in_all_windows(twin, blind))
+    assert same_light(building, ROOM, twin, SMALL.sampling, None)
     wall = np.array([[[8, -2, 0], [14, -2, 0], [14, -2, 6]]], dtype=float)
     shaded = replace(building, elements=(Element("w", "wall", "IfcWall", wall, 0.2, 0.2),))
-    assert not same_light(shaded, ROOM, twin, SMALL, None)
+    assert not same_light(shaded, ROOM, twin, SMALL.sampling, None)
 
-    options = replace(SMALL, sensor_samples=2048)
+    options = SMALL.changed(sensor_samples=2048)
     one, other = (
         compute_room(building, s, systems, weather, options, skies=skies, pictures=False)
         for s in (ROOM, twin)
     )
-    given = as_room(one, twin)
-    assert given.like == "room" and given.space is twin
+    given = moved_result(one, twin)
+    assert given.template == "room" and given.space is twin
     np.testing.assert_allclose(given.daylight.points, other.daylight.points, atol=1e-9)
     np.testing.assert_allclose(given.glare.view.position, other.glare.view.position, atol=1e-9)
     mean = given.daylight.illuminance.mean(axis=0)
@@ -312,8 +316,8 @@ def test_a_room_alike_has_the_results_of_its_twin(variant, weather, skies, glass
     np.testing.assert_allclose(mean, other.daylight.illuminance.mean(axis=0), rtol=0.03)
 
 
-def test_a_run_computes_rooms_alike_once(variant, weather, skies, glass, monkeypatch) -> None:
-    from scenes.job import run
+def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeypatch) -> None:
+    from scenes.run import run
 
     twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
     other = shoebox(2.5, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 1.5, 1.5),), name="other")
@@ -327,21 +331,22 @@ def test_a_run_computes_rooms_alike_once(variant, weather, skies, glass, monkeyp
         return compute_room(building, space, *others, **options, pictures=False)
 
     monkeypatch.setattr(run, "compute_room", noted)
-    options = JobOptions(
-        Path(), Path(), method="three-phase", cache=False, sky_subdivision=1, sensor_spacing=2.0,
+    room = RoomOptions.of(
+        method="three-phase", sky_subdivision=1, sensor_spacing=2.0,
         sensor_samples=1024, patch_samples=1024,
     )  # fmt: skip
+    options = JobOptions(Path(), Path(), cache=False, room=room)
     inputs = run.JobInputs(building, spaces, weather, systems, None)
     results, problems, notes = run._rooms(inputs, skies, options, silent)
     assert computed == ["room", "other"] and not problems
     assert [r.space.name for r in results] == ["room", "other", "twin"]
-    assert [r.like for r in results] == ["", "", "room"]
+    assert [r.template for r in results] == ["", "", "room"]
     assert len(notes) == 1 and "twin" in notes[0] and "room" in notes[0]
 
 
 def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glass) -> None:
-    options = replace(SMALL, annual_glare=True, picture_hours=("06-20 12", "12-19 12"))
-    found = compute_room(BOX, ROOM, everywhere(ROOM, glass), weather, options, skies=skies)
+    options = SMALL.changed(annual_glare=True, picture_hours=("06-20 12", "12-19 12"))
+    found = compute_room(BOX, ROOM, in_all_windows(ROOM, glass), weather, options, skies=skies)
     year = found.annual_glare["dgp"].to_numpy()
     assert np.flatnonzero(np.isfinite(year)).tolist() == list(HOURS)
     for picture in found.glare.pictures:

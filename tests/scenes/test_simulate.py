@@ -40,7 +40,7 @@ def ran(year, tmp_path_factory) -> Path:
     """The files of `cfs run` on the same."""
     out = tmp_path_factory.mktemp("run") / "out"
     words = ["run", OFFICE, "--weather", WEATHER, "--cfs", VENETIAN_BLIND, "--out", out, "--quick",
-             "--space", "A", "--picture", "06-21 12", "--picture-size", "96"]  # fmt: skip
+             "--space", "A", "--picture", "06-21 12", "--size", "96"]  # fmt: skip
     assert run([str(word) for word in words]) == 0
     return out
 

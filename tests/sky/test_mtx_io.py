@@ -96,8 +96,8 @@ def test_dctimestep_multiplies_ours(tmp_path, radiance, kind):
 @pytest.mark.peer
 @pytest.mark.parametrize("kind", ["", "-of", "-od"])
 def test_reads_gendaymtx(radiance, chicago, tmp_path, kind):
+    from mitsuba_cfs.sky.epw import read_epw
     from mitsuba_cfs.sky.matrix import sky_matrix
-    from mitsuba_cfs.sky.weather import read_epw
 
     path = tmp_path / "sky.smx"
     options = [kind] if kind else []

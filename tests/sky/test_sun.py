@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.sky import sun
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 
 
 def weather_at(times, latitude=0.0, longitude=0.0, zone=0.0, elevation=0.0, **series) -> Weather:

@@ -8,8 +8,8 @@ from weather_files import epw_rows, write_epw
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky import air
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.wea import read_wea, write_wea
-from mitsuba_cfs.sky.weather import read_epw
 
 FEBRUARY_3_14H = 24 * (31 + 2) + 13  # row of the hour that ends at 14:00
 DNI, DRY, DEW, HUMIDITY, PRESSURE, INFRARED, COVER = 14, 6, 7, 8, 9, 12, 23

@@ -53,7 +53,7 @@ def hold(table: pd.DataFrame) -> None:
 
 
 def test_sun_on_the_facade_is_energyplus_own(real_data, reference_data):
-    from mitsuba_cfs.sky.weather import read_epw
+    from mitsuba_cfs.sky.epw import read_epw
 
     weather = read_epw(real_data / "epw" / EPW_FILES["Houlton"])
     steps = sun_steps(weather, 6)
@@ -94,7 +94,7 @@ def test_better_closure_meets_the_bars_in_all_cases(real_data, reference_data):
 
 @pytest.mark.slow
 def test_comfort_agrees(real_data, reference_data):
-    from mitsuba_cfs.sky.weather import read_epw
+    from mitsuba_cfs.sky.epw import read_epw
 
     outdoor = read_epw(real_data / "epw" / EPW_FILES["Frankfurt"]).dry_bulb_c
     total = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.surfaces import Surfaces, Window, WindowGroup
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 
 
 def quad(a, b, c, d) -> NDArray[np.float64]:
@@ -50,7 +50,7 @@ def test_room(scale: float = 1.0) -> tuple[Surfaces, list[WindowGroup]]:
         ]
     )
     glass = quad((X0, 0, Z0), (X1, 0, Z0), (X1, 0, Z1), (X0, 0, Z1))
-    return room, [WindowGroup("south", (Window("window", glass),))]
+    return room, [WindowGroup("south", (WindowSurface("window", glass),))]
 
 
 def obstruction() -> Surfaces:
@@ -87,8 +87,8 @@ def l_shaped_room() -> tuple[Surfaces, list[WindowGroup], Surfaces]:
     south = quad((1, 0, 0.8), (3, 0, 0.8), (3, 0, 2.4), (1, 0, 2.4))
     west = quad((0, 5, 0.8), (0, 1, 0.8), (0, 1, 2.4), (0, 5, 2.4))
     groups = [
-        WindowGroup("south", (Window("south", south),)),
-        WindowGroup("west", (Window("west", west),)),
+        WindowGroup("south", (WindowSurface("south", south),)),
+        WindowGroup("west", (WindowSurface("west", west),)),
     ]
     shade = surfaces([(quad((-3, -1, 0), (-3, 7, 0), (-3, 7, 4), (-3, -1, 4)), 0.35)])
     return surfaces(parts), groups, shade
@@ -114,7 +114,7 @@ def skylight_room() -> tuple[Surfaces, list[WindowGroup]]:
     ]
     opaque = [(np.asarray(w, dtype=float), 0.5) for w in walls]
     opaque += [(patch(*strip), 0.7) for strip in strips]
-    return surfaces(opaque), [WindowGroup("roof", (Window("skylight", patch(1, 1, 3, 3)),))]
+    return surfaces(opaque), [WindowGroup("roof", (WindowSurface("skylight", patch(1, 1, 3, 3)),))]
 
 
 test_room.__test__ = False

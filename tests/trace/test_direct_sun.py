@@ -25,7 +25,9 @@ def matrix(scattering, exterior=rooms.NOTHING, suns=SUNS, points=POINTS, **optio
 
     room, groups = rooms.test_room()
     normals = np.tile(UP, (len(points), 1))
-    return direct_sun_matrix(room, exterior, groups, [scattering], points, normals, suns, **options)
+    return direct_sun_matrix(
+        room, exterior, groups, [scattering], points, normals, suns=suns, **options
+    )
 
 
 def diffuser(tau: float):

@@ -76,7 +76,7 @@ def test_scattered_sun(name, tmp_path):
     scattering = KlemsScattering(KLEMS_FULL, system.transmission_front, np.zeros(KLEMS_FULL.size))
     ours = direct_sun_matrix(
         surfaces, outside, groups, [scattering] * len(groups), POINTS,
-        np.tile([0, 0, 1.0], (3, 1)), suns, window_points=1024,
+        np.tile([0, 0, 1.0], (3, 1)), suns=suns, window_points=1024,
     )  # fmt: skip
     theirs = np.stack([radiance_illuminance(name, sun, tmp_path) for sun in suns], axis=2)
     mean, error = theirs.mean(axis=0), theirs.std(axis=0, ddof=1) / np.sqrt(RUNS)

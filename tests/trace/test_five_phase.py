@@ -166,7 +166,7 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     from the room on both sides.
     """
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.point_in_time import point_in_time
 
     diffuse = 300.0  # cd/m2 of a uniform sky and ground
@@ -177,7 +177,7 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     found = lit(matrices, [[glass()]], sun)
     beam = AngularBeam(glass_transmittance(np.linspace(0, 1, 128)))
     behind, luminance = (
-        LitRoom(room, rooms.NOTHING, groups, [System(None, beam)]),
+        LitRoom(room, rooms.NOTHING, groups, [PathOptics(None, beam)]),
         1e5 / SUN_SOLID_ANGLE,
     )
     for h, direction in enumerate(sun.direction):
@@ -196,7 +196,7 @@ def corner():
     """Two window groups below a shade, three sensors, three suns before one or both of them."""
     room, groups, shade = rooms.l_shaped_room()
     points = np.array([[2.0, 1.0, 0.8], [1.0, 4.5, 0.8], [5.0, 4.5, 0.8]])
-    matrices = traced(room, shade, groups, points, subdivision=1)
+    matrices = traced(room, shade, groups, points, subdivision=1, window_parts=1)
     sky = ReinhartSky(1)
     facing = np.stack([sky.directions @ group.frame[2] for group in groups])
     facing[:, np.abs(sky.directions[:, 2] - 0.4) > 0.2] = -1
@@ -240,7 +240,7 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     t, ways = [c.transmission for c in chosen], [c.scattering for c in chosen]
     exact = direct_sun_matrix(
         scene.interior, scene.exterior, scene.groups, ways, scene.points, scene.normals,
-        sky.direction, window_points=256, stopping=Stopping(batches=4),
+        suns=sky.direction, window_points=256, stopping=Stopping(batches=4),
     )  # fmt: skip
     view, direct_view = matrices.sensors.values, matrices.direct_sensors
     expected = phases.three_phase(view, t, matrices.daylight.values, sky.whole)
@@ -261,13 +261,13 @@ def test_the_suns_light_by_group_adds_up_to_that_of_the_room(corner):
     scene, ways = matrices.scene, [diffuser(0.2).scattering, diffuser(0.4).scattering]
     around = scene.interior, scene.exterior, scene.groups, ways, scene.points, scene.normals
     both, each = (
-        direct_sun_matrix(*around, sky.direction, stopping=Stopping(batches=4), by_group=by)
+        direct_sun_matrix(*around, suns=sky.direction, stopping=Stopping(batches=4), by_group=by)
         for by in (False, True)
     )
     assert each.values.shape == (2, 3, 3) and np.all(each.values.max(axis=(1, 2)) > 0)
     assert each.values.sum(axis=0) == pytest.approx(both.values, rel=1e-5)
     alone = direct_sun_matrix(
         scene.interior, scene.exterior, scene.groups, [ways[0], None], scene.points,
-        scene.normals, sky.direction, stopping=Stopping(batches=4),
+        scene.normals, suns=sky.direction, stopping=Stopping(batches=4),
     )  # fmt: skip
     assert each.values[0] == pytest.approx(alone.values, rel=1e-6)

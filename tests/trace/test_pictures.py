@@ -51,13 +51,13 @@ def random_tree_system(seed: int) -> TensorTreeBsdf:
 @pytest.mark.parametrize("kind", ["glass", "mirror", "diffuser"])
 def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.point_in_time import point_in_time
 
     half = AngularBeam(np.full(16, 0.3))
     system = {
         "glass": glass(0.6),
-        "mirror": System(None, AngularBeam(np.full(16, 0.6)), (half, half)),
+        "mirror": PathOptics(None, AngularBeam(np.full(16, 0.6)), (half, half)),
         "diffuser": diffuser(0.5, 0.3),
     }[kind]
     interior, groups = rooms.test_room()

@@ -44,15 +44,15 @@ def diffuser(*values):
     import mitsuba as mi
 
     from mitsuba_cfs.bsdf.plugin import klems_plugin
-    from mitsuba_cfs.trace.lit_room import System
+    from mitsuba_cfs.trace.lit_room import PathOptics
 
-    return System(mi.load_dict(klems_plugin(klems(*values))))
+    return PathOptics(mi.load_dict(klems_plugin(klems(*values))))
 
 
 def glass(tau: float = 1.0):
-    from mitsuba_cfs.trace.lit_room import AngularBeam, System
+    from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
 
-    return System(None, AngularBeam(np.full(16, tau)))
+    return PathOptics(None, AngularBeam(np.full(16, tau)))
 
 
 def agree(found, expected, error=0.0):
@@ -100,7 +100,7 @@ def test_the_sun_through_glass_is_the_direct_matrix_and_its_reflections():
     found = traced([glass(0.8)], Sky(dark, SUN, SUN_LUMINANCE), scene=black)
     _, groups = rooms.test_room()
     beam = KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, 0.8))
-    direct = direct_sun_matrix(black[0], rooms.NOTHING, groups, [beam], POINTS, UP, SUN[None])
+    direct = direct_sun_matrix(black[0], rooms.NOTHING, groups, [beam], POINTS, UP, suns=SUN[None])
     expected = direct.values[:, 0] * SUN_LUMINANCE
     agree(found, expected, direct.standard_error[:, 0] * SUN_LUMINANCE + 1e-3 * expected + 1e-6)
     bright = traced([glass(0.8)], Sky(dark, SUN, SUN_LUMINANCE))

@@ -9,7 +9,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("variant")]
 
 @pytest.mark.parametrize("system", ["glass", "blind"])
 def test_illuminance_and_glare_are_radiances(tmp_path, system):
-    from mitsuba_cfs.sky.weather import read_epw
+    from mitsuba_cfs.sky.epw import read_epw
     from scenes.evidence.benchmarks.annual_product import WEATHER
     from scenes.evidence.validation.rendered_pictures import moments, outcomes
 

@@ -9,7 +9,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Surfaces, Window, WindowGroup
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 from mitsuba_cfs.window_parts import Region, cut_group, window_cells
 
 from . import rooms
@@ -184,7 +184,7 @@ def l_shape() -> WindowGroup:
         ]
     )
     gable = np.array([[(3, -0.5, 0), (5, -0.5, 0), (4, -0.5, 2)]], dtype=float)
-    return WindowGroup("south", (Window("L", glass), Window("gable", gable)))
+    return WindowGroup("south", (WindowSurface("L", glass), WindowSurface("gable", gable)))
 
 
 def test_cells_and_parts_keep_the_area():

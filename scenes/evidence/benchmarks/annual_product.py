@@ -13,8 +13,8 @@ from mitsuba_cfs import phases, variants
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.matrices.mtx_io import luminance, read_matrix, write_matrix
 from mitsuba_cfs.progress import Progress
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix
-from mitsuba_cfs.sky.weather import read_epw
 from scenes.evidence.benchmarks import daylight_matrix, radiance, view_matrix
 from scenes.evidence.benchmarks.harness import Comparison, Run, timed
 

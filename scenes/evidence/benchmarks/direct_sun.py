@@ -107,7 +107,7 @@ def ours(blind: Blind, points: int, batches: int = BATCHES, seed: int = 1) -> ND
         room.window_groups(),
         [blind.scattering()],
         *room.sensors(SPACING),
-        suns(),
+        suns=suns(),
         window_points=points,
         stopping=Stopping(batches=batches),
         seed=seed,

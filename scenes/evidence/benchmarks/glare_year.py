@@ -20,9 +20,9 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.mtx_io import write_matrix
 from mitsuba_cfs.progress import Progress
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import is_up
-from mitsuba_cfs.sky.weather import read_epw
 from scenes.cost import room
 from scenes.evidence.benchmarks import glare_rating, radiance
 from scenes.evidence.benchmarks.annual_product import SYSTEM, WEATHER
@@ -35,7 +35,7 @@ EYE = (1.8, 2.0, 1.2)
 PRODUCT = f"dctimestep -o hour%03d.hdr patch%03d.hdr {SYSTEM.name} daylight.mtx sky.mtx"
 
 
-class Year:
+class BenchmarkYear:
     """The benchmark room behind the demo's blind: matrices, and the skies of some lit hours."""
 
     def __init__(self, every: int, size: int = SIZE) -> None:
@@ -97,7 +97,7 @@ def compare(name: str, progress: Progress) -> Comparison:
     radiance.environment()
     variants.activate()
     progress(name, 0.0)
-    year = Year(EVERY)
+    year = BenchmarkYear(EVERY)
     geometry = GlareView(year.matrices.view)
     progress(name, 0.3)
 

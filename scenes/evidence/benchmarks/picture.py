@@ -22,7 +22,7 @@ from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.hdr import read_hdr
 from mitsuba_cfs.images.view import fisheye, format_view
 from mitsuba_cfs.progress import Progress
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.cost import room
 from scenes.evidence.benchmarks import radiance
 from scenes.evidence.benchmarks.annual_product import WEATHER
@@ -30,7 +30,7 @@ from scenes.evidence.benchmarks.harness import Comparison, Run, timed
 from scenes.evidence.validation.rendered_pictures import (
     DIRECTION,
     EYE,
-    Fenestration,
+    PicturedSystem,
     Radiance,
     moments,
 )
@@ -43,13 +43,13 @@ TABLE_9 = "-ab 12 -ad 5000 -as 5000 -aa 0.15 -lw 1e-4"
 LOOSE = "-ab 5 -ad 1000 -as 500 -aa 0.25 -lw 1e-3"
 
 
-class Scene:
+class PictureScene:
     """The room, its blind and its sky, for both programs."""
 
     def __init__(self, folder: Path) -> None:
         from mitsuba_cfs.trace.lit_room import LitRoom, Sky
 
-        fenestration = Fenestration("blind", folder)
+        fenestration = PicturedSystem("blind", folder)
         moment = moments(read_epw(WEATHER))[MOMENT]
         self.room = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         self.sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
@@ -94,7 +94,7 @@ def compare(name: str, parameters: str, size: int, progress: Progress) -> Compar
     radiance.environment()
     variants.activate()
     with tempfile.TemporaryDirectory() as temporary:
-        scene = Scene(Path(temporary))
+        scene = PictureScene(Path(temporary))
         found, seconds, processor = timed(lambda: scene.ours(SIZE, SAMPLES), repeat=2)
         view = fisheye(EYE, DIRECTION, SIZE)
         pictures = [found, *(scene.ours(SIZE, SAMPLES, seed=seed) for seed in range(1, SEEDS))]

@@ -18,13 +18,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.progress import Progress
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.benchmarks.harness import Comparison, PeerMissing, Run
 from scenes.evidence.validation import energyplus_model, reference_room
 from scenes.evidence.validation.ashrae140_sun import ANGLES, PANE, glass
 from scenes.evidence.validation.energyplus_cases import STEPS, Site, simulate_case
 from scenes.evidence.validation.facade_sun import facade_sun, sun_steps
-from scenes.evidence.validation.reference_systems import Optics, System
+from scenes.evidence.validation.reference_systems import Optics, ReferenceSystem
 from thermal.blackbox import Fenestration, LayerAbsorptances
 
 EPW = Path(__file__).parents[2] / "demo" / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
@@ -39,7 +39,7 @@ class Clock(NamedTuple):
     processor: float
 
 
-def glazing() -> System:
+def glazing() -> ReferenceSystem:
     """The clear double glazing of `glass("double")` as a system of the reference room."""
     pane = glass("double")
     tau, outer, inner = pane.diffuse
@@ -53,7 +53,7 @@ def glazing() -> System:
     # light that the glass passes as beam: `reference_room` knows clear glass by this name
     plain = pane.fenestration
     fenestration = Fenestration("dgu", plain.u_value, resistance=plain.resistance)
-    return System(fenestration, optics, direct, both, (pane.back[1], pane.back[2]))
+    return ReferenceSystem(fenestration, optics, direct, both, (pane.back[1], pane.back[2]))
 
 
 def energyplus_room(orientation: str) -> energyplus_model.Model:

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.evidence.validation import ashrae140_cases, ashrae140_sun, ashrae140_sunspace
 from scenes.evidence.validation.facade_sun import SunSteps, sun_steps
 from thermal.balance import BalanceOptions, ZoneResult, simulate

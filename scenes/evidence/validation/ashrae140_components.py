@@ -19,7 +19,7 @@ import pandas as pd
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.benchmarks.thermal_year import energyplus_room
 from scenes.evidence.validation.ashrae140 import WEATHER
 from scenes.evidence.validation.ashrae140_cases import DEPTH, HEIGHT, WIDTH, cases

@@ -29,7 +29,7 @@ AIR_GAP = Gap(0.012, (("air", 1.0),), (0.84, 0.84))
 
 
 @dataclass(frozen=True, slots=True)
-class Glass:
+class AshraeGlazing:
     """A glazing of the standard: the Blackbox and its optics per angle of `ANGLES`."""
 
     fenestration: Fenestration
@@ -40,7 +40,7 @@ class Glass:
     back: tuple[float, float, float]  # rho, outer and inner absorptance for light of the room
 
 
-def glass(kind: str) -> Glass:
+def glass(kind: str) -> AshraeGlazing:
     """The double (600), low-e (660) or single (670) glazing, through U, g and the Blackbox."""
     thickness, tau, rho = PANE
     clear = uncoated_pane(ANGLES, tau, rho)
@@ -65,7 +65,7 @@ def glass(kind: str) -> Glass:
         ("back", optics.rho_back), ("back outer", back[:, 1]), ("back inner", back[:, 0]),
     )}  # fmt: skip
     fenestration = Fenestration(f"{kind} glazing", u, resistance=resistance)
-    return Glass(
+    return AshraeGlazing(
         fenestration, optics.tau, layers.outer, layers.inner,
         (mean["tau"], mean["outer"], mean["inner"]),
         (mean["back"], mean["back outer"], mean["back inner"]),
@@ -88,7 +88,9 @@ class Transmitted:
     first: FloatArray  # [T, 6] first hits [W] in the order of `SEEN_FROM`
 
 
-def transmitted(opening: Opening, sun: FacadeSun, pane: Glass, *, depth: float | None = None):
+def transmitted(
+    opening: Opening, sun: FacadeSun, pane: AshraeGlazing, *, depth: float | None = None
+):
     """What the windows of a facade let through and absorb, shaded by their devices."""
     lit = sun.beam > 0
     share = np.zeros(len(sun.beam))
@@ -123,7 +125,7 @@ def zone_solar(
     zone: Zone,
     openings: tuple[Opening, ...],
     steps: SunSteps,
-    pane: Glass,
+    pane: AshraeGlazing,
     *,
     depth: float | None = None,
     irradiance: dict[str, FacadeSun] | None = None,

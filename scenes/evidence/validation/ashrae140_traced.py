@@ -24,13 +24,14 @@ from bim.shoebox import WindowRectangle, shoebox
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Stopping
 from scenes.evidence.validation.ashrae140 import RANGES, WEATHER
 from scenes.evidence.validation.ashrae140_cases import HEIGHT, Opening, cases
-from scenes.evidence.validation.ashrae140_sun import ANGLES, Glass, glass
+from scenes.evidence.validation.ashrae140_sun import ANGLES, AshraeGlazing, glass
 from scenes.evidence.validation.sunlit_facade import Device, Overhang
 
 FACING_DEG = {"south": 180.0, "east": 90.0, "west": 270.0}
@@ -72,14 +73,14 @@ def traced_light(
 
 
 def traced_transmission(
-    opening: Opening, weather: Weather, pane: Glass, *, samples: int = 4096, seed: int = 0
+    opening: Opening, weather: Weather, pane: AshraeGlazing, *, samples: int = 4096, seed: int = 0
 ) -> float:
     """Annual sun through the windows of a facade [kWh/m2]."""
     light = sum(traced_light(opening, weather, samples=samples, seed=seed).values())
     return float(light @ (KLEMS_FULL.projected_solid_angles() * patch_transmittance(pane)))
 
 
-def patch_transmittance(pane: Glass) -> NDArray[np.float64]:
+def patch_transmittance(pane: AshraeGlazing) -> NDArray[np.float64]:
     """Transmittance [K] of the glass for uniform light from each Klems patch."""
     bounds = KLEMS_FULL.theta_bounds
     rings = np.empty(len(bounds) - 1)

@@ -27,7 +27,7 @@ MARGIN = 1.5  # [m] that the slats reach beyond the window: a BSDF knows no edge
 
 
 @dataclass(frozen=True)
-class Scene:
+class BlindRoom:
     """The room and its sensors."""
 
     interior: Surfaces
@@ -36,7 +36,7 @@ class Scene:
     up: NDArray[np.float64]  # [S, 3]
 
 
-def test_room() -> Scene:
+def test_room() -> BlindRoom:
     """The room of Table 1, its facade to the south-west."""
     building = shoebox(
         3.65, 4.60, 3.00,
@@ -49,7 +49,7 @@ def test_room() -> Scene:
     inward = -groups[0].frame[2]
     middle = groups[0].windows[0].triangles.reshape(-1, 3).mean(axis=0) * [1, 1, 0]
     points = middle + np.arange(0.6, 4.2, 0.6)[:, None] * inward + [0, 0, 0.85]
-    return Scene(
+    return BlindRoom(
         interior_surfaces(space), groups, points, np.tile([0.0, 0.0, 1.0], (len(points), 1))
     )
 

@@ -30,21 +30,22 @@ from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.lit_room import LitRoom, Sky, System
+from mitsuba_cfs.trace.lit_room import LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.point_in_time import point_in_time
 from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 from mitsuba_cfs.trace.view_matrix import view_matrix
 from scenes.evidence.validation.blind_room import (
     TILTS,
-    Scene,
+    BlindRoom,
     blind_layer,
     empty,
     glass_klems,
@@ -78,7 +79,7 @@ def known_klems(tilt_deg: float | None, basis: KlemsBasis, samples: int) -> Klem
 
 
 def by_phases(
-    scene: Scene, system: KlemsBsdf, ways: dict[str, Scattering], sky: AnnualSky
+    scene: BlindRoom, system: KlemsBsdf, ways: dict[str, Scattering], sky: AnnualSky
 ) -> tuple[dict[str, NDArray[np.float64]], float]:
     """Illuminance [S, H] by the three-phase and the five-phase method, and V's share of its error.
 
@@ -95,7 +96,7 @@ def by_phases(
     return found, float(three_phase.relative_error().max())
 
 
-def by_fine_matrix(scene: Scene, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
+def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by three phases with matrices of high resolution."""
     view = view_matrix(
         scene.interior, scene.groups, scene.points, scene.up, samples=16384, max_depth=32,
@@ -108,7 +109,7 @@ def by_fine_matrix(scene: Scene, tilt_deg: float | None, sky: AnnualSky) -> NDAr
     return phases.three_phase(view.values, [T], daylight.values, sky.whole)
 
 
-def by_coefficients(scene: Scene, system: System, sky: AnnualSky) -> NDArray[np.float64]:
+def by_coefficients(scene: BlindRoom, system: PathOptics, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
     room = LitRoom(scene.interior, empty(), scene.groups, [system])
     coefficients = daylight_coefficients(
@@ -118,7 +119,7 @@ def by_coefficients(scene: Scene, system: System, sky: AnnualSky) -> NDArray[np.
 
 
 def by_paths(
-    scene: Scene, exterior: Surfaces, system: System, sky: AnnualSky, samples: int
+    scene: BlindRoom, exterior: Surfaces, system: PathOptics, sky: AnnualSky, samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] by point-in-time paths, and its standard error."""
     room = LitRoom(scene.interior, exterior, scene.groups, [system])
@@ -156,7 +157,7 @@ def errors(found: NDArray, reference: NDArray) -> dict[str, float]:
     }
 
 
-def one_case(scene: Scene, sky: AnnualSky, tilt_deg: float | None, samples: int) -> dict:
+def one_case(scene: BlindRoom, sky: AnnualSky, tilt_deg: float | None, samples: int) -> dict:
     """All methods against the explicit geometry for one system."""
     exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
     klems = known_klems(tilt_deg, KLEMS_FULL, 65536)

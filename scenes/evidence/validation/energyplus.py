@@ -21,9 +21,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.validation import energyplus_figures, energyplus_sensitivity
-from scenes.evidence.validation.energyplus_cases import ALL_FILES, EPW_FILES, Case, pairs
+from scenes.evidence.validation.energyplus_cases import ALL_FILES, EPW_FILES, EnergyPlusCase, pairs
 from scenes.evidence.validation.energyplus_statistics import (
     Classification,
     case_row,
@@ -76,7 +76,9 @@ def _comfort_row(key: tuple[str, str, str], counts: Classification) -> dict[str,
     }
 
 
-def _correlations(kept: list[tuple[Case, list[Case]]], weathers: dict) -> list[dict[str, object]]:
+def _correlations(
+    kept: list[tuple[EnergyPlusCase, list[EnergyPlusCase]]], weathers: dict
+) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for index, model in enumerate(CLOSURES):
         for position in ("external or none", "internal"):

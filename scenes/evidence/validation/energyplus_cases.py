@@ -14,7 +14,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from scenes.evidence.validation import energyplus_model, reference_room, reference_systems
 from scenes.evidence.validation.facade_sun import FacadeSun, facade_sun, sun_steps
 from scenes.evidence.validation.reference_systems import Optics
@@ -53,7 +54,7 @@ class Site:
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class EnergyPlusCase:
     """Temperatures of one case and model [H] [degC]."""
 
     climate: str
@@ -81,7 +82,7 @@ def centre_operative(air: FloatArray, surfaces: FloatArray, floor: FloatArray) -
     return 0.5 * (0.5 * (surfaces.mean(axis=1) + floor) + air)
 
 
-def reference_case(name: str, system: str, orientation: str, table: pd.DataFrame) -> Case:
+def reference_case(name: str, system: str, orientation: str, table: pd.DataFrame) -> EnergyPlusCase:
     """EnergyPlus' hours of one case from its table."""
     walls = table[list(WALLS)].to_numpy(dtype=float)
     air, window = (table[c].to_numpy(dtype=float) for c in ("T_air", "T_win_in"))
@@ -89,7 +90,9 @@ def reference_case(name: str, system: str, orientation: str, table: pd.DataFrame
     faces = np.column_stack([walls, window])
     centre = centre_operative(air, faces, floor)
     wall = walls.mean(axis=1)
-    return Case(name, system, orientation, "EnergyPlus", air, wall, window, floor, own, centre)
+    return EnergyPlusCase(
+        name, system, orientation, "EnergyPlus", air, wall, window, floor, own, centre
+    )
 
 
 def our_case(
@@ -99,13 +102,13 @@ def our_case(
     system: reference_systems.System,
     light: reference_room.RoomLight,
     model: str,
-) -> Case:
+) -> EnergyPlusCase:
     """Our hours of one case."""
     result = simulate_case(place, orientation, system, light)
     walls, window = result.surface_in_c, result.window_inner_c
     floor = walls[:, 4]
     centre = centre_operative(result.air_c, np.column_stack([walls, window]), floor)
-    return Case(
+    return EnergyPlusCase(
         place.name,
         system_name,
         orientation,
@@ -144,7 +147,7 @@ def pairs(
     orientations: Sequence[str] = tuple(reference_room.ORIENTATIONS),
     systems: Sequence[str] = reference_systems.SYSTEMS,
     progress: Callable[[float], None] | None = None,
-) -> Iterator[tuple[Case, list[Case]]]:
+) -> Iterator[tuple[EnergyPlusCase, list[EnergyPlusCase]]]:
     """EnergyPlus' case and ours with every closure, case by case."""
     light = reference_room.RoomLight()
     models = {
@@ -191,6 +194,6 @@ def with_g(optics: Optics, g: FloatArray, diffuse_g: FloatArray) -> Optics:
     )
 
 
-def errors(ours: Case, theirs: Case) -> dict[str, FloatArray]:
+def errors(ours: EnergyPlusCase, theirs: EnergyPlusCase) -> dict[str, FloatArray]:
     """Our temperature less EnergyPlus' [H - 168] [K] for every quantity."""
     return {q: (getattr(ours, q) - getattr(theirs, q))[FIRST_HOUR:] for q in QUANTITIES}

@@ -15,7 +15,7 @@ from scenes.evidence.validation.energyplus_cases import (
     EPW_FILES,
     FIRST_HOUR,
     QUANTITIES,
-    Case,
+    EnergyPlusCase,
     Site,
     our_case,
     reference_case,
@@ -23,7 +23,12 @@ from scenes.evidence.validation.energyplus_cases import (
     with_g,
 )
 from scenes.evidence.validation.energyplus_statistics import case_row, pooled
-from scenes.evidence.validation.reference_systems import Optics, System, read_optics, system
+from scenes.evidence.validation.reference_systems import (
+    Optics,
+    ReferenceSystem,
+    read_optics,
+    system,
+)
 from thermal.gvalue import InternalShade
 
 FloatArray = NDArray[np.float64]
@@ -33,7 +38,7 @@ G_ERRORS = (-0.03, 0.03, 0.05, 0.10)
 U_ERRORS = (-0.3, -0.1, 0.1, 0.3)
 
 
-def kappa_system(folder: Path, kappa: float) -> System:
+def kappa_system(folder: Path, kappa: float) -> ReferenceSystem:
     """The interior shade in plain Kuhn, its g from the glazing and the shade by kappa."""
     glazing, whole = read_optics(folder, "dgu"), read_optics(folder, "int_shade")
     at = np.interp
@@ -91,7 +96,7 @@ def wrong_g(optics: Optics, error: float) -> Optics:
     return with_g(optics, _physical(optics.g + error, optics.tau, optics.rho), diffuse)
 
 
-def wrong_u(folder: Path, name: str, error: float) -> System:
+def wrong_u(folder: Path, name: str, error: float) -> ReferenceSystem:
     """A system in plain Kuhn whose measured U is off by `error`."""
     right = system(folder, name, "kuhn")
     return system(folder, name, "kuhn", u_value=right.fenestration.u_value + error)
@@ -124,8 +129,8 @@ def _changes(
     place: Site,
     orientation: str,
     name: str,
-    wrong: dict[tuple[str, float], System],
-    base: Case,
+    wrong: dict[tuple[str, float], ReferenceSystem],
+    base: EnergyPlusCase,
     light: reference_room.RoomLight,
 ) -> list[dict[str, object]]:
     rows = []

@@ -10,14 +10,19 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from mitsuba_cfs.sky.weather import Weather
-from scenes.evidence.validation.energyplus_cases import FIRST_HOUR, QUANTITIES, Case, errors
+from scenes.evidence.validation.energyplus_cases import (
+    FIRST_HOUR,
+    QUANTITIES,
+    EnergyPlusCase,
+    errors,
+)
 from thermal.comfort import adaptive_comfort, hours_between, running_mean
 
 FloatArray = NDArray[np.float64]
 WEATHER_NAMES = ("direct normal", "diffuse horizontal", "outdoor temperature")
 
 
-def case_row(ours: Case, theirs: Case) -> dict[str, object]:
+def case_row(ours: EnergyPlusCase, theirs: EnergyPlusCase) -> dict[str, object]:
     """Mean square and mean error of every quantity of one case (model less reference)."""
     row: dict[str, object] = {
         "model": ours.model,
@@ -43,7 +48,7 @@ def pooled(cases: pd.DataFrame, by: list[str]) -> pd.DataFrame:
 
 
 def weather_correlations(
-    ours: list[Case], theirs: list[Case], weathers: dict[str, Weather]
+    ours: list[EnergyPlusCase], theirs: list[EnergyPlusCase], weathers: dict[str, Weather]
 ) -> pd.DataFrame:
     """Pearson and Spearman correlation of the absolute window error with the weather.
 
@@ -116,7 +121,7 @@ def classify(ours: ArrayLike, theirs: ArrayLike) -> Classification:
 
 
 def comfort_classification(
-    ours: Case, theirs: Case, outdoor_c: FloatArray, band: str
+    ours: EnergyPlusCase, theirs: EnergyPlusCase, outdoor_c: FloatArray, band: str
 ) -> Classification:
     """Working hours (8 to 18) judged by both programs' operative temperature at the centre."""
     mean = running_mean(outdoor_c)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from mitsuba_cfs.sky.weather import read_epw
+from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.benchmarks.thermal_year import EPW, energyplus_room, glazing
 from scenes.evidence.validation import reference_room
 from scenes.evidence.validation.energyplus_cases import STEPS

@@ -30,7 +30,8 @@ from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
-from mitsuba_cfs.sky.weather import Weather, read_epw
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.evidence.validation.blind_room import TILTS, blind_layer, empty, slats
 from scenes.evidence.validation.glare_room import (
@@ -58,7 +59,7 @@ DISSERTATION = {  # Tables 4, 7, 10: rMBE, rRMSE, largest and least relative err
 
 
 @dataclass(frozen=True)
-class Case:
+class GlareCase:
     """A system as geometry and as the methods know it, and the skies it is rated under."""
 
     name: str
@@ -70,7 +71,7 @@ class Case:
 
 
 def measured(
-    scene: DaylightScene, case: Case, sampling: Sampling, pictures: Path | None = None
+    scene: DaylightScene, case: GlareCase, sampling: Sampling, pictures: Path | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """DGP and illuminance [lx] of the room with everything as geometry [H]."""
     geometry, rows = GlareView(scene.view), []
@@ -92,7 +93,7 @@ def measured(
 
 
 def rated(
-    scene: DaylightScene, cases: list[Case], sampling: Sampling, pictures: Path | None
+    scene: DaylightScene, cases: list[GlareCase], sampling: Sampling, pictures: Path | None
 ) -> list[dict]:
     """The measurement and all methods for all cases; a method's scene is traced once."""
     found = []
@@ -116,7 +117,7 @@ def rated(
     return found
 
 
-def weather_case(name: str, weather: Weather, scene: DaylightScene, options) -> Case:
+def weather_case(name: str, weather: Weather, scene: DaylightScene, options) -> GlareCase:
     """A system of `TILTS` in the hours that the options choose."""
     tilt = TILTS[name]
     days = [sunny_days(weather, 9, 4, options.days)]
@@ -124,7 +125,7 @@ def weather_case(name: str, weather: Weather, scene: DaylightScene, options) -> 
         days.append(sunny_days(weather, 6, 4, options.days))
     hours = lit_hours(weather, np.sort(np.concatenate(days)), options.every)
     layer = None if tilt is None else blind_layer(tilt)
-    return Case(
+    return GlareCase(
         name,
         empty() if tilt is None else slats(scene.groups[0], tilt),
         known_system(layer, levels=options.levels),

@@ -23,7 +23,7 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.lit_room import AngularBeam, System
+from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
 from scenes.evidence.validation import blind_room
 from scenes.evidence.validation.glare_systems import tree_optics
 
@@ -44,13 +44,13 @@ def glare_scene(size: int, distance: float = 1.5) -> DaylightScene:
     )
 
 
-def glazing() -> System:
+def glazing() -> PathOptics:
     """The double glazing alone: a beam and two mirrors."""
     mirrors = tuple(
         AngularBeam(blind_room.glass_reflectance(COSINE, normal))
         for normal in (blind_room.GLASS_FRONT, blind_room.GLASS_BACK)
     )
-    return System(None, AngularBeam(blind_room.glass_transmittance(COSINE)), mirrors)
+    return PathOptics(None, AngularBeam(blind_room.glass_transmittance(COSINE)), mirrors)
 
 
 def measurement(scene: DaylightScene, exterior: Surfaces, sampling: Sampling) -> PathSystems:

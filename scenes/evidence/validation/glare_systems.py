@@ -11,7 +11,7 @@ from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.methods.optics import GivenOptics
 from mitsuba_cfs.trace.direct_sun import KlemsScattering
-from mitsuba_cfs.trace.lit_room import AngularBeam, System
+from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
 
 
 class TreeBehind:
@@ -20,7 +20,7 @@ class TreeBehind:
         f = f_tree tau(indoors) + f_between
 
     where f_between is the light that layer and glazing throw at each other, on Klems patches.  As
-    `bsdf` of a `System` it is asked for the light that paths from both sides meet, and as its
+    `bsdf` of a `PathOptics` it is asked for the light that paths from both sides meet, and as its
     `beam` for what goes straight on.
     """
 
@@ -92,7 +92,7 @@ def tree_optics(
 
     Args:
         klems: matrices of layer and glazing together, for the phase methods.
-        between: see `TreeBehind`; mirrors: see `System`.
+        between: see `TreeBehind`; mirrors: see `PathOptics`.
     """
     way = TreeBehind(tree, glass, between)
-    return GivenOptics(klems.transmission_matrix(), way, System(way, way, mirrors))
+    return GivenOptics(klems.transmission_matrix(), way, PathOptics(way, way, mirrors))

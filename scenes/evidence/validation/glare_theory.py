@@ -29,7 +29,7 @@ from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.evidence.validation import blind_room
-from scenes.evidence.validation.glare_methods import GLARE, Case, rated
+from scenes.evidence.validation.glare_methods import GLARE, GlareCase, rated
 from scenes.evidence.validation.glare_room import glare_scene, known_system
 
 SPACING = 0.004  # [m]
@@ -114,7 +114,7 @@ def clear_sky(scene: DaylightScene) -> AnnualSky:
     return AnnualSky(whole, sun[None], np.array([DIRECT]), np.array([0]), 1, alone)
 
 
-def cases(scene: DaylightScene, levels: int) -> list[Case]:
+def cases(scene: DaylightScene, levels: int) -> list[GlareCase]:
     """Both series."""
     sky, found = clear_sky(scene), []
     series = {
@@ -125,7 +125,7 @@ def cases(scene: DaylightScene, levels: int) -> list[Case]:
         for transmittance, amplitude in members:
             value = transmittance if name == "transmittance" else amplitude
             found.append(
-                Case(
+                GlareCase(
                     f"{name} {value:g}",
                     peaked_geometry(scene.groups[0], transmittance, amplitude),
                     known_system(

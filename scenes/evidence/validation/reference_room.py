@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
 from scenes.evidence.validation.facade_sun import FacadeSun
-from scenes.evidence.validation.reference_systems import Optics, System, at_directions
+from scenes.evidence.validation.reference_systems import Optics, ReferenceSystem, at_directions
 from scenes.evidence.validation.sunlit_room import BeamTable, BoxRoom, diffuse_hits, first_hits
 from thermal.blackbox import Fenestration
 from thermal.climate import Climate, Solar, sky_temperature
@@ -106,7 +106,7 @@ class RoomLight:
         return first_hits(ROOM, np.stack([x, y, -z], axis=1))
 
 
-def solar(sun: FacadeSun, system: System, light: RoomLight) -> Solar:
+def solar(sun: FacadeSun, system: ReferenceSystem, light: RoomLight) -> Solar:
     """The sun's work in the room at every step."""
     optics = system.optics
     sky_ground = np.stack([sun.sky, sun.ground], axis=1)
@@ -140,7 +140,7 @@ def solar(sun: FacadeSun, system: System, light: RoomLight) -> Solar:
 
 def _first_hits(
     sun: FacadeSun,
-    system: System,
+    system: ReferenceSystem,
     light: RoomLight,
     tau: FloatArray,
     lit: NDArray[np.bool_],

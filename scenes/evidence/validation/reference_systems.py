@@ -53,7 +53,7 @@ class Optics:
 
 
 @dataclass(frozen=True, slots=True)
-class System:
+class ReferenceSystem:
     """A fenestration system with one closure: thermal data, layer absorptances, optics."""
 
     fenestration: Fenestration
@@ -124,7 +124,7 @@ def system(
     optics: Optics | None = None,
     *,
     u_value: float | None = None,
-) -> System:
+) -> ReferenceSystem:
     """A system of the reference set with one of the closures; other optics or U where given."""
     if closure not in CLOSURES:
         raise ValueError(f"closure {closure!r} is not of {', '.join(CLOSURES)}")
@@ -154,7 +154,7 @@ def system(
     direct = layer_absorptances(optics.tau, optics.rho, optics.g, u, **films)
     tau, rho, g = optics.diffuse.T
     diffuse = layer_absorptances(tau, rho, g, u, **films)
-    return System(plain, optics, direct, diffuse, _back_layers(data, optics, plain))
+    return ReferenceSystem(plain, optics, direct, diffuse, _back_layers(data, optics, plain))
 
 
 def _back_layers(data: dict, optics: Optics, f: Fenestration) -> tuple[float, float]:

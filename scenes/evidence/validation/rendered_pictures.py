@@ -35,10 +35,11 @@ from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.hdr import EFFICACY, read_hdr
 from mitsuba_cfs.images.view import View, fisheye, format_view
+from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE, is_up
-from mitsuba_cfs.sky.weather import Weather, read_epw
-from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
+from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 from mitsuba_cfs.trace.systems import lit_system
 from scenes.cost import room
@@ -103,7 +104,7 @@ def moments(weather: Weather) -> list[Moment]:
     return found
 
 
-class Fenestration:
+class PicturedSystem:
     """A window's system for both programs."""
 
     def __init__(self, name: str, folder: Path) -> None:
@@ -114,12 +115,12 @@ class Fenestration:
             cosine = np.linspace(0, 1, 256)
             tau, rho = uncoated_values(*_normal_values(), np.arccos(cosine))
             mirror = AngularBeam(rho)
-            self.system = System(None, AngularBeam(tau), (mirror, mirror))
+            self.system = PathOptics(None, AngularBeam(tau), (mirror, mirror))
         elif name == "blind":
             (folder / "blind.xml").write_bytes(SYSTEM.read_bytes())
             self.material = "void BSDF window\n6 0 blind.xml 0 0 1 .\n0\n0\n"
             bsdf = read_bsdf_xml(SYSTEM).band("Visible")
-            self.system = System(mi.load_dict(klems_plugin(bsdf)))
+            self.system = PathOptics(mi.load_dict(klems_plugin(bsdf)))
         else:
             write_bsdf_xml(_tree(), folder / "tree.xml")
             self.material = "void aBSDF window\n5 tree.xml 0 0 1 .\n0\n0\n"
@@ -144,7 +145,7 @@ def _tree() -> BsdfFile:
 class Radiance:
     """The room in a folder, rendered by Radiance."""
 
-    def __init__(self, folder: Path, fenestration: Fenestration) -> None:
+    def __init__(self, folder: Path, fenestration: PicturedSystem) -> None:
         radiance.write_surfaces(room.room(), folder / "room.rad")
         lines = [fenestration.material]
         window = room.window_groups()[0].windows[0]
@@ -195,7 +196,7 @@ def outcomes(
     """Render every moment with every system in both programs."""
     view = fisheye(EYE, DIRECTION, size)
     for name in systems:
-        fenestration = Fenestration(name, folder)
+        fenestration = PicturedSystem(name, folder)
         peer = Radiance(folder, fenestration)
         lit = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         for moment in chosen:

@@ -1,0 +1,131 @@
+"""What fills each window: the one resolver of every command and export.
+
+    flag          --cfs; --u and --g in place of the windows' own U and g
+    study file    its [[system]] tables
+    attached      BSDF, U and g that the IFC file holds for the window or its type
+    stated        U, g and transmittances of the IFC file's property sets, as a clear glazing
+
+The first of them that there is fills a window; where there is none, that is an error that says
+what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from bim.model import Window
+from mitsuba_cfs.errors import DataError
+from scenes.fenestration.systems import FenestrationSystem, Given, States
+
+NAMED = 5  # windows that one sentence names
+
+
+def fill_windows(windows: Iterable[Window], given: Given, file: Path | None) -> dict[str, States]:
+    """The systems by state of each window, by its GUID; windows of the same data share theirs.
+
+    Args: file: the IFC file of the windows; None for a box.
+
+    Raises: `DataError` that names the windows that nothing fills, and says what to give.
+    """
+    windows = list(windows)
+    found, unfilled = held_systems(windows, given, file)
+    for missing, names in unfilled.items():
+        raise DataError(
+            f"has no BSDF attached {missing}: give {given.ask}, attach data (cfs ifc attach), or "
+            "state VisibleLightTransmittance and SolarHeatGainTransmittance "
+            "(Pset_DoorWindowGlazingType)",
+            file=file,
+            element=f"window {_listed(names)}",
+        )
+    return found
+
+
+def held_systems(
+    windows: Iterable[Window], given: Given, file: Path | None
+) -> tuple[dict[str, States], dict[str, list[str]]]:
+    """As `fill_windows`, and the names of the windows that nothing fills by what is missing."""
+    windows = list(windows)
+    if given.states or not windows:
+        return {window.guid: given.states for window in windows}, {}
+    if file is None:
+        raise DataError(f"a box holds no fenestration data: give {given.ask}", field="box")
+    # these read IFC: only where there is a file of it
+    from bim.ifc.fenestration_read import read_fenestration
+    from scenes.fenestration.attached import attached_systems
+    from scenes.fenestration.stated import stated_systems, stated_values
+
+    held = read_fenestration(file)
+    found = _with_given(attached_systems(held, windows, file), given)
+    left = [window for window in windows if window.guid not in found]
+    found |= stated_systems(held, left, file, given)
+    unfilled: dict[str, list[str]] = {}
+    for window in left:
+        if window.guid not in found:
+            missing = stated_values(held, window, file, given).missing(given.light_only)
+            unfilled.setdefault(missing, []).append(window.name or window.guid)
+    return found, unfilled
+
+
+def stated_u_and_g(
+    windows: Iterable[Window], file: Path
+) -> dict[str, tuple[float | None, float | None]]:
+    """U and g of each window by GUID as they are attached or stated; None where neither is."""
+    from bim.ifc.fenestration_read import read_fenestration
+    from scenes.fenestration.stated import stated_values
+
+    held = read_fenestration(file)
+    values = {w.guid: stated_values(held, w, file, Given()) for w in windows}
+    return {guid: (one.u_value, one.g_value) for guid, one in values.items()}
+
+
+def _with_given(systems: Mapping[str, States], given: Given) -> dict[str, States]:
+    """The systems with the U and g that the user gives; the same ones stay the same."""
+    if given.u_value is None and given.g_value is None:
+        return dict(systems)
+    known: dict[int, FenestrationSystem] = {}
+    for states in systems.values():
+        for system in states:
+            known.setdefault(id(system), _changed(system, given))
+    return {guid: tuple(known[id(s)] for s in states) for guid, states in systems.items()}
+
+
+def _changed(system: FenestrationSystem, given: Given) -> FenestrationSystem:
+    source = system.source
+    if given.u_value is not None:
+        system = replace(system, u_value=given.u_value)
+        source += ", U of --u"
+    if given.g_value is not None:
+        system = replace(system, g_value=given.g_value, g_by_patch=None)
+        source += ", g of --g"
+    return replace(system, source=source)
+
+
+def window_sources(windows: Iterable[Window], systems: Mapping[str, States]) -> list[dict]:
+    """Each system once: its name, its source, and the windows that it fills."""
+    found: dict[int, dict] = {}
+    for window in windows:
+        for system in systems[window.guid]:
+            about = {"system": system.name, "source": system.source, "windows": []}
+            of_system = found.setdefault(id(system), about)["windows"]
+            of_system.append(window.name or window.guid)
+    return list(found.values())
+
+
+def source_notes(sources: Iterable[dict]) -> tuple[str, ...]:
+    """A sentence for each system on what it fills and where it is from."""
+    return tuple(
+        f"{windows_named(one['windows'])}: {one['system']}, from {one['source']}."
+        for one in sources
+    )
+
+
+def windows_named(names: list[str]) -> str:
+    """Windows in words, the first few by name."""
+    return f"{'Window' if len(names) == 1 else 'Windows'} {_listed(names)}"
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{', '.join(names[:NAMED])}{more}"

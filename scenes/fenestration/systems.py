@@ -1,0 +1,140 @@
+"""A fenestration system from its BSDF file, and what the user gives for all windows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from mitsuba_cfs.errors import DataError
+from scenes.fenestration.thermal_file import ThermalFile
+from thermal.closure import Closure
+
+
+@dataclass(frozen=True, slots=True)
+class FenestrationSystem:
+    """A fenestration system: glazing and shade as one, in both bands."""
+
+    name: str
+    visible: KlemsBsdf  # Klems full, all blocks
+    solar: KlemsBsdf
+    u_value: float | None = None  # [W/(m2 K)]
+    g_value: float | None = None  # at normal incidence
+    g_by_patch: NDArray[np.float64] | None = None  # [K] by incident patch, before g_value
+    closure: Closure | None = None  # of the thermal model
+    shading_position: str | None = None  # a key of thermal.gvalue.TYPICAL_SYSTEMS
+    notes: tuple[str, ...] = ()
+    tree: TensorTreeBsdf | None = None  # visible, where the data are a tree: for sun and pictures
+    file: Path | None = None  # that it was read from
+    source: str = ""  # where the system comes from, in words
+
+    @property
+    def fine(self) -> Bsdf:
+        """The visible band as finely as the data have it."""
+        return self.visible if self.tree is None else self.tree
+
+
+# of a window: its system in each shading state, from open to closed
+States = tuple[FenestrationSystem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What the user gives for all windows; what is not given is looked for in the IFC file."""
+
+    states: States = ()  # by a flag or a study file
+    u_value: float | None = None  # of --u, in place of the file's [W/(m2 K)]
+    g_value: float | None = None  # of --g, at normal incidence
+    ask: str = "--cfs FILE"  # how a system is given, for the error that none is
+    light_only: bool = False  # neither U nor g is needed
+
+
+def given_light(path: Path | None) -> Given:
+    """What `--cfs` gives to a command that asks for the light alone."""
+    states = () if path is None else (read_system(path, by="--cfs"),)
+    return Given(states, light_only=True)
+
+
+def read_system(
+    path: str | PathLike[str],
+    *,
+    u_value: float | None = None,
+    g_value: float | None = None,
+    by: str = "",
+) -> FenestrationSystem:
+    """The system of a BSDF XML file, with U and g given, or of the `.toml` file beside it.
+
+    The `.toml` file has the name of the XML file; see `ThermalFile`.
+
+    Args: by: what names the file, such as "--cfs"; goes before its name in the system's source.
+
+    Raises: `DataError` for a file that cannot be used.
+    """
+    path = Path(path)
+    file = read_bsdf_xml(path)
+    beside = ThermalFile.read(path.with_suffix(".toml"))
+    return system_of(
+        file.bands,
+        file.name or path.stem,
+        path=path,
+        u_value=beside.u_value if u_value is None else u_value,
+        g_value=beside.g_value if g_value is None else g_value,
+        g_by_patch=beside.g_value_by_patch if g_value is None else None,
+        closure=beside.closure,
+        shading_position=beside.shading_position,
+        notes=file.notes,
+        file=path,
+        source=f"{by} {path.name}".strip(),
+    )
+
+
+def system_of(
+    bands: Mapping[str, Bsdf],
+    name: str,
+    *,
+    path: Path,
+    notes: Sequence[str] = (),
+    **more: float | str | Path | NDArray[np.float64] | Closure | None,
+) -> FenestrationSystem:
+    """The system of BSDF data by band, Klems full or tensor trees.
+
+    Args: path: the file that the data come from; more: fields of `FenestrationSystem`.
+    """
+    notes = list(notes)
+    if "Visible" not in bands and "Solar" not in bands:
+        raise DataError("has neither a Visible nor a Solar band", file=path, field="WavelengthData")
+    for band, other in (("Visible", "Solar"), ("Solar", "Visible")):
+        if band not in bands:
+            notes.append(f"{name} has no {band} band: its {other} band stands in for it.")
+    visible = bands.get("Visible") or bands["Solar"]
+    solar = bands.get("Solar") or bands["Visible"]
+    klems = _klems(visible, path, "Visible")
+    return FenestrationSystem(
+        name,
+        klems,
+        klems if solar is visible else _klems(solar, path, "Solar"),
+        notes=tuple(notes),
+        tree=visible if isinstance(visible, TensorTreeBsdf) else None,
+        **more,
+    )
+
+
+def _klems(bsdf: Bsdf, path: Path, band: str) -> KlemsBsdf:
+    """The band as Klems full matrices with all blocks."""
+    if isinstance(bsdf, KlemsBsdf) and {bsdf.basis_in, bsdf.basis_out} != {KLEMS_FULL}:
+        raise DataError(
+            f"has {bsdf.basis_out.size}x{bsdf.basis_in.size} patches; "
+            f"the run needs the Klems full basis of 145x145",
+            file=path,
+            field=band,
+        )
+    return klems_of(bsdf)

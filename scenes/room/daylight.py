@@ -1,0 +1,77 @@
+"""Daylight of a room: its scene, the illuminance of its year, and the metrics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bim.model import Building, Space
+from bim.sensors import sensor_grid, view_point
+from bim.to_tracer import exterior_surfaces, interior_surfaces
+from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.path_light import PathSystems
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.metrics.daylight_factor import daylight_factor
+from mitsuba_cfs.progress import Progress
+from mitsuba_cfs.sky.cie import cie_patches
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.sky.weather import Weather
+from scenes.results import DaylightResult
+from scenes.room.metrics import daylight_metrics
+from scenes.room.options import SensorGrid
+from scenes.room.windows import RoomWindows
+
+
+def room_scene(
+    building: Building, space: Space, windows: RoomWindows, grid: SensorGrid, picture_size: int
+) -> DaylightScene:
+    """Triangles, window groups, sensors and view of a room in the visible band.
+
+    Args: picture_size: pixels of a side of the view.
+    """
+    points, _ = sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)
+    position, direction = view_point(space)
+    return DaylightScene(
+        interior_surfaces(space, "visible"),
+        exterior_surfaces(building, space, "visible"),
+        windows.groups,
+        points,
+        np.tile([0.0, 0.0, 1.0], (len(points), 1)),
+        fisheye(position, direction, picture_size),
+    )
+
+
+def room_daylight(
+    light: PhaseLight,
+    state: NDArray[np.int64],
+    weather: Weather,
+    method: str,
+    progress: Progress,
+) -> DaylightResult:
+    """Illuminance of the year with the state of each hour, and its metrics.
+
+    Args: state: [L] which one holds in each lit hour.
+    """
+    sky, traced = light.sky, light.filled.traced
+    scene, sampling = traced.scene, traced.sampling
+    if method == "point-in-time":
+        filled = PathSystems(scene, light.filled.systems, sampling)
+        lit, error = filled.light(sky, progress=progress).estimate(state)
+    else:
+        lit, error = light.illuminance(state), light.relative_error(state)
+    illuminance = sky.whole_year(lit.astype(np.float32)).T
+    # LM-83's direct sun and the daylight factor are those of open blinds
+    direct = light.direct_sun()
+    direct = None if direct is None else sky.whole_year(direct.astype(np.float32)).T
+    overcast = cie_patches("overcast", ReinhartSky(sampling.subdivision), 1.0)
+    factor = daylight_factor(light.filled.coefficients() @ overcast, 1.0)
+    table, of_room = daylight_metrics(scene.points, illuminance, factor, weather, direct)
+    return DaylightResult(scene.points, illuminance, error, table, of_room)
+
+
+def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.DataFrame:
+    """Illuminance [H, S] with the sensors' numbers as columns."""
+    columns = [f"sensor_{i}" for i in range(len(result.points))]
+    return pd.DataFrame(result.illuminance, index=times, columns=columns).rename_axis("time")

@@ -1,0 +1,80 @@
+"""Fisheye pictures of a room at chosen hours, and their glare."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.methods.glare import pictures
+from mitsuba_cfs.methods.path_light import PathLight
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.progress import Progress
+from scenes.results import GlareResults, LuminancePicture
+from scenes.room.picture_hours import hour_index
+
+DEFAULT_DAYS = ("03-21", "06-21", "12-21")
+DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
+
+
+def default_hours(
+    times: pd.DatetimeIndex,
+    lit: NDArray[np.int64],
+    eye_illuminance: NDArray[np.float32],
+    count: int,
+) -> list[int]:
+    """The year's brightest hour at the eye, and with it hours of the equinox and the solstices.
+
+    In all up to `count`; these at 9, 12 and 15 o'clock, as far as the sun is up.
+
+    Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
+    """
+    labels = [f"{day} {clock:02d}" for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
+    lit_set = set(lit.tolist())
+    found = [hour for label in labels if (hour := hour_index(label, times)) in lit_set]
+    brightest = int(lit[np.argmax(eye_illuminance)])
+    chosen = {brightest, *[hour for hour in found if hour != brightest][: count - 1]}
+    return [hour for hour in dict.fromkeys([*found, brightest]) if hour in chosen]
+
+
+def room_glare(
+    light: PhaseLight | PathLight,
+    view: View,
+    state: NDArray[np.int64],
+    hours: list[int],
+    progress: Progress,
+) -> GlareResults:
+    """Pictures of the chosen hours of the year and their glare.
+
+    Args: state: [L] of the windows in each hour with the sun up.
+    """
+    progress("pictures", 0.0)
+    columns = np.searchsorted(light.sky.lit, hours)
+    geometry = GlareView(view)
+    rated = []
+    made = pictures(light, columns, state, progress=progress)
+    for hour, luminance in zip(hours, made, strict=True):
+        result = evaluate(luminance, geometry)
+        glare = {
+            "ev": result.Ev,
+            "dgp": result.dgp,
+            "dgp_simplified": result.sdgp,
+            "dgi": result.dgi,
+            "ugr": result.ugr,
+            "vcp": result.vcp,
+            "cgi": result.cgi,
+            "sources": float(result.count),
+            "background_luminance": result.background_luminance,
+        }
+        rated.append(LuminancePicture(hour, luminance, glare, result.labels > 0))
+    progress("pictures", 1.0)
+    return GlareResults(view, tuple(rated))
+
+
+def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:
+    """One row for each picture: its time and glare."""
+    rows = [{"time": times[p.hour], **p.glare} for p in result.pictures]
+    return pd.DataFrame(rows).set_index("time")

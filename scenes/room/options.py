@@ -1,0 +1,130 @@
+"""What the user may choose about a room, each part for the functions that need it.
+
+Files, flags and Python name a choice by one word ("sensor_spacing"): `RoomOptions.of` takes these
+names, `RoomOptions.named` gives them back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, get_type_hints
+
+from mitsuba_cfs.methods import METHODS
+from mitsuba_cfs.methods.sampling import Sampling
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorGrid:
+    """Where the sensors of the work plane are."""
+
+    spacing: float = 0.5  # [m]
+    height: float = 0.8  # above the floor [m]
+    margin: float = 0.5  # from the walls [m]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Occupancy:
+    """When people are in the room, and the heat of them and of what they use."""
+
+    hours: tuple[int, int] = (8, 18)  # clock hours from and to, every day
+    equipment_w_m2: float = 8.0  # while occupied, half of it radiant
+    person_w: float = 75.0  # sensible heat of a person
+    floor_per_person: float = 15.0  # [m2]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outputs:
+    """What is pictured and rated beside the sensors' year."""
+
+    picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.room.glare.default_hours`
+    picture_count: int = 10  # at most, where no hours are asked for
+    picture_size: int = 600  # pixels of a side of the fisheye picture
+    annual_glare: bool = False  # rate every lit hour, not only the pictures
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoomOptions:
+    """How a room is computed."""
+
+    method: str = "five-phase"  # one of METHODS
+    sampling: Sampling = field(default_factory=Sampling)
+    grid: SensorGrid = field(default_factory=SensorGrid)
+    occupancy: Occupancy = field(default_factory=Occupancy)
+    outputs: Outputs = field(default_factory=Outputs)
+    heat_step_s: float = 600.0  # of the heat balance; a whole fraction of an hour
+    infiltration_ach: float = 0.5  # [1/h]
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise ValueError(f"method: expected one of {METHODS}, got {self.method!r}")
+        if self.outputs.annual_glare and self.method == "point-in-time":
+            raise ValueError("annual glare needs the three-phase or the five-phase method")
+
+    @classmethod
+    def of(cls, **choices: Any) -> RoomOptions:
+        """The options with these choices, by the names of `NAMES`; the others are the defaults."""
+        return cls().changed(**choices)
+
+    def changed(self, **choices: Any) -> RoomOptions:
+        """These options with other choices, by the names of `NAMES`.
+
+        Raises: `TypeError` for a name that is none.
+        """
+        own: dict[str, Any] = {}
+        parts: dict[str, dict[str, Any]] = {}
+        for name, value in choices.items():
+            if name not in NAMES:
+                raise TypeError(f"no option {name!r}; there are {', '.join(NAMES)}")
+            part, key = NAMES[name]
+            if part:
+                parts.setdefault(part, {})[key] = value
+            else:
+                own[key] = value
+        if "view_samples" in parts.get("sampling", {}):  # nothing is averaged over hours there
+            parts["sampling"]["picture_samples"] = 2 * parts["sampling"]["view_samples"]
+        for part, values in parts.items():
+            own[part] = replace(getattr(self, part), **values)
+        return replace(self, **own)
+
+    def named(self) -> dict[str, Any]:
+        """Every choice by its name of `NAMES`, in that order."""
+        return {
+            name: getattr(getattr(self, part) if part else self, key)
+            for name, (part, key) in NAMES.items()
+        }
+
+
+# Each choice as files, flags and Python name it: the part that holds it ("": none), its name there
+NAMES = {
+    "method": ("", "method"),
+    "picture_hours": ("outputs", "picture_hours"),
+    "picture_count": ("outputs", "picture_count"),
+    "picture_size": ("outputs", "picture_size"),
+    "picture_samples": ("sampling", "view_samples"),  # of a pixel; 4 x 4 share what is reflected
+    "sky_subdivision": ("sampling", "subdivision"),
+    "sensor_spacing": ("grid", "spacing"),
+    "sensor_height": ("grid", "height"),
+    "sensor_margin": ("grid", "margin"),
+    "sensor_samples": ("sampling", "sensor_samples"),
+    "patch_samples": ("sampling", "patch_samples"),
+    "sun_points": ("sampling", "sun_points"),
+    "window_parts": ("sampling", "window_parts"),
+    "annual_glare": ("outputs", "annual_glare"),
+    "path_samples": ("sampling", "hour_samples"),
+    "heat_step_s": ("", "heat_step_s"),
+    "infiltration_ach": ("", "infiltration_ach"),
+    "equipment_w_m2": ("occupancy", "equipment_w_m2"),
+    "person_w": ("occupancy", "person_w"),
+    "floor_per_person": ("occupancy", "floor_per_person"),
+    "occupied": ("occupancy", "hours"),
+    "seed": ("sampling", "seed"),
+}
+
+
+def named_types() -> dict[str, Any]:
+    """The type of each choice by its name of `NAMES`."""
+    own = get_type_hints(RoomOptions)
+    return {
+        name: (get_type_hints(own[part]) if part else own)[key]
+        for name, (part, key) in NAMES.items()
+    }

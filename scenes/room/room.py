@@ -1,0 +1,351 @@
+"""One room from Python objects to all of its results; no file is read or written.
+
+weather = read_weather(Path("city.epw"))
+system = read_system(Path("blind.xml"))                 # scenes.run.inputs
+building = read_ifc("house.ifc")                        # or bim.shoebox.shoebox(...)
+space = building.spaces[0]
+result = compute_room(building, space, in_all_windows(space, system), weather, RoomOptions())
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bim.model import Building, Problem, Space
+from bim.to_thermal import ThermalRoom, thermal_room
+from bim.to_tracer import exterior_surfaces, interior_surfaces
+from mitsuba_cfs.errors import RoomError
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.glare import hourly_glare
+from mitsuba_cfs.methods.path_light import PathLight, PathSystems
+from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
+from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.surfaces import Surfaces
+from scenes.fenestration.systems import States
+from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
+from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYear, ThermalResult
+from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
+from scenes.room.control import shading_states
+from scenes.room.daylight import room_daylight, room_scene
+from scenes.room.glare import default_hours, room_glare
+from scenes.room.holes import hole_problems
+from scenes.room.operation import Operation
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
+from scenes.room.picture_hours import wanted_hours
+from scenes.room.solar import RoomSun
+from scenes.room.thermal import fenestration_table, thermal_result
+from scenes.room.windows import room_windows
+from scenes.room.zone import RoomZone, balances, internal_gains, operated, with_states
+from thermal.balance import ZoneResult
+from thermal.errors import ThermalInputError
+
+FloatArray = NDArray[np.float64]
+T = TypeVar("T")
+WORST = 4  # pictures of an annual glare without hours asked for
+
+
+def skies_for(weather: Weather, method: str, sampling: Sampling) -> AnnualSky:
+    """The year's skies as a method needs them; the same for every room."""
+    with_sun = method != "three-phase"
+    return annual_sky(weather, sampling.subdivision, sun=with_sun, solar=True)
+
+
+def compute_room(
+    building: Building,
+    space: Space,
+    systems: Mapping[str, States],
+    weather: Weather,
+    options: RoomOptions,
+    *,
+    operation: Operation | None = None,
+    skies: AnnualSky | None = None,
+    cache: MatrixCache | None = None,
+    pictures: bool = True,
+    rate: tuple[str, NDArray[np.int64]] | None = None,
+    progress: Progress = silent,
+) -> RoomYear:
+    """Daylight, glare, temperatures and comfort of one room, with one method.
+
+    Args:
+        building: what stands around the room is its `elements`.
+        systems: by window GUID the `FenestrationSystem` in each shading state, from open to
+            closed; one tuple of one system is the usual case, see `in_all_windows`.
+        options: method, sampling, sensors, occupancy, outputs; `RoomOptions()` is a full run.
+        operation: shading control, gains, set points; without it the first state holds all year
+            and the room floats freely.
+        skies: of `skies_for`, where several rooms share them.
+        cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
+            and weather do not enter V and D: variants of them cost only algebra.
+        pictures: False leaves the luminance pictures and their glare out.
+        rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
+
+    Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
+        `ValueError` for a window without a system.
+    """
+    if operation is None:
+        systems = {guid: states[:1] for guid, states in systems.items()}
+    room = RoomSimulation(
+        building, space, systems, weather, options,
+        operation=None if operation is None else operation.tables,
+        skies=skies, cache=cache, progress=progress,
+    )  # fmt: skip
+    outputs, skies = options.outputs, room.skies
+    hours = wanted_hours(outputs.picture_hours, weather.midpoints, skies.lit)
+    daylight = room.timed("daylight", lambda: room.daylight)
+    holes = room.timed("holes", room.holes)
+    year, rated = None, GlareResults(room.scene.view, ())
+    if outputs.annual_glare:
+        year = room.timed("annual glare", room.annual_glare)
+    if pictures:
+        rated = room.timed("glare", lambda: room.glare(hours, year))
+    dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
+    heat, balance = room.timed("thermal", room.thermal)
+    ran = None if operation is None else room.operation_result(balance)
+    return RoomYear(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes)
+
+
+class RoomSimulation:
+    """A room on its way: each step is computed when it is first asked for, and serves all others.
+
+    `cfs run` and `cfs study` ask for all of them (`compute_room`), `cfs thermal` for `zone`.
+    """
+
+    def __init__(
+        self,
+        building: Building,
+        space: Space,
+        systems: Mapping[str, States],
+        weather: Weather,
+        options: RoomOptions,
+        *,
+        operation: OperationTables | None = None,
+        skies: AnnualSky | None = None,
+        cache: MatrixCache | None = None,
+        progress: Progress = silent,
+    ) -> None:
+        """See `compute_room`."""
+        if operation is not None:
+            options = options.changed(occupied=operation.gains.occupied)
+        self.building, self.space, self.weather, self.options = building, space, weather, options
+        self.sampling, self.outputs = options.sampling, options.outputs
+        self.operation, self.cache, self.progress = operation, cache, progress
+        self.skies = (
+            skies_for(weather, options.method, options.sampling) if skies is None else skies
+        )
+        self.windows = room_windows(space, systems)
+        self.seconds: dict[str, float] = {}
+
+    def timed(self, stage: str, work: Callable[[], T]) -> T:
+        """What the work gives; its time is noted."""
+        start = time.monotonic()
+        result = work()
+        self.seconds[stage] = round(time.monotonic() - start, 2)
+        return result
+
+    @cached_property
+    def scene(self) -> DaylightScene:
+        """Triangles, window groups, sensors and view in the visible band."""
+        return room_scene(
+            self.building, self.space, self.windows, self.options.grid, self.outputs.picture_size
+        )
+
+    @cached_property
+    def traced(self) -> PhaseScene:
+        """V and D."""
+        return PhaseScene(
+            self.scene,
+            self.sampling,
+            five_phase=self.options.method != "three-phase",
+            cache=self.cache,
+            progress=self._tracing,
+        )
+
+    def _tracing(self, stage: str, fraction: float) -> None:
+        """The sensors' matrices are a part of the daylight, those of the view a stage."""
+        self.progress(stage, (0.6 if stage == "daylight" else 1.0) * fraction)
+
+    @cached_property
+    def light(self) -> PhaseLight:
+        """The light of the lit hours in every state."""
+        filled = PhaseSystems(self.traced, self.windows.optics())
+        return filled.light(self.skies, progress=part(self.progress, 0.6, 0.9, "daylight"))
+
+    def eye(self) -> NDArray[np.float32]:
+        """Illuminance at the eye in every state [J, L] [lx]."""
+        hours = np.ones(len(self.skies.lit), dtype=np.int64)
+        states = range(self.light.filled.states)
+        return np.stack([self.light.eye(j * hours) for j in states]).astype(np.float32)
+
+    @cached_property
+    def state(self) -> NDArray[np.int64]:
+        """The shading state of every hour [H]."""
+        if self.operation is None or not self.space.windows:
+            return np.zeros(self.skies.hours, dtype=np.int64)
+        return shading_states(
+            self.operation.control,
+            self.space,
+            self.weather,
+            self.windows.states,
+            irradiance=lambda: self.sun.irradiance,
+            eye=lambda: self.skies.whole_year(self.eye()),
+            dgp=lambda: glare_by_state(self.light, self.progress),
+        )
+
+    @property
+    def lit_state(self) -> NDArray[np.int64]:
+        """The shading state of every lit hour [L]."""
+        return self.state[self.skies.lit]
+
+    @cached_property
+    def daylight(self) -> DaylightResult:
+        """Illuminance of the work plane and its metrics."""
+        self.progress("daylight", 0.0)
+        steps = part(self.progress, 0.9, 1.0, "daylight")
+        method = self.options.method
+        found = room_daylight(self.light, self.lit_state, self.weather, method, steps)
+        self.progress("daylight", 1.0)
+        return found
+
+    @cached_property
+    def pictured(self) -> PhaseLight | PathLight:
+        """The light that pictures are made of."""
+        if self.options.method != "point-in-time":
+            return self.light
+        filled = PathSystems(self.scene, self.light.filled.systems, self.sampling)
+        return filled.light(self.skies)
+
+    def holes(self) -> tuple[Problem, ...]:
+        """What of the light leaves through no window."""
+        return hole_problems(self.space, self.scene, seed=self.sampling.seed, cache=self.cache)
+
+    def annual_glare(self) -> pd.DataFrame:
+        """Glare of every hour."""
+        return glare_of_year(self.light, self.lit_state, self.weather, self.progress)
+
+    def rated(self, metric: str, hours: NDArray[np.int64]) -> NDArray[np.float64]:
+        """A glare metric in some hours of the year with the sun up [n]."""
+        columns = np.searchsorted(self.skies.lit, hours)
+        steps = part(self.progress, 0.0, 1.0, "annual glare")
+        return hourly_glare(
+            self.pictured, metric, self.lit_state, hours=columns, progress=steps
+        ).dgp
+
+    def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
+        """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
+        if not hours and year is not None:
+            hours = worst_hours(year, min(WORST, self.outputs.picture_count))
+        if not hours:
+            eye = self.eye()[self.lit_state, np.arange(len(self.skies.lit))]
+            count = self.outputs.picture_count
+            hours = default_hours(self.weather.midpoints, self.skies.lit, eye, count)
+        return room_glare(self.pictured, self.scene.view, self.lit_state, hours, self.progress)
+
+    @cached_property
+    def outdoors(self) -> PhaseScene:
+        """D of the solar band: the visible one's where the outdoors reflects both bands alike."""
+        exterior = exterior_surfaces(self.building, self.space, "solar")
+        if "scene" in self.__dict__ and np.array_equal(
+            exterior.reflectance, self.scene.exterior.reflectance
+        ):
+            return self.traced
+        scene = DaylightScene(Surfaces.none(), exterior, self.windows.groups)
+        steps = part(self.progress, 0.0, 1.0, "sun")
+        found = PhaseScene(scene, self.sampling, cache=self.cache, progress=steps)
+        if scene.groups:
+            _ = found.daylight
+            steps("sun", 1.0)
+        return found
+
+    @cached_property
+    def sun(self) -> RoomSun:
+        """The sun outside and what the room does with it."""
+        steps = part(self.progress, 0.0, 0.8, "heat")
+        interior = interior_surfaces(self.space, "solar")
+        return RoomSun(self.outdoors, interior, self.surfaces, self.skies, steps)
+
+    @cached_property
+    def thermals(self) -> list[list[ThermalSystem]]:
+        """Thermal data of the windows' systems by group and state [G][J]."""
+        return [[thermal_system(system) for system in states] for states in self.windows.systems]
+
+    @cached_property
+    def surfaces(self) -> ThermalRoom:
+        """The room's surfaces and windows as a zone, with the gains and the air of the options."""
+        group, heats = self.windows.group, self.thermals
+        first = heats[group[0]][0].fenestration if len(group) else None
+        gains = internal_gains(self.space, self.skies.hours, self.options.occupancy)
+        air = self.options.infiltration_ach
+        try:
+            room = thermal_room(self.space, first, infiltration_ach=air, gains=gains)
+        except ThermalInputError as error:  # its faces are no zone
+            raise RoomError(f"space {self.space.label}: {error}") from error
+        return replace(room, zone=with_states(room.zone, [heats[g] for g in group]))
+
+    @cached_property
+    def plane(self) -> FloatArray | None:
+        """Mean illuminance of the work plane [H] [lx]; None where neither lamps nor control ask."""
+        tables = self.operation
+        if tables is None or not self.space.windows:
+            return None
+        if tables.control.rule != "glare" and not tables.gains.lighting_w_m2:
+            return None
+        return self.daylight.illuminance.mean(axis=1, dtype=float)
+
+    @cached_property
+    def zone(self) -> RoomZone:
+        """The room as the heat balance takes it."""
+        room, lamps, hours = self.surfaces, np.zeros(self.skies.hours), self.skies.hours
+        sun, state, plane = self.sun, self.state, self.plane  # stages of their own before this one
+        self.progress("heat", 0.0)
+        if self.operation is not None:
+            area = self.space.floor_area
+            zone, lamps = operated(room.zone, self.operation, area, hours, plane)
+            room = replace(room, zone=zone)
+        solar, gains = sun.switched(self.windows, self.thermals, state)
+        return RoomZone(self.space, room, solar, gains, state, lamps, plane)
+
+    def thermal(self) -> tuple[ThermalResult, ZoneResult]:
+        """Temperatures and comfort, and the balance they come from."""
+        step_s = self.options.heat_step_s
+        (balance,) = balances([self.zone], self.weather, step_s, progress=self.progress)
+        self.progress("heat", 1.0)
+        table = fenestration_table(self.windows, self.thermals)
+        occupied = self.options.occupancy.hours
+        return thermal_result(self.zone, balance, self.weather, occupied, table), balance
+
+    def operation_result(self, balance: ZoneResult) -> OperationResult:
+        """What control, heating, cooling and lamps did."""
+        most = max(self.windows.systems, key=len)
+        hours = pd.DataFrame(
+            {
+                "shading_state": self.state,
+                "heating_w": balance.heating,
+                "cooling_w": balance.cooling,
+                "lighting_w": self.zone.lamps,
+            },
+            index=self.weather.midpoints,
+        ).rename_axis("time")
+        summary = {
+            "heating_kwh": balance.heating.sum() / 1e3,
+            "cooling_kwh": balance.cooling.sum() / 1e3,
+            "lighting_kwh": self.zone.lamps.sum() / 1e3,
+            "peak_heating_w": balance.heating.max(),
+            "peak_cooling_w": balance.cooling.max(),
+        }
+        names = tuple(system.name for system in most)
+        summary = {key: float(value) for key, value in summary.items()}
+        return OperationResult(names, hours, summary, self.operation.control.rule)

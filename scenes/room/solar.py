@@ -1,0 +1,163 @@
+"""The sun on a room: what its windows let in, and where window layers and surfaces absorb it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.to_thermal import ThermalRoom
+from mitsuba_cfs import phases
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
+from mitsuba_cfs.progress import Progress, part
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
+from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
+from mitsuba_cfs.trace.estimate import Stopping
+from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.room.windows import RoomWindows
+from thermal.climate import Solar
+from thermal.control import switched
+
+FloatArray = NDArray[np.float64]
+Gains = dict[str, FloatArray]  # [H] [W] by name: incident_w, transmitted_w, absorbed_..._w
+
+
+class RoomSun:
+    """The sun outside a room and what its surfaces do with it, whatever fills the windows.
+
+    Each matrix is traced when it is first asked for.
+    """
+
+    def __init__(
+        self,
+        outdoors: PhaseScene,
+        interior: Surfaces,
+        room: ThermalRoom,
+        skies: AnnualSky,
+        progress: Progress,
+    ) -> None:
+        """From the windows' groups and what stands before them, and the room, in the solar band."""
+        self.outdoors, self.room, self.skies, self.progress = outdoors, room, skies, progress
+        # the room's triangles, numbered by the surfaces of the zone
+        numbers = room.surface_of_face[interior.surface]
+        self.interior = Surfaces(interior.triangles, interior.reflectance, numbers)
+        self._absorbed: dict[bytes, FloatArray] = {}
+        self._tracing = {
+            "samples": max(outdoors.sampling.patch_samples // BATCHES, 1),
+            "stopping": Stopping(batches=BATCHES),
+            "seed": outdoors.sampling.seed,
+            "cache": outdoors.cache,
+        }
+
+    @cached_property
+    def incident(self) -> FloatArray:
+        """Irradiance of the window groups by direction [G, K, L] [W/m2]."""
+        omega = KLEMS_FULL.projected_solid_angles()
+        if not self.outdoors.scene.groups:
+            return np.zeros((0, len(omega), len(self.skies.lit)))
+        daylight = self.outdoors.parts.of_groups(self.outdoors.daylight.values)
+        return phases.window_radiance(daylight, self.skies.solar) * omega[:, None]
+
+    @property
+    def irradiance(self) -> FloatArray:
+        """Irradiance of the window groups [H, G] [W/m2]."""
+        return self.skies.whole_year(self.incident.sum(axis=1)).T
+
+    @cached_property
+    def facade(self) -> FloatArray:
+        """Irradiance on the outside of the zone's surfaces [H, F] [W/m2]."""
+        room = self.room
+        facade = np.zeros((self.skies.hours, len(room.zone.surfaces)))
+        if len(room.outdoor):
+            matrix = sky_irradiance_matrix(
+                self.outdoors.scene.exterior,
+                room.outdoor_points,
+                room.outdoor_normals,
+                subdivision=self.outdoors.sampling.subdivision,
+                progress=part(self.progress, 0.4, 0.6),
+                **self._tracing,
+            )
+            facade[:, room.outdoor] = self.skies.whole_year(matrix.values @ self.skies.solar).T
+        return facade
+
+    def absorbed(self, reflectance: FloatArray) -> FloatArray:
+        """Where a unit of flux of each window patch is absorbed [G, K, F + G].
+
+        Args: reflectance: [G] of the windows for diffuse light from the room.
+        """
+        key = reflectance.tobytes()
+        if key not in self._absorbed:
+            self._absorbed[key] = absorption_matrix(
+                self.interior,
+                self.outdoors.scene.groups,
+                window_reflectance=reflectance,
+                progress=part(self.progress, 0.6, 1.0),
+                **self._tracing,
+            ).values
+        return self._absorbed[key]
+
+    def switched(
+        self,
+        windows: RoomWindows,
+        thermals: Sequence[Sequence[ThermalSystem]],
+        state: NDArray[np.int64],
+    ) -> tuple[Solar, Gains]:
+        """The sun absorbed in the state [H] of every hour, and its sums.
+
+        Args: thermals: thermal data of the windows' systems by group and state [G][J].
+        """
+        suns = [self._of_state(windows, thermals, j) for j in range(windows.states)]
+        gains = {
+            name: np.stack([sums[name] for _, sums in suns])[state, np.arange(len(state))]
+            for name in suns[0][1]
+        }
+        return switched([solar for solar, _ in suns], state), gains
+
+    def _of_state(
+        self, windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]], state: int
+    ) -> tuple[Solar, Gains]:
+        """Sun absorbed by window layers, room surfaces and facades in one state, and its sums."""
+        group, incident, F = windows.group, self.incident, self.facade.shape[1]
+        if not len(group):
+            dark = np.zeros((self.skies.hours, 0))
+            return Solar(dark, dark, np.zeros_like(self.facade), self.facade), {}
+        heats = [states[min(state, len(states) - 1)] for states in thermals]
+        omega = KLEMS_FULL.projected_solid_angles()
+        T = windows.of_state(state, lambda system: system.solar.transmission_matrix() / omega)
+        entering = np.stack([t @ i for t, i in zip(T, incident, strict=True)])
+        area = np.array([g.area for g in windows.groups])
+        entering *= omega[:, None] * area[:, None, None]  # [G, K, L] flux into the room [W]
+        back = np.array([heat.back_reflectance for heat in heats])
+        taken = np.einsum("gkf,gkl->lf", self.absorbed(back), entering, optimize=True)  # [L, F + G]
+        outer, inner = (
+            np.einsum("gk,gkl->lg", np.stack(layer), incident, optimize=True)
+            for layer in (
+                [heat.absorptances.outer for heat in heats],
+                [heat.absorptances.inner for heat in heats],
+            )
+        )
+        kept = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
+
+        def year(values: NDArray) -> NDArray:
+            return self.skies.whole_year(np.ascontiguousarray(values.T)).T
+
+        solar = Solar(
+            absorbed_outer=year(outer[:, group]),
+            absorbed_inner=year(inner[:, group]),
+            inside=year(taken[:, :F]),
+            facade=self.facade,
+            window_inside=year((kept * taken[:, F:] / area)[:, group]),
+        )
+        sums = {
+            "incident_w": incident.sum(axis=1).T @ area,
+            "transmitted_w": entering.sum(axis=(0, 1)),
+            "absorbed_outer_w": outer @ area,
+            "absorbed_inner_w": inner @ area,
+            "absorbed_room_w": taken[:, :F].sum(axis=1),
+        }
+        return solar, {name: self.skies.whole_year(values) for name, values in sums.items()}

@@ -1,0 +1,101 @@
+"""Heat of a room as a run tells it: temperatures and gains of a year, adaptive comfort."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import pandas as pd
+
+from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.results import ThermalResult
+from scenes.room.windows import RoomWindows
+from scenes.room.zone import RoomZone
+from thermal.balance import ZoneResult
+from thermal.comfort import adaptive_comfort, hours_between, running_mean, summarise
+from thermal.zone import Zone
+
+BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
+
+
+def thermal_result(
+    room: RoomZone,
+    result: ZoneResult,
+    weather: Weather,
+    occupied: tuple[int, int],
+    fenestration: Iterator[dict[str, float | str]],
+) -> ThermalResult:
+    """The tables of a room's year.
+
+    Args: occupied: clock hours from and to; fenestration: `fenestration_table` of its windows.
+    """
+    comfort, summary = _comfort(result, weather, occupied)
+    return ThermalResult(
+        _temperatures(result, room.zone, weather),
+        pd.DataFrame(room.gains, index=weather.midpoints).rename_axis("time"),
+        comfort,
+        summary,
+        tuple(fenestration),
+    )
+
+
+def fenestration_table(
+    windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]]
+) -> Iterator[dict[str, float | str]]:
+    """What the windows are, group by group and state by state, at normal incidence."""
+    seen = set()
+    for states, heats in zip(windows.systems, thermals, strict=True):
+        for system, heat in zip(states, heats, strict=True):
+            if id(system) in seen:
+                continue
+            seen.add(id(system))
+            visible = system.visible
+            yield {
+                "system": system.name,
+                "source": system.source,
+                "u_value": heat.fenestration.u_value,
+                "g_value": float(heat.g_value[0]),
+                "solar_transmittance": float(heat.transmittance[0]),
+                "solar_reflectance": float(heat.reflectance[0]),
+                "visible_transmittance": float(
+                    visible.direct_hemispherical(visible.transmission_front)[0]
+                ),
+            }
+
+
+def _temperatures(result: ZoneResult, zone: Zone, weather: Weather) -> pd.DataFrame:
+    """Table of the year's temperatures [degC]."""
+    columns = {
+        "outdoor_c": weather.dry_bulb_c,
+        "air_c": result.air_c,
+        "mrt_c": result.mrt_c,
+        "operative_c": result.operative_c,
+    }
+    for i, surface in enumerate(zone.surfaces):
+        columns[f"{surface.name} ({surface.outside})_c"] = result.surface_in_c[:, i]
+    for i, window in enumerate(zone.windows):
+        columns[f"window {window.name} inside_c"] = result.window_inner_c[:, i]
+        columns[f"window {window.name} outside_c"] = result.window_outer_c[:, i]
+    return pd.DataFrame(columns, index=weather.midpoints).rename_axis("time")
+
+
+def _comfort(
+    result: ZoneResult, weather: Weather, hours: tuple[int, int]
+) -> tuple[pd.DataFrame, dict[str, float]]:
+    """Adaptive comfort (ASHRAE 55) of every hour, and its shares of the occupied ones."""
+    mean = running_mean(weather.dry_bulb_c)
+    occupied = hours_between(*hours, hours=len(mean))
+    table = {"occupied": occupied, "running_mean_c": mean}
+    summary: dict[str, float] = {}
+    for name, band in BANDS.items():
+        comfort = adaptive_comfort(result.operative_c, mean, band)
+        table.setdefault("comfort_c", (comfort.low_c + comfort.high_c) / 2)
+        table.setdefault("applicable", comfort.applicable)
+        table[name] = comfort.comfortable
+        counted = summarise(comfort, occupied, weather.midpoints.month.to_numpy())
+        summary[name] = 100.0 * counted.comfortable / counted.hours
+    summary["too_warm_hours"] = float(counted.too_warm)
+    summary["too_cold_hours"] = float(counted.too_cold)
+    summary["outside_the_model_hours"] = float(counted.not_applicable)
+    frame = pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
+    return frame, summary

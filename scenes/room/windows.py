@@ -1,0 +1,91 @@
+"""The windows of a room and what fills them: groups of one orientation and one system."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Space
+from bim.to_tracer import window_groups
+from mitsuba_cfs.surfaces import WindowGroup
+from scenes.fenestration.systems import FenestrationSystem, States
+
+if TYPE_CHECKING:
+    from mitsuba_cfs.methods.optics import BsdfOptics
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class RoomWindows:
+    """The window groups of a room (axis G), each with its systems by state."""
+
+    groups: list[WindowGroup]
+    systems: tuple[States, ...]  # [G]
+    group: NDArray[np.int64]  # [W] group of each window of the space
+
+    @property
+    def states(self) -> int:
+        """J, how many states there are: of the group that has most; 1 of a room without windows."""
+        return max((len(states) for states in self.systems), default=1)
+
+    def optics(self) -> list[list[BsdfOptics]]:
+        """Each group's systems by state [G][J], as the methods take them."""
+        from mitsuba_cfs.methods.optics import BsdfOptics  # a tracer, which no export needs
+
+        known: dict[int, BsdfOptics] = {}
+        for states in self.systems:
+            for system in states:
+                if id(system) not in known:
+                    known[id(system)] = BsdfOptics(system.visible, system.fine)
+        return [[known[id(system)] for system in states] for states in self.systems]
+
+    def of_state(self, state: int, what: Callable[[FenestrationSystem], T]) -> list[T]:
+        """What `what` makes of each group's system in a state; fewer states end with their last."""
+        return [what(states[min(state, len(states) - 1)]) for states in self.systems]
+
+
+def room_windows(space: Space, systems: Mapping[str, States]) -> RoomWindows:
+    """The windows of a room in groups.
+
+    Args: systems: of each window, by its GUID.
+    """
+    missing = [w.name or w.guid for w in space.windows if w.guid not in systems]
+    if missing:
+        raise ValueError(f"no fenestration system for window {', '.join(missing)}")
+    members: dict[tuple[int, ...], list] = {}
+    for window in space.windows:
+        key = tuple(id(system) for system in systems[window.guid])
+        members.setdefault(key, []).append(window)
+    found: list[tuple[WindowGroup, States]] = []
+    for windows in members.values():
+        states = systems[windows[0].guid]
+        for group in window_groups(replace(space, windows=tuple(windows))):
+            name = group.name if len(members) == 1 else f"{group.name}, {states[0].name}"
+            found.append((replace(group, name=name), states))
+    groups = [group for group, _ in found]
+    return RoomWindows(groups, tuple(states for _, states in found), _groups(space, groups))
+
+
+def in_all_windows(space: Space, *states: FenestrationSystem) -> dict[str, States]:
+    """The same states in every window of a room."""
+    return {window.guid: states for window in space.windows}
+
+
+def _groups(space: Space, groups: list[WindowGroup]) -> NDArray[np.int64]:
+    """Group of each window of the space [W]."""
+    return np.array(
+        [
+            next(
+                g
+                for g, group in enumerate(groups)
+                if any(np.array_equal(w.triangles, window.triangles) for w in group.windows)
+            )
+            for window in space.windows
+        ],
+        dtype=np.int64,
+    )

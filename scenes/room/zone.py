@@ -1,0 +1,143 @@
+"""A room as the heat balance takes it: zone, gains, air, set points, sun; alone or with others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Space
+from bim.to_thermal import ThermalRoom, coupled_rooms, door_links
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import Occupancy
+from thermal.balance import ZoneResult, simulate_zones
+from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
+from thermal.gains import dimmed_share, split_gains
+from thermal.kernel import advance
+from thermal.records import must_compile
+from thermal.zone import Gains, Zone, work_hours
+
+FloatArray = NDArray[np.float64]
+COMPILING = "compiling the heat balance, once: about 10 s"
+RADIANT_SHARE = 0.5  # of the heat of people and equipment
+
+
+@dataclass(frozen=True, slots=True)
+class RoomZone:
+    """A room traced and controlled: all that its heat balance needs, and what it comes from."""
+
+    space: Space
+    room: ThermalRoom  # its zone with the windows' states, gains, air and set points
+    solar: Solar
+    gains: dict[str, FloatArray]  # [H] sums of the sun by name [W]
+    state: NDArray[np.int64]  # [H] shading state
+    lamps: FloatArray  # [H] power [W]
+    daylight: FloatArray | None  # [H] mean on the work plane [lx]; None: nothing asked for it
+
+    @property
+    def zone(self) -> Zone:
+        """The zone of the room."""
+        return self.room.zone
+
+    def with_view_factors(self, among: FloatArray) -> RoomZone:
+        """The room with view factors [N, N] between its surfaces, then its windows."""
+        return replace(self, room=replace(self.room, zone=replace(self.zone, view_factors=among)))
+
+
+def balances(
+    rooms: Sequence[RoomZone],
+    weather: Weather,
+    step_s: float,
+    *,
+    air_links: FloatArray | None = None,
+    progress: Progress = silent,
+) -> list[ZoneResult]:
+    """The years of rooms that exchange heat through their partitions and doors."""
+    if must_compile(advance):
+        progress(COMPILING, 0.0)
+    zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in rooms]
+    return list(simulate_zones(zones, climate(weather), suns, step_s=step_s, air_links=air_links))
+
+
+def coupled(
+    rooms: Sequence[RoomZone], door_m3_s: float
+) -> tuple[list[RoomZone], FloatArray, tuple[str, ...]]:
+    """The rooms with heat flowing through the walls between them; see `coupled_rooms`.
+
+    Args: door_m3_s: air each way through every open door between two of them [m3/s].
+
+    Returns: the rooms, the air between them [Z, Z], and a sentence for every wall that has no
+        other face.
+    """
+    spaces = [room.space for room in rooms]
+    joined, notes = coupled_rooms(spaces, [room.room for room in rooms])
+    found = [replace(room, room=own) for room, own in zip(rooms, joined, strict=True)]
+    return found, door_links(spaces, door_m3_s), notes
+
+
+def with_states(zone: Zone, thermals: Sequence[Sequence[ThermalSystem]]) -> Zone:
+    """The zone whose windows W have their fenestration in every state."""
+    windows = tuple(
+        replace(window, states=tuple(t.fenestration for t in states))
+        for window, states in zip(zone.windows, thermals, strict=True)
+    )
+    return replace(zone, windows=windows)
+
+
+def per_window(solar: Solar, zone: Zone) -> Solar:
+    """The sun with the state of each window: one with fewer states ends with its last."""
+    most = np.array([len(window.states) - 1 for window in zone.windows], dtype=np.int64)
+    return replace(solar, state=np.minimum(solar.state, most))
+
+
+def internal_gains(space: Space, hours: int, occupancy: Occupancy) -> Gains:
+    """Heat of people and equipment during the occupied hours."""
+    power = space.floor_area * (
+        occupancy.equipment_w_m2 + occupancy.person_w / occupancy.floor_per_person
+    )
+    present = work_hours(*occupancy.hours, hours=hours)
+    return Gains((1 - RADIANT_SHARE) * power * present, RADIANT_SHARE * power * present)
+
+
+def operated(
+    zone: Zone,
+    tables: OperationTables,
+    floor_area: float,
+    hours: int,
+    daylight: FloatArray | None,
+) -> tuple[Zone, FloatArray]:
+    """The zone with the gains, air and set points of the tables, and the lamps' power [H] [W].
+
+    Args: daylight: [H] mean illuminance of the work plane, which dims the lamps [lx]; None: nothing
+        dims them.
+    """
+    gains, air = tables.gains, tables.air
+    present = work_hours(*gains.occupied, hours=hours)
+    power = gains.equipment_w_m2 * floor_area + gains.persons * gains.person_w
+    lamps = gains.lighting_w_m2 * floor_area * present
+    if daylight is not None:
+        lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
+    found = replace(
+        zone,
+        infiltration_ach=air.infiltration_ach + air.night_ach * work_hours(*air.night, hours=hours),
+        gains=split_gains(power * present, gains.radiant_share, (lamps, gains.radiant_share)),
+        loads=tables.loads.ideal(),
+    )
+    return found, lamps
+
+
+def climate(weather: Weather) -> Climate:
+    """Outdoor conditions of the heat balance."""
+    return Climate(
+        outdoor_c=weather.dry_bulb_c,
+        sky_c=sky_temperature(weather.horizontal_infrared),
+        wind_speed=weather.wind_speed,
+        wind_direction_deg=np.mod(weather.wind_direction_deg, 360.0),
+        ground_c=undisturbed_ground(weather.dry_bulb_c),
+        pressure=weather.pressure_pa,
+    )

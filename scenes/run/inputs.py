@@ -1,0 +1,99 @@
+"""Reading the weather of a run, and choosing its rooms."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from bim.model import Building, Problem, Space
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.weather import Weather
+
+QUOTED = 3  # problems of the model that one message quotes
+
+
+def read_weather(path: str | PathLike[str]) -> Weather:
+    """Hourly weather of one year from an EPW file.
+
+    Raises: `DataError` for a file that cannot be used.
+    """
+    weather = read_epw(path)
+    if weather.step_h != 1.0:
+        raise DataError(f"has steps of {weather.step_h:g} h; the run needs hours", file=path)
+    return weather
+
+
+def chosen_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
+    """The spaces of those names or GUIDs, or every space with a window.
+
+    Raises: `DataError` that quotes what the model's problems say about a room that is not there.
+    """
+    chosen = named_spaces(building, names, path)
+    if names:
+        for space in chosen:
+            if not space.windows:
+                about = [p for p in _lost(building, "window") if _says(p.what, space.name)]
+                why = f": {_quoted(about)}" if about else ""
+                raise DataError(f"has no window{why}", file=path, element=f"space {space.label}")
+        return chosen
+    chosen = [space for space in chosen if space.windows]
+    if not chosen:
+        why = _because(building, "window") or _because(building, "room")
+        what = f"no space has a window to the outside{why}"
+        raise DataError(what, file=path, element="IfcWindow")
+    return chosen
+
+
+def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
+    """The spaces of those names or GUIDs, each once, or all spaces; with windows or without."""
+    if not building.spaces:
+        raise DataError(f"has no rooms (IfcSpace){_because(building, 'room')}", file=path)
+    if not names:
+        return list(building.spaces)
+    return list(
+        {space.guid: space for space in (_space(building, n, path) for n in names)}.values()
+    )
+
+
+def _space(building: Building, name: str, path: Path) -> Space:
+    try:
+        return building.space(name)
+    except (KeyError, ValueError) as error:
+        lost = [p for p in _lost(building, "room") if p.where == name or _says(p.what, name)]
+        if isinstance(error, KeyError) and lost:
+            message = f"space {name!r} was left out: {_quoted(lost)}"
+        else:
+            message = str(error.args[0])
+        raise DataError(message, file=path, field="space") from error
+
+
+def _lost(building: Building, kind: str) -> list[Problem]:
+    """The problems for which a "room" or "window" is not there."""
+    return [problem for problem in building.problems if problem.lost == kind]
+
+
+def _says(text: str, name: str) -> bool:
+    """Whether a text holds a name as whole words."""
+    return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text, re.IGNORECASE) is not None
+
+
+def _because(building: Building, kind: str) -> str:
+    lost = _lost(building, kind)
+    return f": {_quoted(lost)}" if lost else ""
+
+
+def _quoted(problems: Sequence[Problem]) -> str:
+    """The first problems in one line, and how many more there are."""
+    shown = "; ".join(f"{p.what} ({p.consequence})" for p in problems[:QUOTED])
+    more = len(problems) - QUOTED
+    return f"{shown}; and {more} more, see cfs ifc check" if more > 0 else shown
+
+
+def sha256(path: Path) -> str:
+    """Hash of a file's bytes."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,31 @@
+"""Inputs and choices of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from scenes.room.options import RoomOptions
+
+
+@dataclass(frozen=True, slots=True)
+class JobOptions:
+    """Inputs and choices of a run."""
+
+    building: Path | None  # None: not from a file
+    weather: Path | None
+    system: Path | None = None  # of every window; None: what the building's file holds
+    operation: Path | None = None
+    spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
+    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
+    g_value: float | None = None  # at normal incidence
+    cache: bool = True  # keep traced matrices and find them again
+    quick: bool = False  # said in the results; what it chooses is in `scenes.quick`
+    room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
+
+    def named(self) -> dict[str, Any]:
+        """Every choice by its name, those of the rooms first."""
+        own = [one.name for one in fields(self) if one.name != "room"]
+        return self.room.named() | {name: getattr(self, name) for name in own}

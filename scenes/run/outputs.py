@@ -1,0 +1,69 @@
+"""The files of a run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+
+from bim.names import folder_names
+from mitsuba_cfs.files import write_table, write_text
+from mitsuba_cfs.images.hdr import write_hdr
+from scenes.pictures import write_falsecolour
+from scenes.result_folder import ResultFolder
+from scenes.results import RoomYear, RunResult
+from scenes.room.daylight import illuminance_table
+from scenes.room.glare import glare_table
+
+
+def write_results(result: RunResult, folder: ResultFolder, write_report=None) -> None:
+    """Write all files of a run; earlier results are replaced at the end.
+
+    Args: write_report: `scenes.report.write_report`, or None for no report.
+    """
+    with folder.replaced() as temporary:
+        several = len(result.spaces) > 1
+        names = folder_names([room.space for room in result.spaces])
+        for room, name in zip(result.spaces, names, strict=True):
+            place = temporary / name if several else temporary
+            place.mkdir(exist_ok=True)
+            _write_room(result, room, place)
+        write_table(_problems(result), temporary / "problems.csv", index=False)
+        if write_report is not None:
+            write_report(result, temporary / "report.html")
+        text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
+        write_text(temporary / "run.json", text + "\n")
+
+
+def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
+    table = illuminance_table(room.daylight, result.times)
+    write_table(table, place / "illuminance.parquet")
+    metrics = room.daylight.sensor_metrics.copy()
+    metrics["relative_standard_error"] = room.daylight.relative_error
+    _csv(metrics, place / "daylight_metrics.csv")
+    _csv(pd.DataFrame([room.daylight.room_metrics]), place / "room_metrics.csv", index=False)
+    _csv(glare_table(room.glare, result.times), place / "dgp.csv")
+    heat = room.heat
+    _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
+    if room.operation is not None:
+        _csv(room.operation.hours, place / "operation.csv")
+        _csv(pd.DataFrame([room.operation.summary]), place / "loads.csv", index=False)
+    if room.annual_glare is not None:
+        _csv(room.annual_glare, place / "annual_glare.csv")
+    _csv(pd.DataFrame([heat.comfort_summary]), place / "comfort.csv", index=False)
+    for picture in room.glare.pictures:
+        name = f"view_{result.times[picture.hour]:%m-%d_%Hh}"
+        write_hdr(place / f"{name}.hdr", picture.luminance, room.glare.view)
+        title = f"{result.times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
+        write_falsecolour(place / f"{name}.png", picture.luminance, title=title)
+
+
+def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:
+    """A table with six significant digits, the same in every run."""
+    write_table(table, path, index=index, float_format="%.6g")
+
+
+def _problems(result: RunResult) -> pd.DataFrame:
+    rows = [(p.where, p.what, p.consequence) for p in result.problems]
+    return pd.DataFrame(rows, columns=["where", "what", "consequence"])

@@ -1,0 +1,290 @@
+"""The main job from its files to the results of every room."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from bim.model import Building, Problem, Space
+from bim.templates import template_rooms
+from mitsuba_cfs import variants
+from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.progress import Progress, item, part, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.thermal_system import thermal_system
+from scenes.quick import NOTE
+from scenes.results import RoomYear, RunResult
+from scenes.room.drawn_shades import traced_building
+from scenes.room.equal_rooms import moved_result, same_light, same_systems
+from scenes.room.operation import Operation, check_states
+from scenes.room.room import compute_room, skies_for
+from scenes.run.building import read_building
+from scenes.run.files import JobFiles, read_files
+from scenes.run.inputs import chosen_spaces, sha256
+from scenes.run.options import JobOptions
+
+FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+
+
+OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
+
+
+@dataclass(frozen=True, slots=True)
+class JobInputs:
+    """What the files of a run hold."""
+
+    building: Building
+    spaces: list[Space]
+    weather: Weather
+    systems: Mapping[str, States]  # by window GUID
+    operation: Operation | None
+
+
+def run_job(
+    options: JobOptions,
+    progress: Progress = silent,
+    files: JobFiles | None = None,
+    *,
+    on_room: OnRoom | None = None,
+) -> RunResult:
+    """Daylight, glare, temperatures and comfort of the chosen rooms.
+
+    Args:
+        files: what `read_files` has read of the options; read now without.
+        on_room: called with each room as soon as it is computed, in the rooms' order.
+
+    Raises: `DataError` for a file that cannot be used, before anything is traced.
+    """
+    start = time.monotonic()
+    inputs = read_inputs(options, progress, files)
+    return run_inputs(inputs, options, progress, on_room=on_room, start=start)
+
+
+def run_inputs(
+    inputs: JobInputs,
+    options: JobOptions,
+    progress: Progress = silent,
+    *,
+    on_room: OnRoom | None = None,
+    start: float | None = None,
+) -> RunResult:
+    """Daylight, glare, temperatures and comfort of the rooms of `inputs`.
+
+    Args:
+        options: what was chosen; its files are named in the manifest only.
+        start: when the run began, by `time.monotonic`; now by default.
+    """
+    start = time.monotonic() if start is None else start
+    building, weather = inputs.building, inputs.weather
+    used = used_systems(inputs)
+    thermal_notes = [note for system in used for note in thermal_system(system).notes]
+    sun = sun_directions(weather)
+    variant = variants.activate()
+    progress("sky", 0.0)
+    room = options.room
+    skies = skies_for(weather, room.method, room.sampling)
+    progress("sky", 1.0)
+    results, problems, notes = _rooms(inputs, skies, options, progress, on_room)
+    if not results:
+        raise DataError("none of its rooms could be computed", file=options.building)
+    holes = [problem for result in results for problem in result.problems]
+    manifest = _manifest(options, variant, inputs, used, results)
+    manifest["seconds"] = round(time.monotonic() - start, 1)
+    notes = [
+        *([NOTE] if options.quick else []),
+        *source_notes(used_sources(inputs)),
+        *(note for system in used for note in system.notes),
+        *thermal_notes,
+        *_state_notes(inputs, options),
+        *notes,
+        *(f"{hole.what}: {hole.consequence}." for hole in holes),
+        *weather.notes,
+        *_site_notes(building, weather),
+    ]
+    return RunResult(
+        building,
+        weather.midpoints,
+        sun,
+        tuple(results),
+        (*building.problems, *problems, *holes),
+        manifest,
+        tuple(dict.fromkeys(notes)),
+        room.method,
+    )
+
+
+def read_inputs(
+    options: JobOptions, progress: Progress, files: JobFiles | None = None
+) -> JobInputs:
+    """The inputs, the building last."""
+    files = files or read_files(options)
+    progress("inputs", 0.1)
+    steps = part(progress, 0.1, 1.0)
+    building = read_building(options.building, join=options.join, progress=steps)
+    inputs = job_inputs(building, options.spaces, files)
+    progress("inputs", 1.0)
+    return inputs
+
+
+def job_inputs(building: Building, names: Sequence[str], files: JobFiles) -> JobInputs:
+    """A building's rooms of those names with what fills their windows.
+
+    Raises: `DataError` for a room that is not there, a window without a system.
+    """
+    operation, weather = files.operation, files.weather
+    spaces = chosen_spaces(building, names, building.file)
+    windows = [window for space in spaces for window in space.windows]
+    systems = fill_windows(windows, files.given, building.file)
+    if operation is not None:
+        check_states(operation, max(len(states) for states in systems.values()))
+    building = traced_building(building, systems)
+    return JobInputs(building, spaces, weather, systems, operation)
+
+
+def used_systems(inputs: JobInputs) -> list[FenestrationSystem]:
+    """Every system that the run may use, once."""
+    states = _used_states(inputs).values()
+    return list({id(system): system for some in states for system in some}.values())
+
+
+def used_sources(inputs: JobInputs) -> list[dict]:
+    """Name and source of every system that the run may use, and its windows."""
+    windows = [window for space in inputs.spaces for window in space.windows]
+    return window_sources(windows, _used_states(inputs))
+
+
+def _used_states(inputs: JobInputs) -> dict[str, States]:
+    several = inputs.operation is not None
+    return {guid: s if several else s[:1] for guid, s in inputs.systems.items()}
+
+
+def _rooms(
+    inputs: JobInputs,
+    skies: AnnualSky,
+    options: JobOptions,
+    progress: Progress,
+    on_room: OnRoom | None = None,
+) -> tuple[list[RoomYear], list[Problem], list[str]]:
+    """The results of the rooms in their order, what was left out, and what was given twice."""
+    found: dict[str, RoomYear] = {}
+    problems, notes = [], []
+    cache = MatrixCache.of_user() if options.cache else None
+    sampling = options.room.sampling
+    equal = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
+    for number, space in enumerate(inputs.spaces, 1):
+        name = space.label
+        steps = item(progress, "room", number, len(inputs.spaces), name)
+        try:
+            twin = next(
+                (
+                    other
+                    for other in equal[space.guid]
+                    if other.guid in found
+                    and not found[other.guid].template
+                    and same_systems(other, space, inputs.systems)
+                    and same_light(inputs.building, other, space, sampling, cache)
+                ),
+                None,
+            )
+            if twin is not None:
+                found[space.guid] = moved_result(found[twin.guid], space)
+                notes.append(
+                    f"Room {name} is like {twin.label} in shape, orientation, "
+                    "materials, windows and in what shades it: its results are those."
+                )
+            else:
+                found[space.guid] = compute_room(
+                    inputs.building, space, inputs.systems, inputs.weather, options.room,
+                    operation=inputs.operation, skies=skies, cache=cache, progress=steps,
+                )  # fmt: skip
+        except RoomError as error:
+            if len(inputs.spaces) == 1:
+                where = f"space {name}"
+                raise DataError(str(error), file=options.building, element=where) from error
+            problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+            continue
+        if on_room is not None:
+            on_room(found[space.guid])
+    return list(found.values()), problems, notes
+
+
+def _manifest(
+    options: JobOptions,
+    variant: str,
+    inputs: JobInputs,
+    used: list[FenestrationSystem],
+    results: list[RoomYear],
+) -> dict:
+    """What a reader needs to make the same numbers again."""
+    files = {"building": options.building, "weather": options.weather}
+    files = {name: path for name, path in files.items() if path is not None}
+    if options.system is not None:
+        files["system"] = options.system
+        beside = options.system.with_suffix(".toml")
+        if beside.is_file():
+            files["system_thermal"] = beside
+    if inputs.operation is not None:
+        files["operation"] = inputs.operation.file
+        files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
+    packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
+    return {
+        "quick": options.quick,
+        "inputs": {
+            name: {"path": str(path), "sha256": sha256(path)} for name, path in files.items()
+        },
+        "building": inputs.building.name,
+        "site": inputs.weather.site,
+        "system": ", ".join(dict.fromkeys(system.name for system in used)),
+        "fenestration": used_sources(inputs),
+        "options": {
+            key: str(value) if isinstance(value, Path) else value
+            for key, value in options.named().items()
+        },
+        "seed": options.room.sampling.seed,
+        "variant": variant,
+        "versions": {
+            "python": platform.python_version(),
+            **{name: metadata.version(name) for name in packages},
+        },
+        "rooms": {result.space.guid: result.seconds for result in results},
+    }
+
+
+def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
+    """A sentence where windows have more states than are used."""
+    if inputs.operation is not None and inputs.operation.systems and options.system is not None:
+        file = inputs.operation.file.name
+        return (f"--cfs fills the windows: [[system]] of {file} is not used.",)
+    several = [states[0].name for states in inputs.systems.values() if len(states) > 1]
+    if inputs.operation is not None or not several:
+        return ()
+    names = ", ".join(dict.fromkeys(several))
+    held_by = inputs.building.name if options.building is None else options.building.name
+    return (
+        f"{held_by} holds several shading states; without --operation the first of "
+        f"each window ({names}) holds all year.",
+    )
+
+
+def _site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
+    """A sentence where building and weather lie far apart."""
+    if building.latitude_deg is None or building.longitude_deg is None:
+        return ()
+    north = building.latitude_deg - weather.latitude_deg
+    east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
+    if max(abs(north), abs(east)) <= FAR_SITE_DEG:
+        return ()
+    return (
+        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
+        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
+        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
+    )

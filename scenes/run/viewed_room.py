@@ -1,0 +1,70 @@
+"""A room as `cfs dgp` and `cfs picture` view it: its windows in their first state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bim.model import Space
+from bim.to_tracer import exterior_surfaces, interior_surfaces
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.progress import Progress
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.room.drawn_shades import traced_building
+from scenes.room.holes import hole_notes
+from scenes.room.windows import room_windows
+from scenes.run.building import read_building
+from scenes.run.inputs import chosen_spaces
+
+
+@dataclass(frozen=True, slots=True)
+class ViewedRoom:
+    """A room with its scene, what fills its windows and what is to be said of them."""
+
+    space: Space
+    scene: DaylightScene
+    systems: tuple[FenestrationSystem, ...]  # [G]
+    optics: list[list[BsdfOptics]]  # [G][1]
+    sources: list[dict]  # name, source and windows of each system
+
+    def notes(self) -> tuple[str, ...]:
+        """What fills the windows, what its data lack, and light that is lost; traces a little."""
+        own = (note for system in self.systems for note in system.notes)
+        holes = hole_notes(self.space, cache=MatrixCache.of_user())
+        return tuple(dict.fromkeys([*source_notes(self.sources), *own, *holes]))
+
+
+def read_viewed_room(
+    file: Path,
+    space: str | None,
+    join: Sequence[str],
+    given: Given,
+    view_of: Callable[[Space], View],
+    progress: Progress,
+) -> ViewedRoom:
+    """The room of an IFC file, seen in the visible band.
+
+    Args:
+        space: its name; None: the first with a window.
+        given: what the user gives for all windows.
+        view_of: the view of a room; it refuses one that is not in it.
+    """
+    building = read_building(file, join=join, progress=progress)
+    room = chosen_spaces(building, () if space is None else (space,), file)[0]
+    view = view_of(room)
+    filled = {guid: states[:1] for guid, states in fill_windows(room.windows, given, file).items()}
+    windows = room_windows(room, filled)
+    building = traced_building(building, filled)
+    scene = DaylightScene(
+        interior_surfaces(room, "visible"),
+        exterior_surfaces(building, room, "visible"),
+        windows.groups,
+        view=view,
+    )
+    systems = tuple(system for (system,) in windows.systems)
+    return ViewedRoom(room, scene, systems, windows.optics(), window_sources(room.windows, filled))

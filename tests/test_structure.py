@@ -1,0 +1,210 @@
+"""The inner order of the packages, read from the source: ranks, circles, names, signatures."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+
+import pytest
+
+from tests.modules import EVIDENCE, MODULES, dotted, file_name, imports
+
+# The ranks of what lies directly in a package, lowest first: who imports must stand higher than
+# what it imports.  What shares a rank knows nothing of the others there.
+RANKS = {
+    "mitsuba_cfs": (
+        {"compiled", "directions", "errors", "llvm", "phases", "processes", "progress",
+         "source_code"},
+        {"files", "surfaces", "variants"},
+        {"bsdf", "images", "sky"},
+        {"glare", "matrices", "metrics"},
+        {"trace"},
+        {"methods"},
+    ),
+    "scenes": (
+        {"demo", "figures", "quick", "result_folder", "results", "streams", "toml_file",
+         "user_errors", "pictures", "picture_options", "room_views",
+         "bsdf_combination", "bsdf_generation", "bsdf_plots"},
+        {"fenestration", "cost", "report", "plots", "photovoltaics"},
+        {"room"},
+        {"run", "fenestration_exports"},
+        {"heat", "calibration", "picture_files", "simulation", "year_of_glare"},
+        {"study", "view_picture"},
+        {"study_report"},
+        {"commands"},
+        {"cli"},
+        {"evidence"},
+    ),
+}  # fmt: skip
+MOST_POSITIONAL = 6
+# These decorators compile with numba, which fails where one compiled function calls another by a
+# keyword-only parameter (0.68: no such call binds).  `dr.syntax` has no such excuse
+COMPILED = {"compiled", "inlined"}
+
+SOURCES = {file_name(path): path.read_text(encoding="utf-8") for path in MODULES}
+
+
+@cache
+def _tree(source: str) -> ast.Module:
+    return ast.parse(source)
+
+
+def _part(module: str) -> str:
+    """What lies directly in a package and holds a module; nothing for the package's face."""
+    return module.partition(".")[2].partition(".")[0]
+
+
+def _rank_faults(name: str, source: str) -> list[str]:
+    """Imports of a module from parts of its package that stand no lower than its own."""
+    package, module = name.partition("/")[0], dotted(name)
+    levels = RANKS.get(package, ())
+    rank = {part: level for level, parts in enumerate(levels) for part in parts}
+    rank[""] = len(levels)  # the face
+    faults = []
+    for imported, line in imports(_tree(source)):
+        mine, other = _part(module), _part(imported)
+        if imported.partition(".")[0] != package or not levels or mine == other:
+            continue
+        if rank.get(mine, -1) <= rank.get(other, rank[""]):
+            faults.append(f"{name}:{line}: {package}.{other} does not stand below {package}.{mine}")
+    return list(dict.fromkeys(faults))
+
+
+def _circle(sources: Mapping[str, str]) -> list[str]:
+    """Modules that import each other in a circle, the first one again at the end; none if none."""
+    known = {dotted(name) for name in sources}
+    graph: dict[str, set[str]] = {}
+    for name, source in sources.items():
+        targets = (imported for imported, _ in imports(_tree(source)))
+        either = {t if t in known else t.rpartition(".")[0] for t in targets}
+        graph[dotted(name)] = either & known
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def _repeated_classes(sources: Mapping[str, str]) -> dict[str, list[str]]:
+    """Public class names that several modules of the product have, with these."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for name, source in sources.items():
+        if name.startswith(EVIDENCE):  # scripts beside the product, not in the wheel
+            continue
+        for node in ast.walk(_tree(source)):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found[node.name].append(name)
+    return {name: modules for name, modules in found.items() if len(modules) > 1}
+
+
+def _long_signatures(name: str, source: str) -> Iterator[str]:
+    """Functions with too many positional parameters; `self` and `cls` do not count."""
+    for node in ast.walk(_tree(source)):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        marks = (m.func if isinstance(m, ast.Call) else m for m in node.decorator_list)
+        if COMPILED & {ast.unparse(mark) for mark in marks}:
+            continue
+        given = [a.arg for a in (*node.args.posonlyargs, *node.args.args)]
+        count = len(given) - (given[:1] in (["self"], ["cls"]))
+        if count > MOST_POSITIONAL:
+            yield f"{name}:{node.lineno}: {node.name} has {count} positional parameters"
+
+
+def test_modules_import_only_from_below() -> None:
+    faults = [fault for module in SOURCES.items() for fault in _rank_faults(*module)]
+    assert not faults
+
+
+@pytest.mark.parametrize("package", RANKS)
+def test_the_ranks_hold_each_part_once(package: str) -> None:
+    modules = (dotted(name) for name in SOURCES)
+    parts = {_part(m) for m in modules if m.startswith(f"{package}.")}
+    assert sorted(part for level in RANKS[package] for part in level) == sorted(parts)
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    assert not _circle(SOURCES)
+
+
+def test_a_public_class_name_exists_once() -> None:
+    assert not _repeated_classes(SOURCES)
+
+
+def test_no_function_takes_many_positional_parameters() -> None:
+    faults = [fault for module in SOURCES.items() for fault in _long_signatures(*module)]
+    assert not faults
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [
+        ("mitsuba_cfs/files.py", "from mitsuba_cfs.trace import scene"),  # upwards
+        ("mitsuba_cfs/sky/x.py", "import mitsuba_cfs.bsdf.klems"),  # aside
+        ("mitsuba_cfs/sky/x.py", "import mitsuba_cfs.new"),  # to what has no rank
+        ("mitsuba_cfs/new.py", "from mitsuba_cfs.errors import DataError"),  # from what has none
+        ("mitsuba_cfs/methods/x.py", "import mitsuba_cfs as cfs"),  # the face
+        ("mitsuba_cfs/trace/x.py", "from mitsuba_cfs import methods"),
+        ("mitsuba_cfs/trace/x.py", "def f():\n    from mitsuba_cfs.methods.glare import pictures"),
+        ("scenes/results.py", "if TYPE_CHECKING:\n    from scenes.report.page import write_report"),
+        ("scenes/heat/x.py", "from importlib import import_module\nimport_module('scenes.study')"),
+        ("scenes/study/x.py", "from scenes.commands.parameters import seed_option"),
+        ("scenes/commands/x.py", "from scenes.evidence import bench"),
+    ],
+)
+def test_planted_rank_is_found(name: str, source: str) -> None:
+    assert len(_rank_faults(name, source)) == 1
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        "import bim.x",
+        "from bim import x",
+        "from bim.x import X",
+        "def f():\n    from bim.x import X",
+        "if TYPE_CHECKING:\n    from bim.x import X",
+    ],
+)
+def test_planted_circle_is_found(back: str) -> None:
+    straight = {"bim/__init__.py": "", "bim/x.py": "import bim.y", "bim/y.py": "import bim.z"}
+    assert not _circle(straight | {"bim/z.py": "import numpy"})
+    assert set(_circle(straight | {"bim/z.py": back})) == {"bim.x", "bim.y", "bim.z"}
+
+
+def test_planted_class_name_is_found() -> None:
+    one = {"bim/x.py": "class Window: ...\nclass _Part: ..."}
+    assert not _repeated_classes(one | {"bim/y.py": "class Windows: ...\nclass _Part: ..."})
+    again = "@dataclass\nclass Window: ..."
+    assert _repeated_classes(one | {"bim/y.py": again}) == {"Window": ["bim/x.py", "bim/y.py"]}
+    assert not _repeated_classes(one | {f"{EVIDENCE}y.py": again})
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "def f(a, b, c, d, e, f, g): ...",
+        "def f(a, b, c, d, /, e, f, g): ...",
+        "def f(a, b, c, d, e, f, g=1, *, h): ...",
+        "class A:\n    def __init__(self, a, b, c, d, e, f, g): ...",
+        "def f():\n    def g(a, b, c, d, e, f, g): ...",
+        "@dr.syntax\ndef f(a, b, c, d, e, f, g): ...",
+    ],
+)
+def test_planted_signature_is_found(source: str) -> None:
+    assert len(list(_long_signatures("bim/x.py", source))) == 1
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "def f(a, b, c, d, e, f, *rest, g, **options): ...",
+        "class A:\n    @classmethod\n    def of(cls, a, b, c, d, e, f): ...",
+        "@compiled(nogil=True)\ndef f(a, b, c, d, e, f, g): ...",
+    ],
+)
+def test_sound_signature_is_passed(source: str) -> None:
+    assert not list(_long_signatures("bim/x.py", source))
