@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
-from mitsuba_cfs.methods.optics import States, SystemOptics, hourly_states, in_state
+from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.methods.subdivision import coarse_sky
+from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -39,6 +40,7 @@ class PhaseSystems:
         self.traced, self.systems = traced, systems
         self._seen: dict[tuple[int, ...], tuple[PictureSun, OutdoorCoefficients]] = {}
         self.straight = StraightViews(traced, systems)
+        self.mirrored = WindowReflection(traced)
 
     @property
     def states(self) -> int:
@@ -55,11 +57,16 @@ class PhaseSystems:
         return [found[g] for g in self.traced.parts.group]
 
     def coefficients(self, state: int = 0) -> NDArray[np.float64]:
-        """V T D [S, P]: illuminance of each sensor per unit luminance of each sky patch."""
+        """Illuminance of each sensor per unit luminance of each sky patch [S, P].
+
+        V T D, with what windows reflect, and the straight view of groups that are cut.
+        """
         optics = self.optics([state] * len(self.systems))
         view, daylight = self.traced.sensors.values, self.traced.daylight.values
         through = np.stack([o.transmission @ d for o, d in zip(optics, daylight, strict=True)])
         found = np.einsum("sqk,qkp->sp", view, through, optimize=True)
+        if self.mirrored.reflects(optics):
+            found += self.mirrored.sensors(optics) @ through.reshape(-1, through.shape[-1])
         for g in range(len(self.systems)):
             found += self.straight.coefficients(g, min(state, len(self.systems[g]) - 1))
         return found[: len(self.traced.scene.points)]
@@ -217,6 +224,9 @@ class PhaseLight:
             luminance = phases.room_side_radiance(T, daylight, sky.whole[:, hours])
         else:
             luminance = self._window_luminance("whole", rows, hours)
+            optics = self.filled.optics(state)
+            if self.filled.mirrored.reflects(optics):
+                luminance = luminance + self.filled.mirrored.windows(optics, luminance)
         if not traced.five_phase:
             return matrices.three_phase(luminance)
         sun, seen = self.filled.seen_sun(tuple(int(j) for j in state))
@@ -301,9 +311,22 @@ class PhaseLight:
         """Illuminance of sensors and eye [S + 1, L] by all groups."""
         rows = list(enumerate(self._state(state)))
         diffuse = sum(self._chosen(g, "diffuse", row) for g, row in rows)
+        diffuse = diffuse + self._reflected(state)
         if not self._traced.five_phase:
             return diffuse
         return np.maximum(diffuse, 0.0) + sum(self._chosen(g, "sun", row) for g, row in rows)
+
+    def _reflected(self, state: State | None) -> NDArray[np.float64] | float:
+        """What the windows reflect of the room's light to sensors and eye [S + 1, L]."""
+        rows, mirrored, found = self._state(state), self.filled.mirrored, None
+        for kind, hours in combinations(rows):
+            optics = self.filled.optics(kind)
+            if mirrored.reflects(optics):
+                window = self._window_luminance("whole", rows[:, hours], hours)
+                added = mirrored.sensors(optics) @ window.reshape(-1, len(hours))
+                found = np.zeros((len(added), rows.shape[1])) if found is None else found
+                found[:, hours] = added
+        return 0.0 if found is None else found
 
     def _chosen(self, g: int, name: str, row: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """What a group gives [S, L] in the state of each hour [L]."""

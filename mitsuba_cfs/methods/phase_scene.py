@@ -23,11 +23,13 @@ from mitsuba_cfs.trace.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.view_matrix import view_matrix
+from mitsuba_cfs.trace.window_exchange import window_exchange
 from mitsuba_cfs.window_parts import window_cells
 
 BATCHES = 8  # independent repetitions that the standard errors come from
 INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path
 CELL_SHARE = 0.06  # paths of the cells that a group's parts follow from, of those of its D
+EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room, in each batch
 PART_BATCHES = 2  # of D where groups are cut
 PART_SHARE = 2  # most paths of the parts' D, of those of the whole groups'
 
@@ -120,6 +122,20 @@ class PhaseScene:
     def direct_sensors(self) -> NDArray[np.float64]:
         """V_d [S, Q, K]: what comes straight from the windows; a part of V."""
         return self._sensors(1, 0.9, 1.0).values
+
+    @cached_property
+    def exchange(self) -> NDArray[np.float64]:
+        """W [Q, K, Q * K]: what the windows see of the room that they light."""
+        parts = self.parts.groups
+        return window_exchange(
+            self.scene.interior,
+            parts,
+            samples=max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8),
+            max_depth=INDOOR_DEPTH,
+            stopping=Stopping(batches=2),
+            seed=self.sampling.seed,
+            cache=self.cache,
+        ).values
 
     @cached_property
     def view(self) -> ViewMatrices:
