@@ -279,9 +279,7 @@ def mirror_glass(back: float):
     from mitsuba_cfs.methods.optics import BsdfOptics
 
     through, mirror = np.diag(0.7 / OMEGA), np.diag(back / OMEGA)
-    return BsdfOptics(
-        KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, np.zeros((K, K)), mirror)
-    )
+    return BsdfOptics(KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, np.zeros((K, K)), mirror))
 
 
 def test_windows_reflect_the_light_of_the_room_as_paths_have_it():
@@ -313,9 +311,7 @@ def test_windows_reflect_the_light_of_the_room_as_paths_have_it():
     hours = AnnualSky(
         whole, np.array([[0, -0.8, 0.6]]), np.zeros(1), np.arange(1), 1, np.zeros_like(whole)
     )
-    few = Sampling(
-        sensor_samples=65_536, patch_samples=8_192, hour_samples=262_144, subdivision=1
-    )
+    few = Sampling(sensor_samples=65_536, patch_samples=8_192, hour_samples=262_144, subdivision=1)
     found = {}
     for back in (0.0, 0.4):
         system = [[mirror_glass(back)]]
