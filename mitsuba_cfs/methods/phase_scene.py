@@ -31,7 +31,6 @@ INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path
 CELL_SHARE = 0.06  # paths of the cells that a group's parts follow from, of those of its D
 EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room, in each batch
 PART_BATCHES = 2  # of D where groups are cut
-PART_SHARE = 2  # most paths of the parts' D, of those of the whole groups'
 
 
 class PhaseScene:
@@ -156,7 +155,7 @@ class PhaseScene:
         chosen, parts = self.sampling, self.parts.groups
         samples, batches = chosen.patch_samples, BATCHES
         if len(parts) > len(self.scene.groups):  # at about the cost of the whole groups
-            samples = min(samples, PART_SHARE * samples * len(self.scene.groups) // len(parts))
+            samples = samples * len(self.scene.groups) // len(parts)
             batches = PART_BATCHES
         return daylight_matrix(
             self.scene.exterior,

@@ -93,6 +93,7 @@ def read_year(
     sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
     progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
+    chosen.append(options.window_parts)
     # corrections change rooms and surroundings, as --join does, under the same GUID
     corrections = corrections_file(options.building)
     hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
