@@ -66,7 +66,7 @@ class BsdfOptics:
     def reflection(self) -> NDArray[np.float64] | None:
         """See `SystemOptics`."""
         back = self._coarse.filled().reflection_back
-        return back * self._coarse.basis_in.projected_solid_angles()
+        return None if back is None else back * self._coarse.basis_in.projected_solid_angles()
 
 
 @dataclass(frozen=True)
