@@ -5,9 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
+from mitsuba_cfs.bsdf.glazing import uncoated_values
 from mitsuba_cfs.bsdf.klems import KlemsBasis
+
+FLOAT_GLASS = (0.89, 0.08)  # transmittance and reflectance of the pane whose fall panes are given
+SPECULAR = 0.95  # share of what passes, that the beam of a specular system has at least
+EVEN = 0.02  # relative spread of the beam round a ring, of a system that all azimuths are alike to
+STEEPEST = 12.0  # exponent
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +45,47 @@ def through_peak(
     peaked = straight > contrast * level
     excess = np.where(peaked, straight - level, 0.0)
     return ThroughPeak(excess * basis.projected_solid_angles(), block - np.diag(excess))
+
+
+def specular_fall(theta: ArrayLike, exponent: float) -> NDArray[np.float64]:
+    """Transmittance [..] relative to normal incidence, of panes that neither scatter nor bend.
+
+    That of a pane of float glass by Fresnel's equations, to a power: 1 for a pane, 2 for two.
+    """
+    tau, _ = uncoated_values(*FLOAT_GLASS, theta)
+    return (tau / FLOAT_GLASS[0]) ** exponent
+
+
+def ring_falls(basis: KlemsBasis, exponent: float, *, steps: int = 256) -> NDArray[np.float64]:
+    """Means [R] of `specular_fall` over the rings of a basis, in cos(theta) d_omega."""
+    sine2 = np.sin(basis.theta_bounds) ** 2
+    place = (np.arange(steps) + 0.5) / steps
+    theta = np.arcsin(np.sqrt(sine2[:-1, None] + np.diff(sine2)[:, None] * place))
+    return specular_fall(theta, exponent).mean(axis=1)
+
+
+def specular_exponent(peak: ThroughPeak, basis: KlemsBasis) -> float | None:
+    """The exponent of `specular_fall` that the last two rings of a beam have; None if not specular.
+
+    A ring's value is its mean, and the mean of the last one, 75 to 90 degrees, says little of the
+    fall within it: clear glass passes 0.68 at 75 degrees, nothing at 90.
+    """
+    omega = basis.projected_solid_angles()
+    whole = float(omega @ (peak.transmittance + omega @ peak.scattered))
+    if not whole > 0 or omega @ peak.transmittance < SPECULAR * whole:
+        return None
+    last = [peak.transmittance[basis.rings == r] for r in range(len(basis.phi_counts))[-2:]]
+    if min(ring.min() for ring in last) <= 0 or any(np.std(r) > EVEN * r.mean() for r in last):
+        return None
+    ratio = last[1].mean() / last[0].mean()
+
+    def excess(exponent: float) -> float:
+        falls = ring_falls(basis, exponent)
+        return float(falls[-1] / falls[-2]) - ratio
+
+    if excess(0.0) <= 0 or excess(STEEPEST) >= 0:
+        return None
+    return float(brentq(excess, 0.0, STEEPEST, xtol=1e-6))
 
 
 def neighbours(basis: KlemsBasis) -> list[NDArray[np.int64]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -32,6 +32,10 @@ class SystemOptics(Protocol):
     def paths(self) -> PathOptics:
         """What paths meet, from either side."""
 
+    @property
+    def reflection(self) -> NDArray[np.float64] | None:
+        """Radiance back into the room for radiance from it [K out, K in]; None: black."""
+
 
 States = Sequence[SystemOptics]  # of a window group, such as from open to closed
 
@@ -58,6 +62,12 @@ class BsdfOptics:
         """See `SystemOptics`."""
         return lit_system(self._fine)
 
+    @cached_property
+    def reflection(self) -> NDArray[np.float64] | None:
+        """See `SystemOptics`."""
+        back = self._coarse.filled().reflection_back
+        return None if back is None else back * self._coarse.basis_in.projected_solid_angles()
+
 
 @dataclass(frozen=True)
 class GivenOptics:
@@ -66,6 +76,7 @@ class GivenOptics:
     transmission: NDArray[np.float64] | None = None  # [K, K]
     scattering: Scattering | None = None
     paths: PathOptics | None = None
+    reflection: NDArray[np.float64] | None = None  # [K, K]
 
 
 def hourly_states(state: ArrayLike | None, groups: int, hours: int) -> NDArray[np.int64]:
@@ -80,6 +91,15 @@ def hourly_states(state: ArrayLike | None, groups: int, hours: int) -> NDArray[n
     if rows.shape != (groups, hours):
         raise ValueError(f"state {rows.shape}: expected [{groups}, {hours}]")
     return rows
+
+
+def combinations(
+    rows: NDArray[np.int64],
+) -> Iterator[tuple[tuple[int, ...], NDArray[np.int64]]]:
+    """Each combination of the states [G] of some hours [G, L], and the hours that have it."""
+    kinds, kind = np.unique(rows, axis=1, return_inverse=True)
+    for i, combination in enumerate(kinds.T):
+        yield tuple(combination.tolist()), np.flatnonzero(kind.ravel() == i)
 
 
 def in_state(systems: Sequence[States], state: Sequence[int]) -> list[SystemOptics]:

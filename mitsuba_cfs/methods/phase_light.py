@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
-from mitsuba_cfs.methods.optics import States, hourly_states, in_state
+from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.straight_views import StraightViews
+from mitsuba_cfs.methods.subdivision import coarse_sky
+from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -36,6 +39,8 @@ class PhaseSystems:
             raise ValueError(f"systems of {len(systems)} groups for {len(traced.scene.groups)}")
         self.traced, self.systems = traced, systems
         self._seen: dict[tuple[int, ...], tuple[PictureSun, OutdoorCoefficients]] = {}
+        self.straight = StraightViews(traced, systems)
+        self.mirrored = WindowReflection(traced)
 
     @property
     def states(self) -> int:
@@ -46,20 +51,33 @@ class PhaseSystems:
         """The light of the sky's hours."""
         return PhaseLight(self, sky, progress)
 
+    def optics(self, state: Sequence[int]) -> list[SystemOptics]:
+        """The optics of each part [Q] of the window groups, with each group in a state [G]."""
+        found = in_state(self.systems, state)
+        return [found[g] for g in self.traced.parts.group]
+
     def coefficients(self, state: int = 0) -> NDArray[np.float64]:
-        """V T D [S, P]: illuminance of each sensor per unit luminance of each sky patch."""
-        optics = in_state(self.systems, [state] * len(self.systems))
+        """Illuminance of each sensor per unit luminance of each sky patch [S, P].
+
+        V T D, with what windows reflect, and the straight view of groups that are cut.
+        """
+        optics = self.optics([state] * len(self.systems))
         view, daylight = self.traced.sensors.values, self.traced.daylight.values
         through = np.stack([o.transmission @ d for o, d in zip(optics, daylight, strict=True)])
-        count = len(self.traced.scene.points)
-        return np.einsum("sgk,gkp->sp", view[:count], through, optimize=True)
+        found = np.einsum("sqk,qkp->sp", view, through, optimize=True)
+        if self.mirrored.reflects(optics):
+            found += self.mirrored.sensors(optics) @ through.reshape(-1, through.shape[-1])
+        for g in range(len(self.systems)):
+            found += self.straight.coefficients(g, min(state, len(self.systems[g]) - 1))
+        return found[: len(self.traced.scene.points)]
 
     def seen_sun(self, state: tuple[int, ...]) -> tuple[PictureSun, OutdoorCoefficients]:
         """The sun and the outdoors in the view's pixels, with each group in a state."""
         if state not in self._seen:
             scene, chosen = self.traced.scene, self.traced.sampling
-            scattering = [o.scattering for o in in_state(self.systems, state)]
-            around = scene.interior, scene.exterior, scene.groups, scattering, scene.view
+            scattering = [o.scattering for o in self.optics(state)]
+            parts = self.traced.parts.groups
+            around = scene.interior, scene.exterior, parts, scattering, scene.view
             self._seen[state] = PictureSun(*around), outdoors(
                 *around, subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
                 seed=chosen.seed,
@@ -69,7 +87,7 @@ class PhaseSystems:
 
 @dataclass(frozen=True, slots=True)
 class WindowLight:
-    """The luminance of a window group towards the room in one state."""
+    """The luminance of a part of a window group towards the room in one state."""
 
     whole: NDArray[np.float32]  # [K, L] T D s [cd/m2]
     sun: NDArray[np.float32] | None  # [K, L] T D_d s_d, the sun alone
@@ -108,14 +126,15 @@ class PhaseLight:
 
     @cached_property
     def windows(self) -> list[list[WindowLight]]:
-        """Luminance of each window group in each of its states."""
+        """Luminance of each part [Q] of the window groups in each of its states."""
         daylight, sky, found = self._traced.daylight.values, self.sky, []
-        for g, states in enumerate(self.filled.systems):
-            T, D = [s.transmission for s in states], [daylight[g]] * len(states)
+        for q, g in enumerate(self._traced.parts.group):
+            states = self.filled.systems[g]
+            T, D = [s.transmission for s in states], [daylight[q]] * len(states)
             whole = phases.room_side_radiance(T, D, sky.whole).astype(np.float32)
             sun: Sequence = [None] * len(states)
             if self._traced.five_phase:
-                D = [self._traced.direct_daylight[g]] * len(states)
+                D = [self._traced.direct_daylight[q]] * len(states)
                 sun = phases.room_side_radiance(T, D, sky.sun).astype(np.float32)
             found.append([WindowLight(*pair) for pair in zip(whole, sun, strict=True)])
         return found
@@ -147,18 +166,47 @@ class PhaseLight:
     def relative_error(self, state: State | None = None) -> NDArray[np.float64]:
         """Standard error of each sensor's mean over the hours [S], from the tracing.
 
-        The errors of different window groups are taken as independent.
+        The errors of the parts of the window groups are taken as independent.  What D as a mean
+        over a part leaves is among them (`mitsuba_cfs.methods.subdivision`).
         """
         state, variance = self._state(state), 0.0
+        luminance = self._window_luminance("whole", state)
+        for q, part in enumerate(luminance):
+            variance = (
+                variance + self._traced.sensors.part(np.s_[:, q]).error_of(part.mean(-1)) ** 2
+            )
         for g, row in enumerate(state):
-            mean = self._window_luminance("whole", state)[g].mean(axis=-1)
-            tracing = self._traced.sensors.part(np.s_[:, g]).error_of(mean)
+            variance = variance + self._subdivision_error(g, row) ** 2
             share = np.bincount(row, minlength=len(self.sensors[g])) / len(row)
             sun = sum(w * s.sun_error for w, s in zip(share, self.sensors[g], strict=True))
-            variance = variance + tracing**2 + (sun / len(row)) ** 2
+            variance = variance + (sun / len(row)) ** 2
         mean = self._of_all(state).mean(axis=1)
         error = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
         return error[: len(self._traced.scene.points)]
+
+    def _subdivision_error(self, g: int, row: NDArray[np.int64]) -> NDArray[np.float64]:
+        """What D as a mean over the parts of a group changes in each sensor's mean [S]."""
+        points, normals = self._traced.scene.sensors()
+        found, straight = np.zeros(len(points)), 0.0
+        if not self._traced.parts.cells:
+            return found
+        for j, optics in enumerate(self.filled.systems[g]):
+            sky = self._diffuse_sky[:, row == j].sum(axis=1, keepdims=True) / len(row)
+            if not sky.any():
+                continue
+            through, seen = optics.transmission, self.filled.straight.matrix(g, j)
+            if seen is not None:
+                through = through - np.diag(self.filled.straight.beam(g, j))
+                mean = self.sky.whole[:, row == j].sum(axis=1) / len(row)
+                straight = straight + seen.error_of(mean) ** 2
+            found += self._traced.parts.cells[g].error(points, normals, through, sky)[:, 0]
+        return np.sqrt(found**2 + straight)
+
+    @cached_property
+    def _diffuse_sky(self) -> NDArray[np.float64]:
+        """The skies that D passes straight to the sensors, on Reinhart's sky of MF 1 [P, L]."""
+        sky = self.sky.without_sun() if self._traced.five_phase else self.sky.whole
+        return coarse_sky(sky, self._traced.sampling.subdivision)
 
     def pictures(
         self, hours: NDArray[np.int64], state: Sequence[int], *, direct: bool = False
@@ -172,10 +220,13 @@ class PhaseLight:
         matrices, daylight = traced.view, traced.daylight.values
         if direct:
             matrices, daylight = traced.direct_view, traced.direct_daylight
-            T = [o.transmission for o in in_state(self.filled.systems, state)]
+            T = [o.transmission for o in self.filled.optics(state)]
             luminance = phases.room_side_radiance(T, daylight, sky.whole[:, hours])
         else:
             luminance = self._window_luminance("whole", rows, hours)
+            optics = self.filled.optics(state)
+            if self.filled.mirrored.reflects(optics):
+                luminance = luminance + self.filled.mirrored.windows(optics, luminance)
         if not traced.five_phase:
             return matrices.three_phase(luminance)
         sun, seen = self.filled.seen_sun(tuple(int(j) for j in state))
@@ -193,12 +244,26 @@ class PhaseLight:
         return found
 
     def _sensor_light(self, g: int, j: int, exact: list[Estimate | None]) -> SensorLight:
-        traced, sky, window = self._traced, self.sky, self.windows[g][j]
-        view = traced.sensors.values[:, g]
+        diffuse = sum(self._diffuse_light(q, g, j) for q in self._traced.parts.of(g))
+        diffuse = diffuse + self.filled.straight.light(g, j, self.sky)
+        if not self._traced.five_phase:
+            return SensorLight(diffuse, None, 0.0)
+        sun, shining = np.zeros_like(diffuse), self._shining()
+        if exact[j] is None:
+            return SensorLight(diffuse, sun, 0.0)
+        luminance = self.sky.illuminance[shining] / SUN_SOLID_ANGLE
+        found = exact[j].part(np.s_[g])
+        sun[:, shining] = found.values * luminance
+        return SensorLight(diffuse, sun, found.error_of(luminance))
+
+    def _diffuse_light(self, q: int, g: int, j: int) -> NDArray[np.float64]:
+        """What a part of a group gives to the sensors [S, L] but for the sun straight."""
+        traced, sky, window = self._traced, self.sky, self.windows[q][j]
+        view = traced.sensors.values[:, q]
         three_phase = view @ window.whole
         if not traced.five_phase:
-            return SensorLight(three_phase, None, 0.0)
-        direct = traced.direct_sensors[:, g]
+            return three_phase
+        direct = traced.direct_sensors[:, q]
         optics = self.filled.systems[g][j]
         ways, groups = [optics.scattering], traced.scene.groups[g : g + 1]
         three_phase = three_phase - direct @ window.sun
@@ -209,16 +274,10 @@ class PhaseLight:
                 [optics.transmission],
                 beams,
                 through_beams(groups, ways, sky.direction),
-                traced.direct_daylight[g : g + 1],
+                traced.direct_daylight[q : q + 1],
                 sky.sun,
             )
-        sun, shining = np.zeros_like(three_phase), self._shining()
-        if exact[j] is None:
-            return SensorLight(three_phase, sun, 0.0)
-        luminance = sky.illuminance[shining] / SUN_SOLID_ANGLE
-        found = exact[j].part(np.s_[g])
-        sun[:, shining] = found.values * luminance
-        return SensorLight(three_phase, sun, found.error_of(luminance))
+        return three_phase
 
     def _exact_sun(self) -> list[Estimate | None]:
         """C_ds [G, S, Q] of the hours in which the sun shines on a window, in each state [J]."""
@@ -252,9 +311,22 @@ class PhaseLight:
         """Illuminance of sensors and eye [S + 1, L] by all groups."""
         rows = list(enumerate(self._state(state)))
         diffuse = sum(self._chosen(g, "diffuse", row) for g, row in rows)
+        diffuse = diffuse + self._reflected(state)
         if not self._traced.five_phase:
             return diffuse
         return np.maximum(diffuse, 0.0) + sum(self._chosen(g, "sun", row) for g, row in rows)
+
+    def _reflected(self, state: State | None) -> NDArray[np.float64] | float:
+        """What the windows reflect of the room's light to sensors and eye [S + 1, L]."""
+        rows, mirrored, found = self._state(state), self.filled.mirrored, None
+        for kind, hours in combinations(rows):
+            optics = self.filled.optics(kind)
+            if mirrored.reflects(optics):
+                window = self._window_luminance("whole", rows[:, hours], hours)
+                added = mirrored.sensors(optics) @ window.reshape(-1, len(hours))
+                found = np.zeros((len(added), rows.shape[1])) if found is None else found
+                found[:, hours] = added
+        return 0.0 if found is None else found
 
     def _chosen(self, g: int, name: str, row: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """What a group gives [S, L] in the state of each hour [L]."""
@@ -269,14 +341,14 @@ class PhaseLight:
     def _window_luminance(
         self, name: str, rows: NDArray[np.int64], hours: NDArray[np.int64] | None = None
     ) -> NDArray[np.float32]:
-        """Luminance [G, K, n] of the windows in some hours [n], in the state [G, n] of each."""
+        """Luminance [Q, K, n] of the windows in some hours [n], in the state [G, n] of each."""
         hours = np.arange(len(self.sky.lit)) if hours is None else hours
         found = []
-        for group, row in zip(self.windows, rows, strict=True):
-            states = np.minimum(row, len(group) - 1)
-            values = np.empty((len(group[0].whole), len(hours)), dtype=np.float32)
+        for light, g in zip(self.windows, self._traced.parts.group, strict=True):
+            states = np.minimum(rows[g], len(light) - 1)
+            values = np.empty((len(light[0].whole), len(hours)), dtype=np.float32)
             for j in np.unique(states):
-                values[:, states == j] = getattr(group[j], name)[:, hours[states == j]]
+                values[:, states == j] = getattr(light[j], name)[:, hours[states == j]]
             found.append(values)
         return np.stack(found)
 

@@ -14,19 +14,30 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.subdivision import CellLight, Parts, subdivided
 from mitsuba_cfs.methods.view_cache import kept_view
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
+from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
+from mitsuba_cfs.trace.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.view_matrix import view_matrix
+from mitsuba_cfs.trace.window_exchange import window_exchange
+from mitsuba_cfs.window_parts import window_cells
 
 BATCHES = 8  # independent repetitions that the standard errors come from
 INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path
+CELL_SHARE = 0.06  # paths of the cells that a group's parts follow from, of those of its D
+EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room, in each batch
+PART_BATCHES = 2  # of D where groups are cut
 
 
 class PhaseScene:
-    """The matrices of a scene, each traced when it is first asked for, or found in the cache."""
+    """The matrices of a scene, each traced when it is first asked for, or found in the cache.
+
+    They are those of the parts Q of the window groups; an open site has one part for each group.
+    """
 
     def __init__(
         self,
@@ -53,7 +64,7 @@ class PhaseScene:
             cache=self.cache,
             progress=self.progress if progress is None else progress,
         )
-        for name in ("daylight", "direct_daylight"):
+        for name in ("parts", "daylight", "direct_daylight"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
         return other
@@ -70,26 +81,60 @@ class PhaseScene:
             getattr(self, name)
 
     @cached_property
+    def parts(self) -> Parts:
+        """The window groups, cut where what stands outdoors is not the same before all of them."""
+        scene, chosen = self.scene, self.sampling
+        if not len(scene.exterior.triangles) or not scene.groups:
+            return Parts.whole(scene.groups)
+        cells = [window_cells(group) for group in scene.groups]
+        paths = CELL_SHARE * chosen.patch_samples * len(cells) / sum(len(c.area) for c in cells)
+        found = cell_daylight(
+            scene.exterior,
+            scene.groups,
+            cells,
+            samples=max(round(paths / CELL_BATCHES), 1),
+            max_depth=OUTDOOR_DEPTH,
+            seed=chosen.seed,
+            cache=self.cache,
+        )
+        lights = map(CellLight, scene.groups, cells, found)
+        return Parts.of_cells(subdivided(light, chosen.window_parts or None) for light in lights)
+
+    @cached_property
     def daylight(self) -> Estimate:
-        """D [G, K, P]."""
+        """D [Q, K, P]."""
         return self._daylight(OUTDOOR_DEPTH, 0.0, 0.2)
 
     @cached_property
     def direct_daylight(self) -> NDArray[np.float64]:
-        """D_d [G, K, P]: what comes straight from the sky; a part of D."""
+        """D_d [Q, K, P]: what comes straight from the sky; a part of D."""
         if not len(self.scene.exterior.triangles):  # nothing outdoors reflects
             return self.daylight.values
         return self._daylight(1, 0.2, 0.3).values
 
     @cached_property
     def sensors(self) -> Estimate:
-        """V [S, G, K] of the scene's sensors."""
+        """V [S, Q, K] of the scene's sensors."""
         return self._sensors(INDOOR_DEPTH, 0.3, 0.9)
 
     @cached_property
     def direct_sensors(self) -> NDArray[np.float64]:
-        """V_d [S, G, K]: what comes straight from the windows; a part of V."""
+        """V_d [S, Q, K]: what comes straight from the windows; a part of V."""
         return self._sensors(1, 0.9, 1.0).values
+
+    @cached_property
+    def exchange(self) -> NDArray[np.float64]:
+        """W [Q, K, Q * K]: what the windows see of the room that they light."""
+        parts = self.parts.groups
+        return window_exchange(
+            self.scene.interior,
+            parts,
+            samples=max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8),
+            max_depth=INDOOR_DEPTH,
+            stopping=Stopping(batches=2),
+            seed=self.sampling.seed,
+            cache=self.cache,
+        ).values
 
     @cached_property
     def view(self) -> ViewMatrices:
@@ -107,14 +152,18 @@ class PhaseScene:
         return GlareView(self.scene.view)
 
     def _daylight(self, depth: int, start: float, end: float) -> Estimate:
-        chosen = self.sampling
+        chosen, parts = self.sampling, self.parts.groups
+        samples, batches = chosen.patch_samples, BATCHES
+        if len(parts) > len(self.scene.groups):  # at about the cost of the whole groups
+            samples = samples * len(self.scene.groups) // len(parts)
+            batches = PART_BATCHES
         return daylight_matrix(
             self.scene.exterior,
-            self.scene.groups,
+            parts,
             subdivision=chosen.subdivision,
-            samples=max(chosen.patch_samples // BATCHES, 1),
+            samples=max(samples // batches, 1),
             max_depth=depth,
-            stopping=Stopping(batches=BATCHES),
+            stopping=Stopping(batches=batches),
             seed=chosen.seed,
             progress=part(self.progress, start, end, "daylight"),
             cache=self.cache,
@@ -124,7 +173,7 @@ class PhaseScene:
         chosen = self.sampling
         return view_matrix(
             self.scene.interior,
-            self.scene.groups,
+            self.parts.groups,
             *self.scene.sensors(),
             samples=max(chosen.sensor_samples // BATCHES, 1),
             max_depth=depth,
@@ -138,14 +187,15 @@ class PhaseScene:
         scene, chosen = self.scene, self.sampling
         if scene.view is None:
             raise ValueError("the scene has no view to make pictures of")
-        inputs = scene.interior, tuple(scene.groups), chosen.view_samples, chosen.seed, depth
+        parts = self.parts.groups
+        inputs = scene.interior, parts, chosen.view_samples, chosen.seed, depth
         return kept_view(
             self.cache,
             scene.view,
             (variants.activate(), *inputs),
             lambda: view_matrices(
                 scene.interior,
-                scene.groups,
+                parts,
                 scene.view,
                 samples=chosen.view_samples,
                 seed=chosen.seed,

@@ -17,5 +17,6 @@ class Sampling:
     picture_samples: int = 16  # point-in-time: paths of a pixel under one sky
     hour_samples: int = 2_048  # point-in-time: paths of a sensor under one sky
     subdivision: int = 4  # Reinhart's MF
+    window_parts: int = 0  # of each group; 0: as many as what stands outdoors asks for
     memory: float = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
     seed: int = 0

@@ -54,10 +54,12 @@ class DirectionBins:
         place = dr.select(place >= whole, place - whole, place)
         return dr.gather(mi.UInt32, self._first, ring) + mi.UInt32(place)
 
-    def between(self, values: mi.Float, local: mi.Vector3f) -> mi.Float:
+    def between(self, values: mi.Float, local: mi.Vector3f, *, ends: bool = True) -> mi.Float:
         """Transmittance at local direction(s) with z > 0 from those of the patches' middles [K].
 
-        Linear in polar angle between the rings and in azimuth within a ring; 0 at 90 degrees.
+        Linear in polar angle between the rings and in azimuth within a ring.
+
+        Args: ends: from the last ring on it falls to 0 at 90 degrees; false: it stays.
         """
         theta = dr.atan2(dr.norm(mi.Vector2f(local.x, local.y)), local.z)
         ring = mi.UInt32(0)
@@ -69,7 +71,7 @@ class DirectionBins:
         turn = dr.atan2(-local.y, local.x) * dr.inv_two_pi
         inner = self._within_ring(values, ring, turn)
         outer = self._within_ring(values, dr.select(last, ring, ring + 1), turn)
-        return dr.lerp(inner, dr.select(last, 0.0, outer), share)
+        return dr.lerp(inner, dr.select(last, 0.0, outer) if ends else outer, share)
 
     def _within_ring(self, values: mi.Float, ring: mi.UInt32, turn: mi.Float) -> mi.Float:
         """Linear between the two patches of a ring next to an azimuth [turns]."""

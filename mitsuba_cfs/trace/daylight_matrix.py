@@ -30,10 +30,12 @@ def add_daylight_paths(
     sky: SkyBins,
     matrix: mi.Float64,  # [rows * P], accumulated in place
     starts: PathStarts,  # on the window or the sensor, outdoors
+    weight: mi.Float | None = None,  # of each path, 1 by default
 ) -> None:
     """Follow each path to the sky, where the patch it meets gains the product of reflectances."""
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
+    weight = mi.Float(1.0 if weight is None else weight)
     beta = mi.Float(1.0)
     depth = mi.UInt32(0)
     while active:
@@ -41,7 +43,7 @@ def add_daylight_paths(
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         free = active & ~hit.is_valid()
         slot = row * mi.UInt32(sky.size) + sky.index(direction)
-        dr.scatter_add(matrix, mi.Float64(beta), slot, free)
+        dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
 
         position, face, reflectance = tracer.surface_at(hit, position, direction, active)
@@ -82,14 +84,17 @@ def daylight_matrix(
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
-    tracer = TracedScene(surfaces, groups, windows_block=False)
+    something = len(surfaces.triangles) > 0  # light comes back to the windows
+    tracer = TracedScene(surfaces, groups, windows_block=something)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     n = int(samples)
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         depth = dr.opaque(mi.UInt32, max_depth)
+        clear = tracer.outward(mi.Int32(paths.group), mi.Bool(True)) if something else 0.0
+        place = mi.Point3f(paths.position + clear)
         starts = PathStarts(
-            paths.patch, paths.position, paths.outward, paths.generator, depth, mi.Bool(True)
+            paths.patch, place, paths.outward, paths.generator, depth, mi.Bool(True)
         )
         add_daylight_paths(tracer, sky, matrix, starts)
 

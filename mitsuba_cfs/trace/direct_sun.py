@@ -19,6 +19,7 @@ from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.lit_room import PatchBeam
 from mitsuba_cfs.trace.sampling import lattice, lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
@@ -48,13 +49,20 @@ class KlemsScattering:
     """
 
     def __init__(
-        self, basis: KlemsBasis, scattered: NDArray[np.float64], through: NDArray[np.float64]
+        self,
+        basis: KlemsBasis,
+        scattered: NDArray[np.float64],
+        through: NDArray[np.float64],
+        exponent: float | None = None,
     ) -> None:
-        """From BSDF values [K out, K in] [1/sr] without the peak, and the peak's share [K in]."""
+        """From BSDF values [K out, K in] [1/sr] without the peak, and the peak's share [K in].
+
+        Args: exponent: of the fall of a specular system, see `PatchBeam`.
+        """
         self._bins = DirectionBins(basis)
         self._values = mi.Float(np.ascontiguousarray(scattered, dtype=np.float32).ravel())
-        self._through = mi.Float(np.asarray(through, dtype=np.float32))
-        self.key = ("klems", basis, np.asarray(scattered), np.asarray(through))
+        self._through = PatchBeam(basis, through, exponent)
+        self.key = ("klems", basis, np.asarray(scattered), np.asarray(through), exponent or -1.0)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
@@ -63,7 +71,7 @@ class KlemsScattering:
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
-        return self._bins.between(self._through, sun)
+        return self._through.at(sun)
 
 
 class PluginScattering:

@@ -103,23 +103,26 @@ def _block(
         x = (pixels % view.width + dx) / view.width
         y = 1.0 - (pixels // view.width + dy) / view.height
         directions, exists = rays(view, x, y)
-        _picture_paths(
+        add_picture_paths(
             tracer,
             bins,
             matrix,
             eye,
             mi.Vector3f(directions.T.astype(np.float32)),
             mi.Bool(exists),
-            pixel=number,
+            row=dr.arange(mi.UInt32, dr.width(number)),
+            stream=number,
             sample=dr.opaque(mi.UInt32, j),
-            key=dr.opaque(mi.UInt32, (seed * 1_000_003 + j) & 0xFFFFFFFF),
+            generator=path_generator(
+                number, dr.opaque(mi.UInt32, (seed * 1_000_003 + j) & 0xFFFFFFFF)
+            ),
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
         dr.eval(matrix)
     return (matrix.numpy() / samples).astype(np.float32)
 
 
-def _picture_paths(
+def add_picture_paths(
     tracer: TracedScene,
     bins: DirectionBins,
     matrix: mi.Float64,
@@ -127,15 +130,15 @@ def _picture_paths(
     direction: mi.Vector3f,
     active: mi.Bool,
     *,
-    pixel: mi.UInt32,
+    row: mi.UInt32,
+    stream: mi.UInt32,  # of the stratified samples: a pixel
     sample: mi.UInt32,
-    key: mi.UInt32,
+    generator: mi.PCG32,
     max_depth: mi.UInt32,
 ) -> None:
-    """One path for each pixel: L = 1 of the patch seen directly, else rho / pi E of the surface."""
+    """One path for each lane: L = 1 of the patch seen directly, else rho / pi E of the surface."""
     K = mi.UInt32(bins.size)
     width = mi.UInt32(bins.size * len(tracer.groups))
-    row = dr.arange(mi.UInt32, dr.width(pixel))
     ray = mi.Ray3f(eye, direction)
     hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active = active & hit.is_valid()
@@ -157,8 +160,8 @@ def _picture_paths(
         face,
         beta=reflectance * dr.inv_pi,
         sample=sample,
-        stream=mi.sample_tea_32(pixel, mi.UInt32(0x1F123BB5))[0],
-        generator=path_generator(pixel, key),
+        stream=mi.sample_tea_32(stream, mi.UInt32(0x1F123BB5))[0],
+        generator=generator,
         max_depth=max_depth,
         active=active,
         carried=None,

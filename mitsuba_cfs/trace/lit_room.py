@@ -11,11 +11,14 @@ from numpy.typing import ArrayLike
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KlemsBasis
+from mitsuba_cfs.bsdf.klems_peak import ring_falls, specular_fall
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.scene import TracedScene
+
+FALL_STEPS = 4096  # of the table of a specular system's fall, in cosine
 
 
 class AngularBeam:
@@ -38,15 +41,26 @@ class AngularBeam:
 class PatchBeam:
     """A share of light that keeps its beam, between the Klems patches of the outdoor direction."""
 
-    def __init__(self, basis: KlemsBasis, values: ArrayLike) -> None:
-        """From the shares [K]."""
-        self._bins = DirectionBins(basis)
-        self._values = mi.Float(np.asarray(values, dtype=np.float32))
+    def __init__(self, basis: KlemsBasis, values: ArrayLike, exponent: float | None = None) -> None:
+        """From the shares [K].
+
+        Args: exponent: of a specular system's fall (`specular_exponent`): the shares are means
+            over its rings, and between their middles only what they differ from it by is linear.
+        """
+        self._bins, self._fall = DirectionBins(basis), None
+        values = np.asarray(values, dtype=float)
+        if exponent is not None:
+            cosine = np.linspace(0.0, 1.0, FALL_STEPS)
+            self._fall = AngularBeam(specular_fall(np.arccos(cosine), exponent))
+            values = values / ring_falls(basis, exponent)[basis.rings]
+        self._values = mi.Float(values.astype(np.float32))
 
     def at(self, local: mi.Vector3f) -> mi.Float:
         """Share at the local directions of light that passes along the line of `local`."""
         outward = dr.mulsign(local, local.z)
-        return self._bins.between(self._values, outward)
+        if self._fall is None:
+            return self._bins.between(self._values, outward)
+        return self._fall.at(outward) * self._bins.between(self._values, outward, ends=False)
 
 
 class PathOptics:

@@ -118,9 +118,8 @@ class TracedScene:
     def sample_group(self, group: int, u: mi.Point2f) -> mi.Point3f:
         """A point uniform over the area of one group's windows."""
         triangle, reused = self._group_choice[group].sample_reuse(u.x)
-        return self._point(
-            triangle + int(self._group_first[group]), mi.Point2f(reused, u.y), mi.Bool(True)
-        )
+        first = dr.opaque(mi.UInt32, int(self._group_first[group]))
+        return self._point(triangle + first, mi.Point2f(reused, u.y), mi.Bool(True))
 
     def window_triangle(
         self, triangle: mi.UInt32, origin: mi.Point3f

@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
-from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
@@ -24,7 +24,8 @@ def sun_scattering(bsdf: Bsdf) -> Scattering:
     if isinstance(bsdf, TensorTreeBsdf):
         return TreeScattering(bsdf)
     peak = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
-    return KlemsScattering(bsdf.basis_in, peak.scattered, peak.transmittance)
+    exponent = specular_exponent(peak, bsdf.basis_in)
+    return KlemsScattering(bsdf.basis_in, peak.scattered, peak.transmittance, exponent)
 
 
 def lit_system(bsdf: Bsdf) -> PathOptics:
@@ -39,7 +40,8 @@ def lit_system(bsdf: Bsdf) -> PathOptics:
     front = through_peak(full.transmission_front, bsdf.basis_in)
     back = through_peak(full.transmission_back, bsdf.basis_in)
     rest = replace(full, transmission_front=front.scattered, transmission_back=back.scattered)
-    return PathOptics(_loaded(klems_plugin(rest)), PatchBeam(bsdf.basis_in, front.transmittance))
+    beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
+    return PathOptics(_loaded(klems_plugin(rest)), beam)
 
 
 class TreeBeam:

@@ -19,6 +19,7 @@ from scenes.commands.room_options import (
     seed_option,
     size_option,
     space_option,
+    subdivide_option,
     system_option,
     view_option,
     weather_option,
@@ -64,6 +65,7 @@ _DEFAULT = YearOptions(Path(), Path())
     help="Pictures of each view's worst hours.",
 )  # fmt: skip
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
+@subdivide_option
 @seed_option
 @quick_option
 def command(

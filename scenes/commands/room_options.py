@@ -45,6 +45,10 @@ seed_option = click.option(
     show_default=True,
     help="Of the random numbers.",
 )  # fmt: skip
+subdivide_option = click.option(
+    "--subdivide", "window_parts", type=click.IntRange(0, 64), default=0, show_default=True,
+    help="Parts of each window group; 0: as many as what stands outdoors asks for.",
+)  # fmt: skip
 no_cache_option = click.option(
     "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."
 )

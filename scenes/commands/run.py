@@ -19,6 +19,7 @@ from scenes.commands.room_options import (
     seed_option,
     size_option,
     space_option,
+    subdivide_option,
     system_option,
     u_option,
 )
@@ -61,6 +62,7 @@ _DEFAULT = RoomOptions()
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
 @click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
+@subdivide_option
 @seed_option
 @no_cache_option
 @quick_option

@@ -108,6 +108,7 @@ NAMES = {
     "sensor_samples": ("sampling", "sensor_samples"),
     "patch_samples": ("sampling", "patch_samples"),
     "sun_points": ("sampling", "sun_points"),
+    "window_parts": ("sampling", "window_parts"),
     "annual_glare": ("outputs", "annual_glare"),
     "path_samples": ("sampling", "hour_samples"),
     "heat_step_s": ("", "heat_step_s"),

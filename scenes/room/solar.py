@@ -60,7 +60,7 @@ class RoomSun:
         omega = KLEMS_FULL.projected_solid_angles()
         if not self.outdoors.scene.groups:
             return np.zeros((0, len(omega), len(self.skies.lit)))
-        daylight = self.outdoors.daylight.values
+        daylight = self.outdoors.parts.of_groups(self.outdoors.daylight.values)
         return phases.window_radiance(daylight, self.skies.solar) * omega[:, None]
 
     @property

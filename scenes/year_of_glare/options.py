@@ -30,5 +30,6 @@ class YearOptions:
     occupied: tuple[int, int] = (8, 18)  # clock hours, every day
     worst: int = 3  # pictures of each view's worst hours
     hdr: bool = False  # the pictures as .hdr too
+    window_parts: int = 0  # of each group; 0: as many as what stands outdoors asks for
     seed: int = 0
     quick: bool = False  # said in the results; what it chooses is in `scenes.quick`

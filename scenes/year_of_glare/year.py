@@ -93,6 +93,7 @@ def read_year(
     sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
     progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
+    chosen.append(options.window_parts)
     # corrections change rooms and surroundings, as --join does, under the same GUID
     corrections = corrections_file(options.building)
     hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
@@ -111,7 +112,10 @@ def read_year(
 def sampling_of(options: YearOptions) -> Sampling:
     """How finely the year is computed."""
     memory = options.memory_gb * 2**30
-    return Sampling(view_samples=options.samples, memory=memory, seed=options.seed)
+    return Sampling(
+        view_samples=options.samples, memory=memory, window_parts=options.window_parts,
+        seed=options.seed,
+    )  # fmt: skip
 
 
 def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:

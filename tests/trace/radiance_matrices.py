@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from tests import radiance
 from tests.conftest import REPOSITORY
 
@@ -81,7 +82,7 @@ def view(name: str, folder: Path) -> Repeated:
 def daylight(name: str, folder: Path) -> Repeated:
     """D of the room's windows; [G, K, P]."""
     _, groups, outside = SCENES[name]()
-    radiance.write_surfaces(outside, folder / "outdoors.rad")
+    radiance.write_surfaces(with_black_windows(outside, groups), folder / "outdoors.rad")
     radiance.write_sky(folder / "sky.rad", 1)
     found = []
     for g, group in enumerate(groups):
@@ -96,6 +97,18 @@ def daylight(name: str, folder: Path) -> Repeated:
         runs = [radiance.read_float_matrix(radiance.run(command, folder)) for command in runs]
         found.append(np.stack(runs))
     return Repeated.of(np.stack(found, axis=1))
+
+
+def with_black_windows(outside: Surfaces, groups: Sequence[WindowGroup]) -> Surfaces:
+    """What stands outdoors and the windows, 2 mm behind the plane that the rays start on.
+
+    What comes back to a window is absorbed, as in ours: without it, it would pass through the room.
+    """
+    if not len(outside.triangles):
+        return outside
+    panes = [(w.triangles - 2e-3 * w.normal, 0.0) for g in groups for w in g.windows]
+    old = [(outside.triangles[[i]], r) for i, r in enumerate(outside.reflectance)]
+    return rooms.surfaces(old + panes)
 
 
 MATRICES: dict[str, Callable[[str, Path], Repeated]] = {"view": view, "daylight": daylight}

@@ -196,7 +196,7 @@ def corner():
     """Two window groups below a shade, three sensors, three suns before one or both of them."""
     room, groups, shade = rooms.l_shaped_room()
     points = np.array([[2.0, 1.0, 0.8], [1.0, 4.5, 0.8], [5.0, 4.5, 0.8]])
-    matrices = traced(room, shade, groups, points, subdivision=1)
+    matrices = traced(room, shade, groups, points, subdivision=1, window_parts=1)
     sky = ReinhartSky(1)
     facing = np.stack([sky.directions @ group.frame[2] for group in groups])
     facing[:, np.abs(sky.directions[:, 2] - 0.4) > 0.2] = -1
@@ -271,3 +271,60 @@ def test_the_suns_light_by_group_adds_up_to_that_of_the_room(corner):
         scene.normals, suns=sky.direction, stopping=Stopping(batches=4),
     )  # fmt: skip
     assert each.values[0] == pytest.approx(alone.values, rel=1e-6)
+
+
+def mirror_glass(back: float):
+    """Glass of 0.7 whose room side is a mirror, by phases and by paths."""
+    from mitsuba_cfs.bsdf.klems import KlemsBsdf
+    from mitsuba_cfs.methods.optics import BsdfOptics
+
+    through, mirror = np.diag(0.7 / OMEGA), np.diag(back / OMEGA)
+    return BsdfOptics(KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, np.zeros((K, K)), mirror))
+
+
+def test_windows_reflect_the_light_of_the_room_as_paths_have_it():
+    """A bright room with a front of glass that reflects 0.4 to it: a tenth of the back's light."""
+    from mitsuba_cfs.methods.path_light import PathSystems
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import DaylightScene
+    from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
+
+    w, d, h = 4.0, 5.0, 3.0
+    quads = [
+        rooms.quad((0, 0, 0), (w, 0, 0), (w, d, 0), (0, d, 0)),
+        rooms.quad((0, 0, h), (0, d, h), (w, d, h), (w, 0, h)),
+        rooms.quad((0, d, 0), (w, d, 0), (w, d, h), (0, d, h)),
+        rooms.quad((0, 0, 0), (0, d, 0), (0, d, h), (0, 0, h)),
+        rooms.quad((w, 0, 0), (w, 0, h), (w, d, h), (w, d, 0)),
+    ]
+    front = rooms.quad((0, 0, 0), (w, 0, 0), (w, 0, h), (0, 0, h))
+    groups = [WindowGroup("south", (WindowSurface("front", front),))]
+    points = np.array([[2.0, 1.0, 0.8], [2.0, 4.5, 0.8], [2.0, 4.9, 1.5]])
+    normals = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    interior = rooms.surfaces([(q, 0.7) for q in quads])
+    scene = DaylightScene(interior, rooms.NOTHING, groups, points, normals)
+    sky = ReinhartSky(1)
+    whole = np.full((sky.size, 1), 3000.0)
+    whole[0] = 600.0
+    hours = AnnualSky(
+        whole, np.array([[0, -0.8, 0.6]]), np.zeros(1), np.arange(1), 1, np.zeros_like(whole)
+    )
+    few = Sampling(sensor_samples=65_536, patch_samples=8_192, hour_samples=262_144, subdivision=1)
+    found = {}
+    for back in (0.0, 0.4):
+        system = [[mirror_glass(back)]]
+        paths = PathSystems(scene, system, few).light(hours).illuminance()
+        for five in (False, True):
+            light = PhaseSystems(PhaseScene(scene, few, five_phase=five), system).light(hours)
+            lit_by_phases = light.illuminance()
+            print(back, five, (lit_by_phases / paths).ravel(), light.relative_error())
+            # three errors of both, and a tenth of the gain: W is a mean over the whole front
+            np.testing.assert_allclose(lit_by_phases, paths, rtol=0.022 if back else 0.015)
+            factor = light.filled.coefficients() @ whole
+            np.testing.assert_allclose(factor, lit_by_phases, rtol=1e-5)
+        found[back] = lit_by_phases
+    gain = found[0.4] / found[0.0] - 1
+    print("gain by reflection", gain.ravel())
+    assert gain[1] > 0.1  # far above the tolerance: black windows would not pass

@@ -1,0 +1,95 @@
+"""The outdoors that sensors see straight through cut window groups, in place of V_d and D."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.methods.optics import States
+from mitsuba_cfs.methods.phase_scene import OUTDOOR_DEPTH, PhaseScene
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.trace.direct_sun import patch_beams
+from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.straight_view import straight_view_matrix
+
+BATCHES = 4
+SHARE = 4  # paths of a sensor for V, for each that looks straight through a cut group
+
+
+class StraightViews:
+    """What the straight beam of each cut group shows the sensors, in each of its states.
+
+        B s - V_d diag(tau) D s
+
+    is added to V T D s: behind an edge that not all points of the windows see alike, patches and
+    means blur what a beam shows.  A group that is not cut has nothing of it.
+    """
+
+    def __init__(self, traced: PhaseScene, systems: Sequence[States]) -> None:
+        """From the states of each window group [G]; nothing is traced yet."""
+        self._traced, self._systems = traced, systems
+        self._found: dict[tuple[int, int, bool], Estimate] = {}
+
+    def beam(self, g: int, j: int) -> NDArray[np.float64]:
+        """What of T's diagonal goes straight on, of a group in a state [K]."""
+        optics = self._systems[g][j]
+        through = patch_beams([optics.scattering], KLEMS_FULL)[0]
+        return np.minimum(through, np.diag(optics.transmission))
+
+    def matrix(self, g: int, j: int, *, direct: bool = False) -> Estimate | None:
+        """B of a group in a state [S, P]; None where there is nothing of it.
+
+        Args: direct: without what the outdoors reflects.
+        """
+        traced = self._traced
+        if len(traced.parts.of(g)) < 2 or not self.beam(g, j).any():
+            return None
+        if (g, j, direct) not in self._found:
+            scene, chosen = traced.scene, traced.sampling
+            ways: list = [None] * len(scene.groups)
+            ways[g] = self._systems[g][j].scattering
+            found = straight_view_matrix(
+                scene.interior, scene.exterior, scene.groups, ways, *scene.sensors(),
+                subdivision=chosen.subdivision,
+                samples=max(chosen.sensor_samples // SHARE // BATCHES, 1),
+                max_depth=1 if direct else OUTDOOR_DEPTH,
+                stopping=Stopping(batches=BATCHES), seed=chosen.seed, cache=traced.cache,
+            )  # fmt: skip
+            self._found[g, j, direct] = found.part(np.s_[g])
+        return self._found[g, j, direct]
+
+    def coefficients(self, g: int, j: int) -> NDArray[np.float64] | float:
+        """B - V_d diag(tau) D [S, P]."""
+        whole = self.matrix(g, j)
+        if whole is None:
+            return 0.0
+        return whole.values - self._in_patches(g, j, self._traced.daylight.values)
+
+    def light(self, g: int, j: int, sky: AnnualSky) -> NDArray[np.float64] | float:
+        """What a group in a state gives to the sensors in addition [S, L].
+
+        The sun itself is not among it where there are five phases.
+        """
+        whole = self.matrix(g, j)
+        if whole is None:
+            return 0.0
+        traced = self._traced
+        found = whole.values @ sky.whole - self._in_patches(g, j, traced.daylight.values, sky.whole)
+        if traced.five_phase:
+            direct = self.matrix(g, j, direct=True)
+            found -= direct.values @ sky.sun
+            found += self._in_patches(g, j, traced.direct_daylight, sky.sun)
+        return found
+
+    def _in_patches(
+        self, g: int, j: int, daylight: NDArray[np.float64], sky: NDArray | None = None
+    ) -> NDArray[np.float64]:
+        """V_d diag(tau) D [S, P], or with a sky's luminance [S, L]."""
+        beam, total = self.beam(g, j), 0.0
+        for q in self._traced.parts.of(g):
+            outside = daylight[q] if sky is None else daylight[q] @ sky
+            total = total + (self._traced.direct_sensors[:, q] * beam) @ outside
+        return total

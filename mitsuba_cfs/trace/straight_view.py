@@ -1,0 +1,108 @@
+"""What sensors see of the outdoors through the windows' straight beam, point by point.
+
+The phase methods have the outdoors in the patches of a Klems basis, 10 to 15 degrees wide, and as
+the mean over a window.  Behind clear glass a sensor sees the edge of a roof sharply.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.bins import SkyBins
+from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
+from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.random_walk import PathStarts
+from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.scene import TracedScene
+
+
+def straight_view_matrix(
+    interior: Surfaces,
+    exterior: Surfaces,
+    groups: Sequence[WindowGroup],
+    scattering: Sequence[Scattering | None],
+    points: ArrayLike,
+    directions: ArrayLike,
+    *,
+    subdivision: int = 4,
+    samples: int = 1024,
+    max_depth: int = 16,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
+) -> Estimate:
+    """Illuminance at each sensor per unit luminance of each sky patch [G, S, P] [sr, projected].
+
+        B[g, s, p] = integral over what s sees of g, of cosine tau(omega) R(x, omega, p) d omega
+
+    R is what leaves the outdoors along omega to x for a unit of the patch, all reflections there
+    included; the room reflects nothing.
+
+    Args:
+        scattering: how each group passes light; None for a group that is left out.
+        samples: points on each group for each sensor in each batch.
+        max_depth: 1: what the sky sends itself.
+    """
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    inside, outside = TracedScene(interior, groups), TracedScene(exterior, groups)
+    sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
+    place = mi.Point3f((points - inside.centre).T.astype(np.float32))
+    normal = mi.Vector3f(directions.T.astype(np.float32))
+
+    def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
+        matrix = dr.zeros(mi.Float64, S * sky.size)
+        count = dr.opaque(mi.UInt32, n)
+        lane = dr.arange(mi.UInt32, S * n)
+        sensor = lane // count
+        stream = mi.sample_tea_32(sensor, key ^ mi.UInt32(0x510E527F + g))[0]
+        target = inside.sample_group(g, lattice_2d(lane - sensor * count, stream, 0))
+        start = dr.gather(mi.Point3f, place, sensor)
+        to_target = target - start
+        distance = dr.norm(to_target)
+        omega = mi.Vector3f(to_target / distance)
+        local = inside.to_group(g, omega)
+        cosine = dr.dot(dr.gather(mi.Vector3f, normal, sensor), omega)
+        seen = (cosine > 0) & (local.z > 1e-4)
+        shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
+        seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
+        weight = cosine * local.z / dr.square(distance) * way.through(local)
+        step = mi.Vector3f(*map(float, groups[g].frame[2])) * outside.epsilon
+        starts = PathStarts(
+            sensor,
+            mi.Point3f(target + step),
+            omega,
+            path_generator(lane, key),
+            dr.opaque(mi.UInt32, max_depth),
+            seen & (weight > 0),
+        )
+        add_daylight_paths(outside, sky, matrix, starts, weight)
+        return matrix.numpy().reshape(S, sky.size) * (groups[g].area / n)
+
+    def batch(number: int) -> NDArray[np.float64]:
+        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        nothing = np.zeros((S, sky.size))
+        return np.stack(
+            [nothing if way is None else one_group(g, way, key) for g, way in enumerate(scattering)]
+        )
+
+    keys = [None if way is None else way.key for way in scattering]
+    return accumulate(
+        batch,
+        stopping=stopping,
+        label="straight view",
+        entry=cache_entry(
+            cache, "straight view", interior, exterior, groups, keys, points, directions,
+            subdivision, n, max_depth, seed, by=__name__, stopping=stopping,
+        ),
+    )  # fmt: skip

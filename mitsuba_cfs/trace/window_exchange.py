@@ -1,0 +1,72 @@
+"""What windows see of the room that they light themselves: for the light that they reflect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import mitsuba as mi
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.image import add_picture_paths
+from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
+
+
+def window_exchange(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    *,
+    basis: KlemsBasis = KLEMS_FULL,
+    samples: int = 128,
+    max_depth: int = 32,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
+) -> Estimate:
+    """Radiance that meets the windows from the room, per unit radiance of a patch [G, K, G * K].
+
+        I[g, k] = sum over g', k' of W[g, k, g' k'] L[g', k']
+
+    the mean over a group and over its back's incident patch k, the windows black.  A row sums to
+    the share of a patch's view, direct and reflected, that ends on the windows.
+
+    Args:
+        surfaces: what the room is made of, in the band of the radiances.
+        samples: paths for each patch in each batch.
+    """
+    tracer, bins, n = TracedScene(surfaces, groups), DirectionBins(basis), int(samples)
+    columns = len(groups) * bins.size
+
+    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+        normal = mi.Vector3f(*map(float, groups[paths.group].frame[2]))
+        # a back's incident patch lies before the window as the front's does, mirrored
+        inward = paths.outward - normal * (2 * dr.dot(normal, paths.outward))
+        path = dr.arange(mi.UInt32, dr.width(paths.patch))
+        add_picture_paths(
+            tracer,
+            bins,
+            matrix,
+            mi.Point3f(paths.position - normal * tracer.epsilon),
+            mi.Vector3f(inward),
+            mi.Bool(True),
+            row=paths.patch,
+            stream=paths.patch,
+            sample=path - paths.patch * dr.opaque(mi.UInt32, n),
+            generator=paths.generator,
+            max_depth=dr.opaque(mi.UInt32, max_depth),
+        )
+
+    return accumulate(
+        window_batches(tracer, bins, columns, n, seed, follow),
+        stopping=stopping,
+        label="window exchange",
+        entry=cache_entry(
+            cache, "window exchange", surfaces, groups, basis, n, max_depth, seed,
+            by=__name__, stopping=stopping,
+        ),
+    )  # fmt: skip
