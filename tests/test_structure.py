@@ -19,7 +19,7 @@ RANKS = {
         {"compiled", "directions", "errors", "llvm", "phases", "processes", "progress",
          "source_code"},
         {"files", "surfaces", "variants"},
-        {"bsdf", "images", "sky"},
+        {"bsdf", "images", "sky", "window_parts"},
         {"glare", "matrices", "metrics"},
         {"trace"},
         {"methods"},
