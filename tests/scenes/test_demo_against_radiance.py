@@ -6,6 +6,7 @@ D, the sky and the product are its own (rfluxmtx, gendaymtx, dctimestep).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -69,7 +70,10 @@ def test_year_of_illuminance(name, tmp_path):
     building = read_ifc(DEMO / "office.ifc")
     space = building.space(name)
     options = RoomOptions.of(method="three-phase", sensor_spacing=SPACING)
-    systems = in_all_windows(space, read_system(SYSTEM))
+    system = read_system(SYSTEM)
+    # windows are black from the room in Radiance's chain: with their reflection ours is 3 % above
+    black = replace(system.visible, reflection_back=np.zeros((145, 145)))
+    systems = in_all_windows(space, replace(system, visible=black))
     ours = compute_room(
         building, space, systems, read_weather(WEATHER), options, pictures=False
     ).daylight
