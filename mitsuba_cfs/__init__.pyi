@@ -45,7 +45,11 @@ from .methods.phase_scene import PhaseScene as PhaseScene
 from .methods.sampling import Sampling as Sampling
 from .methods.scene import DaylightScene as DaylightScene
 from .metrics.room import RoomMetrics as RoomMetrics, room_metrics as room_metrics
-from .sky.annual import AnnualSky as AnnualSky, annual_sky as annual_sky
+from .sky.annual import (
+    AnnualSky as AnnualSky,
+    annual_sky as annual_sky,
+    given_sky as given_sky,
+)
 from .sky.cie import cie_patches as cie_patches
 from .sky.matrix import sky_matrix as sky_matrix
 from .sky.patches import ReinhartSky as ReinhartSky
