@@ -38,7 +38,7 @@ from .matrices.cache import MatrixCache as MatrixCache
 from .matrices.mtx_io import read_matrix as read_matrix, write_matrix as write_matrix
 from .methods.by_name import traced_scene as traced_scene, with_systems as with_systems
 from .methods.glare import hourly_glare as hourly_glare, pictures as pictures
-from .methods.optics import BsdfOptics as BsdfOptics
+from .methods.optics import AngularOptics as AngularOptics, BsdfOptics as BsdfOptics
 from .methods.path_light import PathLight as PathLight, PathSystems as PathSystems
 from .methods.phase_light import PhaseLight as PhaseLight, PhaseSystems as PhaseSystems
 from .methods.phase_scene import PhaseScene as PhaseScene

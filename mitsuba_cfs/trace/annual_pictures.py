@@ -24,6 +24,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, flat
+from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
@@ -229,6 +230,19 @@ class FivePhasePictures:
 
     def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
+        values = self._values(batch)
+        self._sun.add_disc(values, self._directions[batch], self._illuminance[batch])
+        return values
+
+    def without_disc(
+        self, batch: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        discs = self._sun.discs(self._directions[batch], self._illuminance[batch])
+        return self._values(batch), discs
+
+    def _values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Luminance [h, n] without the sun's disc."""
         m, rest = self._matrices, self._rest[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength)

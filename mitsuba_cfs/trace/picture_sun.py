@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.picture_disc import disc_rays, disc_reach
+from mitsuba_cfs.trace.picture_disc import disc_in_view, disc_parts, disc_rays, disc_reach
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
@@ -89,19 +90,39 @@ class PictureSun:
             self._panes.append((pane, mi.Point3f(point + step), towards))
 
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
-        """Add the sun's luminance [cd/m2] to the pixels' values [h, n].
+        """Add the sun's light on surfaces and windows [cd/m2] to the pixels' values [h, n].
+
+        Its disc is apart: `add_disc`, `discs`.
 
         Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
         """
-        facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
-        lit = np.flatnonzero(facing & (illuminance > 0) & (suns[:, 2] > 0))
+        lit = self._shining(suns, illuminance)
         if not len(lit):
             return
         towards, strength = suns[lit], illuminance[lit]
         self._add(values, lit, self._surface, towards, strength, self._beam_on_surfaces)
         for g, (pane, _, _) in enumerate(self._panes):
             self._add(values, lit, pane, towards, strength, self._scattered_in_panes, g)
-        self._add_disc(values, lit, towards, strength)
+
+    def _shining(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.int64]:
+        """The hours in which the sun stands before a window."""
+        facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
+        return np.flatnonzero(facing & (illuminance > 0) & (suns[:, 2] > 0))
+
+    def discs(self, suns: NDArray, illuminance: NDArray) -> list[SunDisc | None]:
+        """The sun's disc [h] as the eye sees it through the straight beam, None where hidden."""
+        found: list[SunDisc | None] = [None] * len(suns)
+        lit = self._shining(suns, illuminance)
+        lit = lit[[disc_in_view(self._directions, suns[hour], self._size) for hour in lit]]
+        if not len(lit):
+            return found
+        ways = np.stack([disc_parts(suns[hour]) for hour in lit])
+        towards = mi.Vector3f(ways.reshape(-1, 3).T.astype(np.float32))
+        tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
+        tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
+        for hour, way, part in zip(lit, ways, tau, strict=True):
+            found[hour] = seen_disc(way, part * (illuminance[hour] / SUN_SOLID_ANGLE))
+        return found
 
     def _add(self, values, lit, columns, suns, strength, kernel, *options) -> None:
         """Add what a kernel gives for pairs of hours and pixels, some hours at a time."""
@@ -200,8 +221,10 @@ class PictureSun:
         hidden = self._outside.scene.ray_test(ray, coherent=False)
         return 1.0 - hidden.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
 
-    def _add_disc(self, values, lit, suns, strength) -> None:
-        """Add the sun's disc seen through the straight beam, by its share of each pixel."""
+    def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
+        """Add the disc as the eye sees it, by its share of each pixel; arguments of `add_to`."""
+        lit = self._shining(suns, illuminance)
+        suns, strength = suns[lit], illuminance[lit]
         reach = 2 * np.sin(disc_reach(self._size) / 2)
         near = self._tree.query_ball_point(suns, reach)
         hour = np.repeat(np.arange(len(lit)), [len(found) for found in near])
