@@ -51,8 +51,16 @@ class PictureMatrix:
                 "expected [m, N], [n], [n]"
             )
 
-    def add_to(self, values: NDArray[np.float32], luminance: NDArray[np.float32]) -> None:
-        """Add the pixels' luminance to values [h, n] under patch luminances [N, h]."""
+    def add_to(
+        self,
+        values: NDArray[np.float32],
+        luminance: NDArray[np.float32],
+        more: NDArray[np.float32] | None = None,
+    ) -> None:
+        """Add the pixels' luminance to values [h, n] under patch luminances [N, h].
+
+        Args: more: [m, h] luminance of the rows besides.
+        """
         across = np.ascontiguousarray(luminance.T, dtype=np.float32)
         of_rows = np.empty((len(values), len(self.rows)), dtype=np.float32)
         step = len(self.rows)
@@ -61,6 +69,8 @@ class PictureMatrix:
         for start in range(0, len(self.rows), step):
             rows = np.asarray(self.rows[start : start + step])
             np.matmul(across, rows.T, out=of_rows[:, start : start + step])
+        if more is not None:
+            of_rows += more.T
         for hour, found in zip(values, of_rows, strict=True):
             hour += found[self.row] * self.share
 

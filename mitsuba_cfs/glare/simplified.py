@@ -34,7 +34,7 @@ def direct_only(matrices: Matrices) -> Matrices:
     nothing = PictureMatrix(
         np.zeros((1, lit.rows.shape[1]), dtype=np.float32), np.zeros_like(lit.row), lit.share
     )
-    return replace(matrices, indirect=nothing)
+    return replace(matrices, indirect=nothing, elements=None)
 
 
 def enhanced_simplified_dgp(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
-from mitsuba_cfs.methods.optics import States, hourly_states, in_state
+from mitsuba_cfs.methods.optics import States, SystemOptics, hourly_states, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -73,6 +73,8 @@ class WindowLight:
 
     whole: NDArray[np.float32]  # [K, L] T D s [cd/m2]
     sun: NDArray[np.float32] | None  # [K, L] T D_d s_d, the sun alone
+    beam: NDArray[np.float32] | None  # [K, L] what of this goes straight on
+    beam_at_sun: NDArray[np.float32] | None  # [K, L] the same at the sun's own angle
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +93,7 @@ class PhaseLight:
         E = V T D s - V_d T D_d s_d + C_ds s_sun            five-phase
 
     with V T D s having the beam that the room reflects at the sun's own angle, as C_ds has it
-    (`mitsuba_cfs.phases.beam_at_sun_angle`).  V_d and D_d are traced with the seed and the samples
+    (`mitsuba_cfs.phases.sun_beams`).  V_d and D_d are traced with the seed and the samples
     of V and D: they are a part of them, entry by entry, and nothing gets negative.
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase); McNeil and
@@ -114,11 +116,26 @@ class PhaseLight:
             T, D = [s.transmission for s in states], [daylight[g]] * len(states)
             whole = phases.room_side_radiance(T, D, sky.whole).astype(np.float32)
             sun: Sequence = [None] * len(states)
+            beams: Sequence = [(None, None)] * len(states)
             if self._traced.five_phase:
                 D = [self._traced.direct_daylight[g]] * len(states)
                 sun = phases.room_side_radiance(T, D, sky.sun).astype(np.float32)
-            found.append([WindowLight(*pair) for pair in zip(whole, sun, strict=True)])
+                beams = [self._beams(g, optics) for optics in states]
+            lights = zip(whole, sun, beams, strict=True)
+            found.append([WindowLight(w, s, *both) for w, s, both in lights])
         return found
+
+    def _beams(self, g: int, optics: SystemOptics) -> tuple[NDArray[np.float32] | None, ...]:
+        """The sun's beam of a group by its patches and at its own angle; None without a beam."""
+        ways, sky = [optics.scattering], self.sky
+        patches = patch_beams(ways, KLEMS_FULL)
+        if not patches.any():
+            return None, None
+        at_sun = through_beams(self._traced.scene.groups[g : g + 1], ways, sky.direction)
+        daylight = self._traced.direct_daylight[g : g + 1]
+        found = phases.sun_beams([optics.transmission], patches, at_sun, daylight, sky.sun)
+        by_patch, by_angle = (beam[0].astype(np.float32) for beam in found)
+        return by_patch, by_angle
 
     @cached_property
     def sensors(self) -> list[list[SensorLight]]:
@@ -186,6 +203,7 @@ class PhaseLight:
             self._window_luminance("sun", rows, hours),
             sky.direction[hours],
             sky.illuminance[hours],
+            beam=self._window_luminance("beam", rows, hours),
         )
         found.show_outdoors(
             seen, daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
@@ -199,19 +217,9 @@ class PhaseLight:
         if not traced.five_phase:
             return SensorLight(three_phase, None, 0.0)
         direct = traced.direct_sensors[:, g]
-        optics = self.filled.systems[g][j]
-        ways, groups = [optics.scattering], traced.scene.groups[g : g + 1]
         three_phase = three_phase - direct @ window.sun
-        beams = patch_beams(ways, KLEMS_FULL)
-        if beams.any():
-            three_phase += phases.beam_at_sun_angle(
-                (view - direct)[:, None],
-                [optics.transmission],
-                beams,
-                through_beams(groups, ways, sky.direction),
-                traced.direct_daylight[g : g + 1],
-                sky.sun,
-            )
+        if window.beam is not None:
+            three_phase += (view - direct) @ (window.beam_at_sun - window.beam)
         sun, shining = np.zeros_like(three_phase), self._shining()
         if exact[j] is None:
             return SensorLight(three_phase, sun, 0.0)
@@ -274,9 +282,11 @@ class PhaseLight:
         found = []
         for group, row in zip(self.windows, rows, strict=True):
             states = np.minimum(row, len(group) - 1)
-            values = np.empty((len(group[0].whole), len(hours)), dtype=np.float32)
+            values = np.zeros((len(group[0].whole), len(hours)), dtype=np.float32)
             for j in np.unique(states):
-                values[:, states == j] = getattr(group[j], name)[:, hours[states == j]]
+                light = getattr(group[j], name)
+                if light is not None:
+                    values[:, states == j] = light[:, hours[states == j]]
             found.append(values)
         return np.stack(found)
 

@@ -24,8 +24,14 @@ from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
-from mitsuba_cfs.trace.path_disc import add_disc, eye_of, pixel_size
-from mitsuba_cfs.trace.picture_sharing import SharedLight, Tiles, face_numbers
+from mitsuba_cfs.trace.path_disc import add_disc, eye_of
+from mitsuba_cfs.trace.picture_sharing import (
+    STEPS,
+    SharedLight,
+    Tiles,
+    face_numbers,
+    tile_size,
+)
 from mitsuba_cfs.trace.point_in_time import (
     add_paths,
     leave,
@@ -37,8 +43,7 @@ from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixe
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 BLOCK = 2**19  # paths traced at a time
-TILE, LARGEST_TILE = np.radians(0.9), 16  # across; [px]
-SURFACE_STEPS, WINDOW_STEPS = (1, 2), (1,)  # [tiles] of the smoothing, one after the other
+WINDOW_STEPS = (1,)  # [tiles] of the smoothing where windows scatter
 
 
 def point_in_time_picture(
@@ -62,8 +67,7 @@ def point_in_time_picture(
             of any assumption.
         disc: the sun's disc too; without it, it is to be rated apart (`path_disc.disc_seen`).
     """
-    if tile is None:
-        tile = int(np.clip(round(TILE / pixel_size(view)), 2, LARGEST_TILE))
+    tile = tile_size(view) if tile is None else tile
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
@@ -113,7 +117,7 @@ def _add_shared(
     light = SharedLight(tiles, key, total, count)
     if tiles.size > 1:
         glass = light.faces < windows
-        for step in SURFACE_STEPS:
+        for step in STEPS:
             light = light.smoothed(step, None if step in WINDOW_STEPS else ~glass)
     pixel, face, weight = (np.concatenate(part) for part in zip(*pairs, strict=True))
     np.add.at(picture, pixel, weight * light.at(pixel, face))

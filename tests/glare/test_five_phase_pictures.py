@@ -87,7 +87,7 @@ def source(system, *, exterior=rooms.NOTHING, size=200):
     return PictureSun(room, exterior, groups, [system], view).discs(SUN[None], LUX)[0]
 
 
-@pytest.mark.parametrize("size", [60, 200, 800])
+@pytest.mark.parametrize("size", [90, 200, 800])
 def test_the_disc_is_a_source_with_its_own_luminance_whatever_the_pixel(size):
     view = fisheye(EYE, (0.0, -1.0, 0.0), size)
     disc = source(clear(), size=size)
