@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
-from mitsuba_cfs.trace.picture_disc import disc_in_view, disc_parts, disc_rays, disc_reach
+from mitsuba_cfs.trace.picture_disc import (
+    before_eye,
+    disc_in_view,
+    disc_parts,
+    disc_rays,
+    disc_reach,
+)
 from mitsuba_cfs.trace.point_in_time import straight_to_sky
 
 DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
@@ -24,7 +30,7 @@ def disc_seen(room: LitRoom, sky: Sky, view: View) -> SunDisc | None:
     if not radiance or not disc_in_view(shown, sun, pixel_size(view)):
         return None
     ways = disc_parts(sun)
-    return seen_disc(ways, _straight(room, view, ways) * radiance)
+    return seen_disc(ways, _straight(room, view, ways) * before_eye(view, ways) * radiance)
 
 
 def with_disc(

@@ -33,6 +33,11 @@ def disc_in_view(
     return bool(np.max(directions @ sun, initial=-1.0) > np.cos(pixel_size))
 
 
+def before_eye(view: View, directions: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether directions [.., 3] lie before the eye: at its side the disc is cut in two."""
+    return directions @ np.asarray(view.direction, dtype=float) > 0
+
+
 def disc_reach(pixel_size: float) -> float:
     """Angle [rad] from the sun's middle within which a pixel's middle lies that shows the disc."""
     return float(SUN_RADIUS + pixel_size)

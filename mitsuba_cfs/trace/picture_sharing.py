@@ -18,6 +18,7 @@ from mitsuba_cfs.images.view import View, pixel_solid_angles
 TILE, LARGEST_TILE = np.radians(0.9), 16  # across; [px]
 MARGIN = 8  # [tiles] round the picture, so that no tile's neighbour is another row's end
 STEPS = (1, 2)  # [tiles] of the smoothing, one after the other
+BALANCINGS = 64  # rounds, by which the sums agree to 1e-4
 FACE_STEPS = 8  # normals that differ less than 1/16 in each component are one face
 
 
@@ -77,12 +78,21 @@ def neighbours(tiles: Tiles, key: NDArray[np.int64], step: int) -> sparse.csr_ar
 def smoothing(tiles: Tiles, key: NDArray[np.int64], count: NDArray) -> sparse.csr_array:
     """What means over tiles [m] become when the tiles round each on its face smooth them [m, m].
 
+    An even face stays even, and the sum of count times mean stays what it is: the weights 1 2 1
+    are scaled to diag(x) A diag(x) with row and column sums of 1 (Sinkhorn and Knopp 1967).
+
     Args: key: [m] as of `neighbours`; count: [m] how much stands behind each mean.
     """
-    whole = sparse.csr_array(sparse.diags_array(np.asarray(count, dtype=float)))
+    count = np.maximum(np.asarray(count, dtype=float), 1e-12)
+    whole = sparse.csr_array(sparse.eye_array(len(key)))
     for step in STEPS:
-        whole = neighbours(tiles, key, step) @ whole
-    return sparse.csr_array(sparse.diags_array(1 / np.maximum(whole.sum(axis=1), 1e-300)) @ whole)
+        near, x = neighbours(tiles, key, step), np.ones(len(key))
+        for _ in range(BALANCINGS):
+            x = np.sqrt(x / (near @ (count * x)))
+        weights = sparse.diags_array(x) @ near @ sparse.diags_array(x * count)
+        rows = sparse.diags_array(1 / np.maximum(weights.sum(axis=1), 1e-300))
+        whole = sparse.csr_array(rows @ weights @ whole)
+    return whole
 
 
 def _find(

@@ -17,7 +17,13 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.picture_disc import disc_in_view, disc_parts, disc_rays, disc_reach
+from mitsuba_cfs.trace.picture_disc import (
+    before_eye,
+    disc_in_view,
+    disc_parts,
+    disc_rays,
+    disc_reach,
+)
 from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
@@ -140,7 +146,7 @@ class PictureSun:
         towards = mi.Vector3f(ways.reshape(-1, 3).T.astype(np.float32))
         tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
         tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
-        for hour, way, part in zip(lit, ways, tau, strict=True):
+        for hour, way, part in zip(lit, ways, tau * before_eye(self._view, ways), strict=True):
             found[hour] = seen_disc(way, part * (illuminance[hour] / SUN_SOLID_ANGLE))
         return found
 

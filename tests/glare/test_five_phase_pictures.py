@@ -123,6 +123,20 @@ def test_an_edge_cuts_the_source_and_leaves_its_luminance():
     assert source(clear(), exterior=rooms.surfaces([(whole, 0.2)])) is None
 
 
+@pytest.mark.parametrize(("beyond", "share"), [(-0.3, 1.0), (0.0, 0.5), (0.3, 0.0)])
+def test_the_disc_ends_where_the_eye_does(beyond, share):
+    """A sun at the side of a fisheye, its middle so many degrees behind the eye."""
+    from mitsuba_cfs.trace.picture_sun import PictureSun
+
+    room, groups = rooms.test_room(0.0)
+    turn = np.radians(90 - beyond)
+    across = np.cross(SUN, [0, 0, 1.0]) / np.linalg.norm(np.cross(SUN, [0, 0, 1.0]))
+    view = fisheye(EYE, np.cos(turn) * SUN + np.sin(turn) * across, 200)
+    disc = PictureSun(room, rooms.NOTHING, groups, [clear()], view).discs(SUN[None], LUX)[0]
+    seen = 0.0 if disc is None else disc.solid_angle / SUN_SOLID_ANGLE
+    assert seen == pytest.approx(share, abs=0.01)
+
+
 def test_paths_see_the_same_disc():
     from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, Sky, System
     from mitsuba_cfs.trace.path_disc import disc_seen, with_disc

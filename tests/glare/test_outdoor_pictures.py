@@ -12,6 +12,7 @@ from mitsuba_cfs.images.view import fisheye, pixel_directions
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.sky.sun import direction
 from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.picture_sharing import Tiles, smoothing
 from tests.trace import rooms
 
 pytestmark = pytest.mark.usefixtures("variant")
@@ -23,7 +24,7 @@ VIEW = fisheye((1.8, 1.0, 1.5), (0.0, -1.0, 0.0), SIZE)
 
 
 def street() -> Surfaces:
-    """Ground before the window, a facade across the street, and a wall that is in the sun."""
+    """Ground before the house and its wall, a facade across the street, a wall in the sun."""
     return rooms.surfaces(
         [
             (
@@ -31,6 +32,7 @@ def street() -> Surfaces:
                 GROUND,
             ),
             (rooms.quad((-9, -9, -0.5), (-9, -9, 4), (12, -9, 4), (12, -9, -0.5)), FACADE),
+            (rooms.quad((-9, 0.02, -0.5), (12, 0.02, -0.5), (12, 0.02, 4), (-9, 0.02, 4)), 0.1),
             (rooms.quad((6, -9, -0.5), (6, -9, 3), (6, -1, 3), (6, -1, -0.5)), FACADE),
         ]
     )
@@ -44,7 +46,7 @@ def sky(hours=1):
     return given_sky(sun, np.full(hours, 800.0), np.full(hours, 90.0), day_of_year=172)
 
 
-def lights(hours=1):
+def lights(hours=1, samples=8):
     """The same room by five phases and by paths, behind clear glass."""
     import mitsuba_cfs as cfs
 
@@ -53,13 +55,13 @@ def lights(hours=1):
     finer = replace(scene, view=replace(VIEW, width=FINER * SIZE, height=FINER * SIZE))
     glass = cfs.AngularOptics([0.0, 0.6, 0.6, 0.6, 0.6])
     phases = cfs.PhaseSystems(cfs.PhaseScene(scene), [[glass]]).light(sky(hours))
-    chosen = cfs.Sampling(picture_samples=8)
+    chosen = cfs.Sampling(picture_samples=samples)
     return phases, cfs.PathSystems(finer, [[glass]], chosen).light(sky(hours))
 
 
-def both(hours=1):
+def both(hours=1, samples=8):
     """Pictures [h, ny, nx] by five phases, and finer ones by paths, without the sun's disc."""
-    phases, paths = lights(hours)
+    phases, paths = lights(hours, samples)
     made = phases.pictures(np.arange(hours), [0])
     values = made.without_disc(np.arange(hours))[0]
     found = np.stack([full_picture(row, made.pixels, VIEW) for row in values])
@@ -94,11 +96,18 @@ def on_ground(eye, towards):
     return down & opening & (point[..., 1] > -6) & (point[..., 0] < 2) & (point[..., 0] > -5)
 
 
-def test_no_pixel_outdoors_shines_above_what_paths_show():
-    """Sun on the ground, on a wall, and from both on a facade in the shade: three hours."""
-    found, paths = both(3)
+@pytest.mark.slow
+def test_no_pixel_shines_above_what_paths_show():
+    """Sun on the ground, on a wall, from both on a facade in the shade, and in the room."""
+    found, paths = both(3, samples=32)
     # finer ones: a strip of sun narrower than a pixel is all of a pixel whose middle lies in it
     assert np.all(found <= 1.5 * brightest(paths))
+
+
+def test_the_sun_on_the_ground_is_that_of_paths():
+    """Its noise too, so that no pixel of it shines out."""
+    found, paths = both()
+    assert np.all((found <= 1.5 * brightest(paths))[:, shown(on_ground)])
     ground = shown(on_ground)
     assert np.count_nonzero(ground) > 100
     for ours, theirs in zip(found, coarse(paths, np.mean), strict=True):
@@ -141,3 +150,21 @@ def test_the_beam_that_the_room_reflects_has_the_suns_own_angle():
     assert cfs.hourly_glare(light).Ev == pytest.approx(truth, rel=0.05)
     pictures = light.pictures(np.arange(4), [0])
     assert pictures.without_disc(np.arange(4))[1] == [None] * 4
+
+
+def test_smoothing_keeps_what_is_even_and_what_there_is():
+    random = np.random.default_rng(4)
+    tiles = Tiles(2, 40)
+    row, column = np.divmod(np.arange(400), 20)
+    shown = random.random(400) < 0.7  # holes, and tiles without neighbours
+    face = (column > 11).astype(int)
+    keys = tiles.key(column, row, face)[shown]
+    order = np.argsort(keys)
+    count = random.uniform(0.1, 4.0, len(keys))
+    smooth = smoothing(tiles, keys[order], count)
+    assert smooth @ np.ones(len(keys)) == pytest.approx(np.ones(len(keys)), abs=1e-12)
+    assert count @ smooth == pytest.approx(count, rel=1e-3)
+    noise = random.normal(size=len(keys))
+    assert np.std(smooth @ noise) < 0.5 * np.std(noise)
+    across = smooth[np.ix_(face[shown][order] == 0, face[shown][order] == 1)]
+    assert abs(across).sum() == 0
