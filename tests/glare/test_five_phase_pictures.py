@@ -129,7 +129,7 @@ def test_the_disc_ends_where_the_eye_does(beyond, share):
     from mitsuba_cfs.trace.picture_sun import PictureSun
 
     room, groups = rooms.test_room(0.0)
-    turn = np.radians(90 - beyond)
+    turn = np.radians(90 + beyond)
     across = np.cross(SUN, [0, 0, 1.0]) / np.linalg.norm(np.cross(SUN, [0, 0, 1.0]))
     view = fisheye(EYE, np.cos(turn) * SUN + np.sin(turn) * across, 200)
     disc = PictureSun(room, rooms.NOTHING, groups, [clear()], view).discs(SUN[None], LUX)[0]
