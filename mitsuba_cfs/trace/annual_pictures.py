@@ -266,10 +266,10 @@ class FivePhasePictures:
         seen = self._outdoors
         if seen is not None:
             sky = self._sky[:, batch]
-            windows += seen.sky @ sky + seen.tiles @ (seen.reflected @ sky)
+            windows += seen.sky @ sky
         values = np.ascontiguousarray(windows.T, dtype=np.float32)
         if seen is not None:
-            seen.sun.add_to(values, suns, strength)
+            seen.sun.add_to(values, suns, strength, seen.reflected @ sky)
         more = None
         if self._elements is not None:
             more = self._sun.on_elements(self._elements, suns, strength)

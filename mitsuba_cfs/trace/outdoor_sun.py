@@ -42,43 +42,50 @@ class OutdoorSun:
         outside: TracedScene,
         shown: ShownFaces,
         smooth: sparse.csr_array,
-        pixels: int,
         seed: int,
     ) -> None:
-        """Find what is lit.
-
-        Args: smooth: [C, C] of means over tiles; pixels: how many the view has, n.
-        """
+        """Find what is lit; `smooth`: [C, C] of means over tiles."""
         self._outside, count = outside, smooth.shape[0]
         pair = shown.pixel * max(count, 1) + shown.tile
         _, first, place = np.unique(pair, return_index=True, return_inverse=True)
         values = np.bincount(place, shown.value, minlength=len(first)).astype(np.float32)
         self._places, column = shown.places.some(first), np.arange(len(first))
-        row, tile = shown.pixel[first], shown.tile[first]
-        self._pixels = sparse.csr_array((values, (row, column)), shape=(pixels, len(first)))
-        # what a pixel shows of unit irradiance on the faces in tiles, tau rho / pi [n, C]
-        self.tiles = sparse.csr_array((values, (row, tile)), shape=(pixels, count))
+        self._shown, row = np.unique(shown.pixel[first], return_inverse=True)
+        shape = len(self._shown), len(first)
+        self._pixels = sparse.csr_array((values, (row, column)), shape=shape)
+        # what a pixel shows of unit irradiance on the faces in tiles, tau rho / pi
+        entries = values, (row, shown.tile[first])
+        self._tiles = sparse.csr_array(entries, shape=(len(self._shown), count))
         self._reflecting, gather = _reflecting(outside, shown, count, seed)
         self._gather = sparse.csr_array((smooth @ gather).astype(np.float32))
 
     def add_to(
-        self, values: NDArray, suns: NDArray[np.float64], illuminance: NDArray[np.float64]
+        self,
+        values: NDArray,
+        suns: NDArray[np.float64],
+        illuminance: NDArray[np.float64],
+        sky: NDArray[np.float32],
     ) -> None:
-        """Add the sun's luminance [cd/m2] to the pixels' values [h, n].
+        """Add the luminance of surfaces outdoors [cd/m2] to the pixels' values [h, n].
 
-        Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
+        Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx]; sky: [C, h]
+            irradiance of the faces in tiles by the sky without the sun.
         """
         if not self._places.size:
             return
         lit = np.flatnonzero((illuminance > 0) & (suns[:, 2] > 0))
+        found, irradiance = np.zeros((len(self._shown), len(suns)), dtype=np.float32), sky.copy()
         step = max(1, LANES // (self._places.size + self._reflecting.size))
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
-            found = self._pixels @ self._sunlight(self._places, suns[hours])
+            strength = illuminance[hours].astype(np.float32)
+            found[:, hours] = self._pixels @ (self._sunlight(self._places, suns[hours]) * strength)
             if self._reflecting.size:
-                light = self._gather @ self._sunlight(self._reflecting, suns[hours])
-                found += self.tiles @ light
-            values[hours] += (found * illuminance[hours].astype(np.float32)).T
+                light = self._sunlight(self._reflecting, suns[hours]) * strength
+                irradiance[:, hours] += self._gather @ light
+        found += self._tiles @ irradiance
+        for hour, luminance in zip(values, found.T, strict=True):
+            hour[self._shown] += luminance
 
     def _sunlight(self, places: Places, suns: NDArray[np.float64]) -> NDArray[np.float32]:
         """Cosine of the sun at places where it shines, else 0 [m, h]."""

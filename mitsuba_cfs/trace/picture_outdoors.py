@@ -38,11 +38,10 @@ RAYS = 2**20  # at once
 class Outdoors:
     """Luminance of the pixels through the windows' straight beam, per unit luminance of the sky.
 
-    The sun comes apart (`sun`): `tiles` and `reflected` are for the sky without it.
+    What surfaces reflect is added by `sun`; `sky` and `reflected` are for the sky without the sun.
     """
 
     sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows itself
-    tiles: sparse.csr_array  # [n, C] of unit irradiance on the faces in each tile of pixels
     reflected: sparse.csr_array  # [C, P] irradiance of the faces in each tile
     beam: NDArray[np.float64]  # [G, K] transmittance of the beam, mean over each window patch
     sun: OutdoorSun
@@ -88,11 +87,10 @@ def outdoors(
     found, keys = _joined(shown)
     count = np.bincount(found.tile, minlength=len(keys))
     smooth = smoothing(Tiles(tile, view.width), keys, count)
-    sun = OutdoorSun(outside, found, smooth, len(pixels), seed)
+    sun = OutdoorSun(outside, found, smooth, seed)
     reflected = smooth @ _reflected(outside, sky, found, len(keys), seed)
     return Outdoors(
         sparse.csr_array(sparse.vstack(free)),
-        sun.tiles,
         sparse.csr_array(reflected.astype(np.float32)),
         _beams(scattering, basis),
         sun,

@@ -19,7 +19,6 @@ from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
-    disc_in_view,
     disc_parts,
     disc_rays,
     disc_reach,
@@ -139,7 +138,7 @@ class PictureSun:
         """The sun's disc [h] as the eye sees it through the straight beam, None where hidden."""
         found: list[SunDisc | None] = [None] * len(suns)
         lit = self._shining(suns, illuminance)
-        lit = lit[[disc_in_view(self._directions, suns[hour], self._size) for hour in lit]]
+        lit = lit[self._tree.query(suns[lit])[0] < self._size] if len(lit) else lit
         if not len(lit):
             return found
         ways = np.stack([disc_parts(suns[hour]) for hour in lit])
