@@ -25,7 +25,7 @@ from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 
 ELEMENTS = 1024  # into which the surfaces' area is divided, about
 POINTS = 4  # on each, that the sun is taken at
-PATHS = 2**18  # of a view at most, but one of each pixel
+PATHS = 2**19  # of a view at most, but one of each pixel
 RAYS = 2**18  # at once
 
 
