@@ -168,3 +168,17 @@ def test_smoothing_keeps_what_is_even_and_what_there_is():
     assert np.std(smooth @ noise) < 0.5 * np.std(noise)
     across = smooth[np.ix_(face[shown][order] == 0, face[shown][order] == 1)]
     assert abs(across).sum() == 0
+
+
+def test_the_matrices_of_a_view_are_found_again_with_their_elements(tmp_path):
+    import mitsuba_cfs as cfs
+
+    room, groups = rooms.test_room()
+    view = fisheye(VIEW.position, VIEW.direction, 32)
+    scene = cfs.DaylightScene(room, rooms.NOTHING, groups, view=view)
+    first, again = (cfs.PhaseScene(scene, cache=cfs.MatrixCache(tmp_path)).view for _ in range(2))
+    assert first is not again and len(list(tmp_path.rglob("*.npz"))) == 1
+    light = np.random.default_rng(0).random((first.elements.places.size, 3))
+    np.testing.assert_array_equal(first.elements.rows(light), again.elements.rows(light))
+    np.testing.assert_array_equal(first.elements.places.point, again.elements.places.point)
+    np.testing.assert_array_equal(first.indirect.rows, again.indirect.rows)
