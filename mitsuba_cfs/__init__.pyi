@@ -38,14 +38,18 @@ from .matrices.cache import MatrixCache as MatrixCache
 from .matrices.mtx_io import read_matrix as read_matrix, write_matrix as write_matrix
 from .methods.by_name import traced_scene as traced_scene, with_systems as with_systems
 from .methods.glare import hourly_glare as hourly_glare, pictures as pictures
-from .methods.optics import BsdfOptics as BsdfOptics
+from .methods.optics import AngularOptics as AngularOptics, BsdfOptics as BsdfOptics
 from .methods.path_light import PathLight as PathLight, PathSystems as PathSystems
 from .methods.phase_light import PhaseLight as PhaseLight, PhaseSystems as PhaseSystems
 from .methods.phase_scene import PhaseScene as PhaseScene
 from .methods.sampling import Sampling as Sampling
 from .methods.scene import DaylightScene as DaylightScene
 from .metrics.room import RoomMetrics as RoomMetrics, room_metrics as room_metrics
-from .sky.annual import AnnualSky as AnnualSky, annual_sky as annual_sky
+from .sky.annual import (
+    AnnualSky as AnnualSky,
+    annual_sky as annual_sky,
+    given_sky as given_sky,
+)
 from .sky.cie import cie_patches as cie_patches
 from .sky.epw import read_epw as read_epw
 from .sky.matrix import sky_matrix as sky_matrix

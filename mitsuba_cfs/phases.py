@@ -54,24 +54,22 @@ def three_phase(
     return coefficients @ np.asarray(sky)
 
 
-def beam_at_sun_angle(
-    reflected_view: ArrayLike,
+def sun_beams(
     transmission: Sequence[ArrayLike],
     through: ArrayLike,
     through_sun: ArrayLike,
     direct_daylight: ArrayLike,
     sun: ArrayLike,
-) -> NDArray[np.float64]:
-    """What the five-phase sum lacks where the room reflects the sun's beam [S, H].
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The sun's straight beam on window patches, two ways [G, K, H].
 
-        (V - V_d) diag(tau(sun) - tau) D_d s_d
+        diag(tau) D_d s_d        as T D s has it, with one transmittance in a whole patch
+        diag(tau(sun)) D_d s_d   at the sun's own angle, as C_ds has it
 
-    V T D s passes the beam with one transmittance in a whole patch, C_ds with that of the sun's
-    own angle.  Added to the sum this gives the reflected beam the sun's own too.  It takes away no
-    more than V T D s - V_d T D_d s_d holds.
+    V T D s + (V - V_d) times the difference gives the beam that the room reflects its own angle
+    too.  It takes away no more than V T D s - V_d T D_d s_d holds.
 
     Args:
-        reflected_view: V - V_d [S, G, K].
         transmission: for each group its T [K, K].
         through: [G, K] tau, what of T's diagonal goes straight on: the beam at the patches'
             middles, `mitsuba_cfs.trace.direct_sun.patch_beams`.
@@ -79,11 +77,7 @@ def beam_at_sun_angle(
         direct_daylight: D_d [G, K, P].
         sun: s_d [P, H], the sun alone on the sky's patches.
     """
-    reflected_view, through_sun = np.asarray(reflected_view), np.asarray(through_sun)
-    total = np.zeros((len(reflected_view), through_sun.shape[1]))
-    for g, at_sun in enumerate(through_sun):
-        patches = np.minimum(np.asarray(through)[g], np.diag(np.asarray(transmission[g])))
-        window = np.asarray(direct_daylight)[g] @ np.asarray(sun)
-        view = reflected_view[:, g]
-        total += (view @ window) * at_sun - (view * patches) @ window
-    return total
+    window = np.matmul(np.asarray(direct_daylight), np.asarray(sun))
+    diagonal = np.stack([np.diag(np.asarray(T)) for T in transmission])
+    patches = np.minimum(np.asarray(through), diagonal)
+    return window * patches[:, :, None], window * np.asarray(through_sun)[:, None]

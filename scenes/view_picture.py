@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.sensors import view_point
 from mitsuba_cfs import variants
+from mitsuba_cfs.glare.evaluation import GlareResult
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
+from mitsuba_cfs.methods.glare import rated_pictures
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.progress import Progress, part, silent
@@ -34,6 +36,7 @@ class RoomPicture:
     room: str
     time: pd.Timestamp  # middle of the hour
     notes: tuple[str, ...]  # of systems and weather
+    glare: GlareResult | None = None  # of a fisheye of the whole hemisphere
 
 
 def room_picture(
@@ -61,11 +64,19 @@ def room_picture(
     light = PathSystems(viewed.scene, viewed.optics, sampling).light(
         annual_sky(weather, sampling.subdivision, hours=[hour])
     )
-    luminance = light.picture(0, progress=part(progress, 0.4, 1.0, "picture"))
+    view, steps, rated = viewed.scene.view, part(progress, 0.4, 1.0, "picture"), None
+    if rates_glare(view):
+        [(luminance, rated)] = rated_pictures(light, [0], progress=steps)
+    else:
+        luminance = light.picture(0, progress=steps)
     notes = (*viewed.notes(), *weather.notes)
-    return RoomPicture(
-        luminance, viewed.scene.view, viewed.space.label, weather.midpoints[hour], notes
-    )
+    return RoomPicture(luminance, view, viewed.space.label, weather.midpoints[hour], notes, rated)
+
+
+def rates_glare(view: View) -> bool:
+    """Whether a view is a fisheye of the whole hemisphere, which glare needs."""
+    whole = view.horizontal_deg == view.vertical_deg == 180
+    return view.kind in ("angular", "hemispherical") and whole
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:

@@ -21,6 +21,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import replacing
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
 
@@ -50,8 +51,16 @@ class PictureMatrix:
                 "expected [m, N], [n], [n]"
             )
 
-    def add_to(self, values: NDArray[np.float32], luminance: NDArray[np.float32]) -> None:
-        """Add the pixels' luminance to values [h, n] under patch luminances [N, h]."""
+    def add_to(
+        self,
+        values: NDArray[np.float32],
+        luminance: NDArray[np.float32],
+        more: NDArray[np.float32] | None = None,
+    ) -> None:
+        """Add the pixels' luminance to values [h, n] under patch luminances [N, h].
+
+        Args: more: [m, h] luminance of the rows besides.
+        """
         across = np.ascontiguousarray(luminance.T, dtype=np.float32)
         of_rows = np.empty((len(values), len(self.rows)), dtype=np.float32)
         step = len(self.rows)
@@ -60,6 +69,8 @@ class PictureMatrix:
         for start in range(0, len(self.rows), step):
             rows = np.asarray(self.rows[start : start + step])
             np.matmul(across, rows.T, out=of_rows[:, start : start + step])
+        if more is not None:
+            of_rows += more.T
         for hour, found in zip(values, of_rows, strict=True):
             hour += found[self.row] * self.share
 
@@ -76,6 +87,7 @@ class AnnualGlare:
     vcp: NDArray[np.float64]  # [%]
     sources: NDArray[np.float64]  # number of glare sources
     background_luminance: NDArray[np.float64]  # [cd/m2]
+    rule: str = GlareOptions().rule  # what its sources are
 
     def worst(self, count: int) -> NDArray[np.int64]:
         """The hours [count] of the highest DGP, the worst first."""
@@ -94,6 +106,11 @@ class Pictures(Protocol):
 
     def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Luminance [h, n] [cd/m2] of the pixels in some hours [h]."""
+
+    def without_disc(
+        self, batch: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+        """The same without the sun's disc, and the disc [h] as far as it is seen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +141,12 @@ class ThreePhasePictures:
         self.reflected.add_to(values, luminance)
         return values
 
+    def without_disc(
+        self, batch: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+        """See `Pictures`; the sun is part of the patches."""
+        return self.values(batch), [None] * len(batch)
+
 
 def annual_glare(
     pictures: Pictures,
@@ -139,6 +162,7 @@ def annual_glare(
 
     Args:
         geometry: of the pictures' view, where it is at hand.
+        options: how glare is rated, see `mitsuba_cfs.glare.evaluation`.
         illuminance: [H] at the eye from its own calculation, for DGP [lx]: with pictures of direct
             light alone the result is eDGP.
         threads: pictures rated at a time; the processor's cores by default.
@@ -156,22 +180,30 @@ def annual_glare(
     left = np.flatnonzero(np.isnan(table[:, 0]))
     size = max(1, BATCH_BYTES // (4 * max(1, len(pictures.pixels))))
 
-    def rated(values: NDArray[np.float32], hour: int) -> list[float]:
+    def rated(values: NDArray[np.float32], disc: SunDisc | None, hour: int) -> list[float]:
         picture = full_picture(values, pictures.pixels, pictures.view)
         known = options if own is None else replace(options, illuminance=float(own[hour]))
-        return figures(evaluate(picture, geometry, options=known))
+        return figures(evaluate(picture, geometry, options=known, disc=disc))
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for start in range(0, len(left), size):
             batch = left[start : start + size]
-            table[batch] = list(pool.map(rated, pictures.values(batch), batch))
+            discs: list[SunDisc | None] = [None] * len(batch)
+            if options.sun == "source":
+                values, discs = pictures.without_disc(batch)
+            else:
+                values = pictures.values(batch)
+            table[batch] = list(pool.map(rated, values, discs, batch))
             _save(keep, table)
             progress("glare", (len(table) - len(left) + start + len(batch)) / len(table))
-    return AnnualGlare(*table.T)
+    return AnnualGlare(**dict(zip(FIGURES, table.T, strict=True)), rule=options.rule)
 
 
 def kept_glare(keep: Path, hours: int) -> AnnualGlare | None:
-    """The finished ratings of a run of `annual_glare`; None where hours are missing."""
+    """The finished ratings of a run of `annual_glare` by the rule that holds without a choice.
+
+    None where hours are missing.
+    """
     table = _begin(keep, hours)
     return None if np.isnan(table).any() else AnnualGlare(*table.T)
 

@@ -14,10 +14,15 @@ from mitsuba_cfs.glare.areas import Zones, angles_to, split_by_zone
 from mitsuba_cfs.glare.field_of_view import seen
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
 from mitsuba_cfs.glare.position_index import position_index, view_angles
-from mitsuba_cfs.glare.sources import Sources, glare_sources
+from mitsuba_cfs.glare.sources import Sources, glare_sources, pixel_sources, with_disc
+from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 
 BACKGROUNDS = ("indirect", "average", "illuminance")
+GROUPINGS = {  # what a source is
+    "evalglare": "bright pixels near one another, as evalglare groups them",
+    "pixels": "each bright pixel, as raytools sums them",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +51,28 @@ class GlareOptions:
     low_light: bool = False
     age: float | None = None  # [years]
     zones: Zones | None = None  # sources are cut at their borders
+    grouping: str = "evalglare"  # or "pixels", see `GROUPINGS`
+    sun: str = "source"  # its disc is a source of its own, or part of its "pixels"
 
     def __post_init__(self) -> None:
         if self.background not in BACKGROUNDS:
             raise ValueError(f"background {self.background!r}: expected one of {BACKGROUNDS}")
+        if self.grouping not in GROUPINGS:
+            raise ValueError(f"grouping {self.grouping!r}: expected one of {tuple(GROUPINGS)}")
+        if self.grouping == "pixels" and self.zones is not None:
+            raise ValueError("zones cut grouped sources: not with grouping 'pixels'")
+        if self.sun not in ("source", "pixels"):
+            raise ValueError(f"sun {self.sun!r}: expected 'source' or 'pixels'")
         if not self.search_radius > 0:
             raise ValueError(f"search radius {self.search_radius:g}: expected an angle above 0")
         if self.illuminance is not None and not self.illuminance >= 0:
             raise ValueError(f"illuminance {self.illuminance:g}: expected lx")
+
+    @property
+    def rule(self) -> str:
+        """What the sources are, in words."""
+        own = "a source of its own" if self.sun == "source" else "part of its pixels"
+        return f"sources: {GROUPINGS[self.grouping]}; the sun's disc: {own}"
 
 
 @dataclass(frozen=True)
@@ -84,6 +103,7 @@ class GlareResult:
     cgi: float
     dgr: float
     contrast: float = field(repr=False, default=0.0)  # sum L^2 omega/P^2
+    disc: SunDisc | None = None  # that is a source of its own, the last
 
     @cached_property
     def sdgp(self) -> float:
@@ -113,6 +133,7 @@ def evaluate(
     view: View | GlareView,
     *,
     options: GlareOptions | None = None,
+    disc: SunDisc | None = None,
     **changes: Any,
 ) -> GlareResult:
     """Glare of a picture.
@@ -121,6 +142,7 @@ def evaluate(
         luminance: [ny, nx] row 0 at the top [cd/m2].
         view: the picture's view, or its `GlareView`, worked out once for many pictures.
         options: how glare is rated; `changes` are single options by name.
+        disc: the sun, where the picture's pixels are without it.
 
     Raises:
         ValueError: negative or NaN pixels, another size than the view's, a parallel view.
@@ -133,21 +155,21 @@ def evaluate(
         picture = np.where(seen(geometry, options.field_of_view), picture, 0.0)
     task = mean if options.task is None else task_luminance(picture, geometry, options.task)
     threshold = _threshold(options, task)
-    sources = glare_sources(
-        picture,
-        geometry,
-        threshold,
-        search_radius=options.search_radius,
-        peak=options.peak,
-        smoothing=options.smoothing,
-    )
-    zones = np.zeros(len(sources.pixels), dtype=np.int64)
-    if options.zones is not None:
-        sources, zones = split_by_zone(sources, options.zones, picture, geometry)
+    sources, zones = _sources(picture, geometry, threshold, options)
     # evalglare rounds to four bytes before it cuts off: a whole number stays one
     pixel = sources.x.astype(np.float32).astype(int), sources.y.astype(np.float32).astype(int)
     direction = geometry.directions[pixel]
-    position = position_index(direction, geometry.view, model=options.position_model)
+    position = _positions(options, geometry, pixel, direction)
+    if disc is not None:
+        lux = disc.luminance * disc.solid_angle * float(disc.direction @ geometry.forward)
+        Ev, mean = Ev + lux, mean + disc.luminance * disc.solid_angle / geometry.total_solid_angle
+        largest = max(largest, disc.luminance)
+        if disc.luminance <= threshold or not _in_field(disc, geometry, options):
+            disc = None
+    if disc is not None:
+        sources, zones = with_disc(sources, disc, lux, geometry), np.append(zones, 0)
+        own = position_index(disc.direction[None], geometry.view, model=options.position_model)
+        direction, position = np.vstack([direction, disc.direction]), np.append(position, own)
     sigma = view_angles(direction, geometry.view)[0]
     direct = float(sources.illuminance.sum())
     background = _background(options, geometry, sources, Ev, direct, mean)
@@ -179,7 +201,44 @@ def evaluate(
         cgi=indices.cie_glare_index(contrast, Ev, direct),
         dgr=rating,
         contrast=contrast,
+        disc=disc,
     )
+
+
+def _sources(
+    picture: NDArray, geometry: GlareView, threshold: float, options: GlareOptions
+) -> tuple[Sources, NDArray[np.int64]]:
+    """The picture's sources, and the zone [n] of each."""
+    if options.grouping == "pixels":
+        sources = pixel_sources(picture, geometry, threshold)
+        return sources, np.zeros(len(sources.pixels), dtype=np.int64)
+    sources = glare_sources(
+        picture,
+        geometry,
+        threshold,
+        search_radius=options.search_radius,
+        peak=options.peak,
+        smoothing=options.smoothing,
+    )
+    if options.zones is not None:
+        return split_by_zone(sources, options.zones, picture, geometry)
+    return sources, np.zeros(len(sources.pixels), dtype=np.int64)
+
+
+def _positions(
+    options: GlareOptions, geometry: GlareView, pixel: tuple[NDArray, NDArray], direction: NDArray
+) -> NDArray[np.float64]:
+    """Position index [n] of pixels in directions [n, 3]."""
+    if options.position_model == "guth" and options.grouping == "pixels":
+        return geometry.guth[pixel]  # worked out once for all pictures of the view
+    return position_index(direction, geometry.view, model=options.position_model)
+
+
+def _in_field(disc: SunDisc, geometry: GlareView, options: GlareOptions) -> bool:
+    """Whether the disc stands in what counts as the field of view."""
+    if options.field_of_view == "all":
+        return True
+    return bool(seen(geometry, options.field_of_view)[geometry.pixel_at(disc.direction)])
 
 
 def prepare(

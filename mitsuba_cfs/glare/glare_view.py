@@ -63,6 +63,17 @@ class GlareView:
         """Position index [nx, ny] (Guth, Iwata)."""
         return position_index(self.directions, self.view)
 
+    @property
+    def forward(self) -> NDArray[np.float64]:
+        """Unit vector [3] of the line of sight."""
+        return np.asarray(self.view.direction, dtype=float)
+
+    def pixel_at(self, direction: NDArray[np.float64]) -> tuple[int, int]:
+        """The pixel in scan order, among those that count, nearest to a direction [3]."""
+        nearest = np.argmax(np.where(self.valid, self.directions @ direction, -1.0))
+        x, y = np.unravel_index(nearest, self.valid.shape)
+        return int(x), int(y)
+
     def direction_at(self, x: int, y: int) -> NDArray[np.float64]:
         """Unit vector [3] of a pixel in scan order."""
         return self.directions[x, y]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.glare import passes, scan
 from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.glare.sun_disc import SunDisc
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,40 @@ def glare_sources(
     if bright:
         _extract_peaks(labels, sums, count, peaks, search_radius / 2, fixed)
     return _collect(labels, sums, luminance, geometry)
+
+
+def pixel_sources(luminance: NDArray[np.float64], geometry: GlareView, threshold: float) -> Sources:
+    """Every bright pixel as a source of its own; arguments as for `glare_sources`.
+
+    The sum of L^2 omega / P^2 is then that of raytools and raytraverse: none is averaged away, and
+    each pixel has its own position index.
+    """
+    x, y = np.nonzero((luminance > threshold) & geometry.valid)
+    labels = np.zeros(luminance.shape, dtype=np.int32)
+    labels[x, y] = np.arange(1, len(x) + 1)
+    L = luminance[x, y]
+    return Sources(
+        labels, np.ones(len(x)), geometry.solid_angle[x, y], L, x.astype(float), y.astype(float),
+        L * geometry.projected[x, y],
+    )  # fmt: skip
+
+
+def with_disc(sources: Sources, disc: SunDisc, illuminance: float, geometry: GlareView) -> Sources:
+    """The sources and the sun's disc as the last; it covers none of the pixels.
+
+    Args: illuminance: of the disc at the eye [lx].
+    """
+    count, labels = len(sources.pixels), sources.labels
+    x, y = geometry.pixel_at(disc.direction)
+    if labels[x, y] == 0:  # so that it shows in a picture of the sources
+        labels = labels.copy()
+        labels[x, y] = count + 1
+    own = (0.0, disc.solid_angle, disc.luminance, x, y, illuminance)
+    values = (
+        sources.pixels, sources.solid_angle, sources.luminance, sources.x, sources.y,
+        sources.illuminance,
+    )  # fmt: skip
+    return Sources(labels, *(np.append(a, b) for a, b in zip(values, own, strict=True)))
 
 
 def _extract_peaks(labels, sums, count, limit, radius, fixed) -> None:

@@ -10,6 +10,7 @@ whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare import indices
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, annual_glare, figures, full_picture
-from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
+from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.optics import hourly_states
-from mitsuba_cfs.methods.path_light import PathLight
+from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress, part, silent
 
@@ -34,6 +36,7 @@ def hourly_glare(
     state: State = None,
     *,
     hours: ArrayLike | None = None,
+    options: GlareOptions | None = None,
     keep: Path | None = None,
     progress: Progress = silent,
 ) -> AnnualGlare:
@@ -42,12 +45,14 @@ def hourly_glare(
     Args:
         metric: DGP, eDGP or sDGP; the latter has no figures but the illuminance.
         state: of the windows in each of the sky's hours.
+        options: what a source is, and the rest of how glare is rated.
         keep: file of the ratings so far, see `annual_glare`.
     """
     chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
     rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, chosen]
+    options = options or GlareOptions()
     if isinstance(light, PathLight):
-        return _of_paths(light, metric, chosen, rows, progress)
+        return _of_paths(light, metric, chosen, rows, options, progress)
     if metric == "sDGP":
         return _simplified(light.eye(state)[chosen])
     own = light.eye(state)[chosen] if metric == "eDGP" else None
@@ -59,12 +64,13 @@ def hourly_glare(
         rated = annual_glare(
             light.pictures(chosen[columns], combination, direct=metric == "eDGP"),
             geometry=geometry,
+            options=options,
             illuminance=None if own is None else own[columns],
             keep=keep if keep is None or i == 0 else keep.with_stem(f"{keep.stem}-{i}"),
             progress=part(progress, i / kinds.shape[1], (i + 1) / kinds.shape[1], "glare"),
         )
         table[:, columns] = [getattr(rated, name) for name in FIGURES]
-    return AnnualGlare(**dict(zip(FIGURES, table, strict=True)))
+    return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
 
 
 def pictures(
@@ -101,11 +107,48 @@ def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
     return AnnualGlare(dgp=dgp, Ev=np.asarray(eye, dtype=float), **rest)
 
 
+def rated_pictures(
+    light: PhaseLight | PathLight,
+    hours: ArrayLike,
+    state: State = None,
+    *,
+    options: GlareOptions | None = None,
+    progress: Progress = silent,
+) -> list[tuple[NDArray[np.float32], GlareResult]]:
+    """Luminance pictures of some hours as of `pictures`, and the glare of each."""
+    hours, options = np.asarray(hours, dtype=np.int64), options or GlareOptions()
+    rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, hours]
+    found, geometry = [], GlareView(_view(light))
+    for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
+        steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
+        if isinstance(light, PathLight):
+            bare, disc = light.picture(hour, now, disc=False, progress=steps), light.disc(hour, now)
+            shown = light.with_disc(bare, hour, now)
+        else:
+            of_hour = light.pictures(np.array([hour]), now)
+            values, discs = of_hour.without_disc(np.array([0]))
+            bare, disc = full_picture(values[0], of_hour.pixels, of_hour.view), discs[0]
+            shown = full_picture(of_hour.values(np.array([0]))[0], of_hour.pixels, of_hour.view)
+        apart = options.sun == "source"
+        rated = evaluate(
+            bare if apart else shown, geometry, options=options, disc=disc if apart else None
+        )
+        found.append((shown, rated))
+        steps("pictures", 1.0)
+    return found
+
+
+def _view(light: PhaseLight | PathLight) -> View | None:
+    filled = light.filled
+    return (filled.scene if isinstance(filled, PathSystems) else filled.traced.scene).view
+
+
 def _of_paths(
     light: PathLight,
     metric: str,
     hours: NDArray[np.int64],
     rows: NDArray[np.int64],
+    options: GlareOptions,
     progress: Progress,
 ) -> AnnualGlare:
     """Glare of some hours, each by its own paths."""
@@ -114,12 +157,14 @@ def _of_paths(
         return _simplified(np.array(eye))
     geometry, found = GlareView(light.filled.scene.view), []
     for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
-        options, depth = GlareOptions(), {}
+        known, depth = options, {}
         if metric == "eDGP":
-            options = GlareOptions(illuminance=light.eye(hour, now))
+            known = replace(options, illuminance=light.eye(hour, now))
             depth = {"max_depth": DIRECT_DEPTH}
-        result = evaluate(light.picture(hour, now, **depth), geometry, options=options)
-        found.append(figures(result))
+        apart = options.sun == "source"
+        picture = light.picture(hour, now, disc=not apart, **depth)
+        disc = light.disc(hour, now) if apart else None
+        found.append(figures(evaluate(picture, geometry, options=known, disc=disc)))
         progress("glare", (i + 1) / len(hours))
     table = np.array(found, dtype=float).reshape(len(hours), len(FIGURES)).T
-    return AnnualGlare(**dict(zip(FIGURES, table, strict=True)))
+    return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)

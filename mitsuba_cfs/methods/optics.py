@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
-from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.lit_room import PathOptics
-from mitsuba_cfs.trace.systems import lit_system, sun_scattering
+from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
+from mitsuba_cfs.trace.systems import AngularScattering, lit_system, sun_scattering
+
+PATCH_ANGLES = 32  # of incidence in each patch, for its mean
 
 
 class SystemOptics(Protocol):
@@ -67,6 +69,57 @@ class BsdfOptics:
         """See `SystemOptics`."""
         back = self._coarse.filled().reflection_back
         return None if back is None else back * self._coarse.basis_in.projected_solid_angles()
+
+
+class AngularOptics:
+    """The optics of a layer that passes light by its angle of incidence alone: glass, a weave.
+
+    Exact at every angle for the direct sun, in pictures and for paths; the matrices take the mean
+    of each patch.  It reflects nothing.
+    """
+
+    def __init__(self, straight: ArrayLike, scattered: ArrayLike = (0.0, 0.0)) -> None:
+        """From shares [n], [m] at even steps of the cosine of incidence, 0 to 1.
+
+        Args: straight: that keeps its beam; scattered: that leaves evenly to all sides.
+        """
+        self._straight, self._scattered = (np.asarray(a, float) for a in (straight, scattered))
+
+    @cached_property
+    def transmission(self) -> NDArray[np.float64]:
+        """See `SystemOptics`."""
+        return self._klems().transmission_matrix() + np.diag(self._patch_means(self._straight))
+
+    @cached_property
+    def scattering(self) -> Scattering:
+        """See `SystemOptics`."""
+        return AngularScattering(self._straight, self._scattered)
+
+    @cached_property
+    def paths(self) -> PathOptics:
+        """See `SystemOptics`."""
+        beam = AngularBeam(self._straight)
+        if not self._scattered.any():
+            return PathOptics(beam=beam)
+        return PathOptics(lit_system(self._klems()).bsdf, beam)
+
+    @property
+    def reflection(self) -> None:
+        """See `SystemOptics`."""
+        return None
+
+    def _klems(self) -> KlemsBsdf:
+        """What is scattered, from either side."""
+        block = np.tile(self._patch_means(self._scattered) / np.pi, (KLEMS_FULL.size, 1))
+        return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block)
+
+    @staticmethod
+    def _patch_means(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mean [K] over each patch's projected solid angle."""
+        places = (np.arange(PATCH_ANGLES) + 0.5) / PATCH_ANGLES
+        theta, _ = KLEMS_FULL.angles_within(np.arange(KLEMS_FULL.size)[:, None], places, 0.5)
+        steps = np.linspace(0.0, 1.0, len(shares))
+        return np.interp(np.cos(theta), steps, shares).mean(axis=1)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.methods.optics import States, hourly_states, in_state
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
@@ -16,6 +17,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
+from mitsuba_cfs.trace.path_disc import disc_seen, with_disc
 from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 from mitsuba_cfs.trace.point_in_time import point_in_time
 
@@ -97,12 +99,22 @@ class PathLight:
 
         Args: options: of `point_in_time_picture`; samples and seed are the sampling's.
         """
-        chosen, filled = self.filled.sampling, self.filled
-        state = [0] * len(filled.systems) if state is None else state
+        chosen, view = self.filled.sampling, self.filled.scene.view
         options = {"samples": chosen.picture_samples, "seed": chosen.seed} | options
-        return point_in_time_picture(
-            filled.room(state), self.sky_of(hour), filled.scene.view, **options
-        )
+        return point_in_time_picture(self._room(state), self.sky_of(hour), view, **options)
+
+    def disc(self, hour: int, state: Sequence[int] | None = None) -> SunDisc | None:
+        """The sun's disc in the view in one hour."""
+        return disc_seen(self._room(state), self.sky_of(hour), self.filled.scene.view)
+
+    def with_disc(
+        self, picture: NDArray[np.float32], hour: int, state: Sequence[int] | None = None
+    ) -> NDArray[np.float32]:
+        """A picture of `picture(hour, state, disc=False)` with the disc in its pixels."""
+        return with_disc(picture, self._room(state), self.sky_of(hour), self.filled.scene.view)
+
+    def _room(self, state: Sequence[int] | None) -> LitRoom:
+        return self.filled.room([0] * len(self.filled.systems) if state is None else state)
 
     def sky_of(self, hour: int) -> Sky:
         """Sky and sun of one hour."""

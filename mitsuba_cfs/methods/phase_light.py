@@ -91,6 +91,8 @@ class WindowLight:
 
     whole: NDArray[np.float32]  # [K, L] T D s [cd/m2]
     sun: NDArray[np.float32] | None  # [K, L] T D_d s_d, the sun alone
+    beam: NDArray[np.float32] | None  # [K, L] what of this goes straight on
+    beam_at_sun: NDArray[np.float32] | None  # [K, L] the same at the sun's own angle
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +111,7 @@ class PhaseLight:
         E = V T D s - V_d T D_d s_d + C_ds s_sun            five-phase
 
     with V T D s having the beam that the room reflects at the sun's own angle, as C_ds has it
-    (`mitsuba_cfs.phases.beam_at_sun_angle`).  V_d and D_d are traced with the seed and the samples
+    (`mitsuba_cfs.phases.sun_beams`).  V_d and D_d are traced with the seed and the samples
     of V and D: they are a part of them, entry by entry, and nothing gets negative.
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase); McNeil and
@@ -133,11 +135,26 @@ class PhaseLight:
             T, D = [s.transmission for s in states], [daylight[q]] * len(states)
             whole = phases.room_side_radiance(T, D, sky.whole).astype(np.float32)
             sun: Sequence = [None] * len(states)
+            beams: Sequence = [(None, None)] * len(states)
             if self._traced.five_phase:
                 D = [self._traced.direct_daylight[q]] * len(states)
                 sun = phases.room_side_radiance(T, D, sky.sun).astype(np.float32)
-            found.append([WindowLight(*pair) for pair in zip(whole, sun, strict=True)])
+                beams = [self._beams(q, optics) for optics in states]
+            lights = zip(whole, sun, beams, strict=True)
+            found.append([WindowLight(w, s, *both) for w, s, both in lights])
         return found
+
+    def _beams(self, q: int, optics: SystemOptics) -> tuple[NDArray[np.float32] | None, ...]:
+        """The sun's beam of a part by its patches and at its own angle; None without a beam."""
+        ways, sky = [optics.scattering], self.sky
+        patches = patch_beams(ways, KLEMS_FULL)
+        if not patches.any():
+            return None, None
+        at_sun = through_beams(self._traced.parts.groups[q : q + 1], ways, sky.direction)
+        daylight = self._traced.direct_daylight[q : q + 1]
+        found = phases.sun_beams([optics.transmission], patches, at_sun, daylight, sky.sun)
+        by_patch, by_angle = (beam[0].astype(np.float32) for beam in found)
+        return by_patch, by_angle
 
     @cached_property
     def sensors(self) -> list[list[SensorLight]]:
@@ -237,6 +254,7 @@ class PhaseLight:
             self._window_luminance("sun", rows, hours),
             sky.direction[hours],
             sky.illuminance[hours],
+            beam=self._window_luminance("beam", rows, hours),
         )
         found.show_outdoors(
             seen, daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
@@ -258,25 +276,15 @@ class PhaseLight:
 
     def _diffuse_light(self, q: int, g: int, j: int) -> NDArray[np.float64]:
         """What a part of a group gives to the sensors [S, L] but for the sun straight."""
-        traced, sky, window = self._traced, self.sky, self.windows[q][j]
+        traced, window = self._traced, self.windows[q][j]
         view = traced.sensors.values[:, q]
         three_phase = view @ window.whole
         if not traced.five_phase:
             return three_phase
-        direct = traced.direct_sensors[:, q]
-        optics = self.filled.systems[g][j]
-        ways, groups = [optics.scattering], traced.scene.groups[g : g + 1]
-        three_phase = three_phase - direct @ window.sun
-        beams = patch_beams(ways, KLEMS_FULL)
-        if beams.any():
-            three_phase += phases.beam_at_sun_angle(
-                (view - direct)[:, None],
-                [optics.transmission],
-                beams,
-                through_beams(groups, ways, sky.direction),
-                traced.direct_daylight[q : q + 1],
-                sky.sun,
-            )
+        three_phase = three_phase - traced.direct_sensors[:, q] @ window.sun
+        if window.beam is not None:
+            reflected = view - traced.direct_sensors[:, q]
+            three_phase += reflected @ (window.beam_at_sun - window.beam)
         return three_phase
 
     def _exact_sun(self) -> list[Estimate | None]:
@@ -344,11 +352,13 @@ class PhaseLight:
         """Luminance [Q, K, n] of the windows in some hours [n], in the state [G, n] of each."""
         hours = np.arange(len(self.sky.lit)) if hours is None else hours
         found = []
-        for light, g in zip(self.windows, self._traced.parts.group, strict=True):
-            states = np.minimum(rows[g], len(light) - 1)
-            values = np.empty((len(light[0].whole), len(hours)), dtype=np.float32)
+        for group, g in zip(self.windows, self._traced.parts.group, strict=True):
+            states = np.minimum(rows[g], len(group) - 1)
+            values = np.zeros((len(group[0].whole), len(hours)), dtype=np.float32)
             for j in np.unique(states):
-                values[:, states == j] = getattr(light[j], name)[:, hours[states == j]]
+                light = getattr(group[j], name)
+                if light is not None:
+                    values[:, states == j] = light[:, hours[states == j]]
             found.append(values)
         return np.stack(found)
 

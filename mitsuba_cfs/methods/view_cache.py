@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,7 +16,10 @@ from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
+from mitsuba_cfs.trace.room_sun import SunElements
+from mitsuba_cfs.trace.sun_paths import Places
 
+SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
 LARGEST = 256 << 20  # [bytes] larger ones are traced anew: they would push out all the others
 
 
@@ -47,10 +50,11 @@ def _read(path: Path, view: View) -> ViewMatrices:
     with opened_arrays(path) as data:
         row, share = data["row"], data["share"]
         parts = (PictureMatrix(data[name], row, share) for name in ("indirect", "lit"))
-        seen = tuple(data[f"seen_{name}"] for name in ("data", "indices", "indptr"))
-        found = ViewMatrices(
-            view, data["pixels"], *parts, sparse.csr_array(seen, shape=tuple(data["seen_shape"]))
-        )
+        elements = None
+        if "places_point" in data:
+            places = Places(data["places_point"], data["places_normal"])
+            elements = SunElements(places, _sparse(data, "elements"), _sparse(data, "smooth"))
+        found = ViewMatrices(view, data["pixels"], *parts, _sparse(data, "seen"), elements)
     os.utime(path)  # used now
     return found
 
@@ -68,8 +72,25 @@ def _write(path: Path, found: ViewMatrices) -> None:
                 lit=found.lit.rows,
                 row=found.lit.row,
                 share=found.lit.share,
-                seen_data=found.seen.data,
-                seen_indices=found.seen.indices,
-                seen_indptr=found.seen.indptr,
-                seen_shape=np.array(found.seen.shape),
+                **_arrays("seen", found.seen),
+                **_of_elements(found.elements),
             )
+
+
+def _of_elements(elements: SunElements | None) -> dict[str, np.ndarray]:
+    if elements is None:
+        return {}
+    points = {"places_point": elements.places.point, "places_normal": elements.places.normal}
+    return points | _arrays("elements", elements.share) | _arrays("smooth", elements.smooth)
+
+
+def _arrays(name: str, matrix: sparse.csr_array) -> dict[str, np.ndarray]:
+    """A sparse matrix as the arrays of a file."""
+    parts = {part: getattr(matrix, part) for part in SPARSE}
+    return {f"{name}_{part}": np.asarray(array) for part, array in parts.items()}
+
+
+def _sparse(data: Mapping[str, np.ndarray], name: str) -> sparse.csr_array:
+    """A sparse matrix from the arrays of a file."""
+    *parts, shape = (data[f"{name}_{part}"] for part in SPARSE)
+    return sparse.csr_array(tuple(parts), shape=tuple(shape))

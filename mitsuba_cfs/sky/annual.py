@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.sky.matrix import sky_matrix, sky_series, sun_up
+from mitsuba_cfs.sky.matrix import (
+    DEFAULT_ALBEDO,
+    DEFAULT_DEW_POINT_C,
+    SkySeries,
+    given_series,
+    series_matrix,
+    sky_series,
+)
+from mitsuba_cfs.sky.sun import is_up
 from mitsuba_cfs.sky.weather import Weather
 
 
@@ -58,29 +66,83 @@ def annual_sky(
     sun: bool = True,
     solar: bool = False,
     rotation_deg: float = 0.0,
+    sun_model: str = "spa",
+    ground: str = "reflected",
 ) -> AnnualSky:
     """Perez skies of a weather, single precision.
 
     Args:
         subdivision: Reinhart's MF.
-        hours: which hours of the year; by default those with the sun up.
+        hours: which hours of the weather; by default those with the sun up.
         sun: the sun alone too, which all methods but the three-phase need.
         solar: radiances too, for heat.
-        rotation_deg: see `mitsuba_cfs.sky.matrix.sky_matrix`.
+        rotation_deg, sun_model, ground: see `mitsuba_cfs.sky.matrix.sky_matrix`.
     """
-    lit = np.flatnonzero(sun_up(weather)) if hours is None else np.asarray(hours, dtype=np.int64)
-    options: dict[str, Any] = {"rotation_deg": rotation_deg, "hours": lit, "dtype": np.float32}
+    place: dict[str, Any] = {"sun_model": sun_model, "rotation_deg": rotation_deg}
+    visible = sky_series(weather, **place)
+    radiance = sky_series(weather, "solar", **place) if solar else None
+    return _of_series(
+        visible, radiance, subdivision, hours, sun=sun, reflectance=weather.albedo, ground=ground
+    )
 
-    def matrix(band: str, parts: str) -> NDArray[np.float32]:
-        return sky_matrix(weather, subdivision, band, parts, **options)
 
-    series = sky_series(weather, rotation_deg=rotation_deg)
+def given_sky(
+    direction: ArrayLike,
+    direct_normal: ArrayLike,
+    diffuse_horizontal: ArrayLike,
+    subdivision: int = 4,
+    *,
+    day_of_year: ArrayLike,
+    dew_point_c: ArrayLike = DEFAULT_DEW_POINT_C,
+    hours: ArrayLike | None = None,
+    sun: bool = True,
+    solar: bool = False,
+    ground: str = "reflected",
+    ground_reflectance: float = DEFAULT_ALBEDO,
+) -> AnnualSky:
+    """Perez skies of given suns and irradiances, wherever they come from; see `annual_sky`.
+
+    Args:
+        direction: [H, 3] unit vectors to the sun.
+        direct_normal, diffuse_horizontal: [H] irradiances [W/m2].
+        day_of_year: [H] or one, for the distance to the sun (`gendaylit -ang` takes 1).
+        dew_point_c: [H] or one, for the luminous efficacies.
+    """
+    given = direction, direct_normal, diffuse_horizontal
+    moment: dict[str, Any] = {"day_of_year": day_of_year, "dew_point_c": dew_point_c}
+    visible = given_series(*given, **moment)
+    radiance = given_series(*given, "solar", **moment) if solar else None
+    return _of_series(
+        visible,
+        radiance,
+        subdivision,
+        hours,
+        sun=sun,
+        reflectance=ground_reflectance,
+        ground=ground,
+    )
+
+
+def _of_series(
+    series: SkySeries,
+    solar: SkySeries | None,
+    subdivision: int,
+    hours: ArrayLike | None,
+    *,
+    sun: bool,
+    reflectance: float,
+    ground: str,
+) -> AnnualSky:
+    lit = np.flatnonzero(is_up(series.sun)) if hours is None else np.asarray(hours, dtype=np.int64)
+    options: dict[str, Any] = {
+        "ground_reflectance": reflectance, "ground": ground, "dtype": np.float32,
+    }  # fmt: skip
     return AnnualSky(
-        matrix("visible", "all"),
+        series_matrix(series, lit, subdivision, **options),
         series.sun[lit],
         series.direct_normal[lit],
         lit,
-        len(weather.times),
-        matrix("visible", "sun") if sun else None,
-        matrix("solar", "all") if solar else None,
+        len(series.sun),
+        series_matrix(series, lit, subdivision, "sun", **options) if sun else None,
+        None if solar is None else series_matrix(solar, lit, subdivision, **options),
     )

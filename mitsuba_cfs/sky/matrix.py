@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +10,8 @@ from scipy import sparse
 
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky import sun as sun_module
-from mitsuba_cfs.sky.options import PARTS, SUN_PATCHES
+from mitsuba_cfs.sky.ground import gendaylit_ground, reflected_ground
+from mitsuba_cfs.sky.options import GROUNDS, PARTS, SUN_PATCHES
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import PerezSky, perez_sky, relative_luminance
 from mitsuba_cfs.sky.weather import Weather
@@ -19,6 +20,7 @@ FloatArray = NDArray[np.float64]
 
 BANDS = ("visible", "solar")
 DARK = 1e-4  # [W/m2] gendaymtx's night: direct normal plus diffuse at or below it
+DEFAULT_ALBEDO = 0.2  # gendaymtx's
 DEFAULT_DEW_POINT_C = 11.0  # gendaymtx's, for files without one
 CHUNK_BYTES = 2**20  # size of one temporary array: it stays in the cache, four times the speed
 
@@ -60,9 +62,55 @@ class SkySeries:
         level *= self.diffuse_horizontal[hours] / total
         return level
 
+    def ground(self, hours: NDArray[np.int64], reflectance: float, model: str) -> FloatArray:
+        """Luminance or radiance [h] of the ground by one of `GROUNDS`."""
+        if model not in GROUNDS:
+            raise ValueError(f"ground: expected one of {GROUNDS}, got {model!r}")
+        if model == "reflected":
+            return reflected_ground(self.global_horizontal[hours], reflectance)
+        zenith = self.luminance(np.array([[0.0, 0.0, 1.0]]), hours)[0]
+        direct = self.direct_normal[hours] * np.maximum(self.sun[hours, 2], 0.0)
+        clearness, sun = self.model.clearness[hours], self.sun[hours]
+        return gendaylit_ground(zenith, direct, clearness, sun, reflectance)
+
     def _relative(self, directions: FloatArray, hours: NDArray[np.int64]) -> FloatArray:
         cosine = np.clip(directions @ self.model.sun[hours].T, -1.0, 1.0)
         return relative_luminance(self.model.coefficients[:, hours], directions[:, 2], cosine)
+
+
+def given_series(
+    sun: ArrayLike,
+    direct_normal: ArrayLike,
+    diffuse_horizontal: ArrayLike,
+    band: str = "visible",
+    *,
+    day_of_year: ArrayLike,
+    dew_point_c: ArrayLike = DEFAULT_DEW_POINT_C,
+) -> SkySeries:
+    """Perez sky under given suns.
+
+    Args:
+        sun: [H, 3] unit vectors to it.
+        direct_normal, diffuse_horizontal: [H] irradiances [W/m2].
+        day_of_year: [H] or one, for the distance to the sun.
+        dew_point_c: [H] or one, for the luminous efficacies.
+    """
+    if band not in BANDS:
+        raise ValueError(f"band: expected one of {BANDS}, got {band!r}")
+    towards = np.atleast_2d(np.asarray(sun, dtype=float))
+    direct, diffuse = (np.asarray(a, dtype=float) for a in (direct_normal, diffuse_horizontal))
+    if towards.shape[1:] != (3,) or {direct.shape, diffuse.shape} != {(len(towards),)}:
+        raise ValueError(
+            f"suns {towards.shape}, irradiances {direct.shape}, {diffuse.shape}: "
+            "expected [H, 3], [H], [H]"
+        )
+    model = perez_sky(
+        direct, diffuse, towards, day_of_year=day_of_year, dew_point_c=dew_point_c
+    )  # fmt: skip
+    dark = direct + diffuse <= DARK
+    if band == "visible":
+        direct, diffuse = direct * model.direct_efficacy, diffuse * model.diffuse_efficacy
+    return SkySeries(towards, model, np.where(dark, 0.0, diffuse), np.where(dark, 0.0, direct))
 
 
 def sky_series(
@@ -74,27 +122,26 @@ def sky_series(
     measured_illuminance: bool = False,
 ) -> SkySeries:
     """Sun and Perez sky in the middle of each interval; options as for `sky_matrix`."""
-    if band not in BANDS:
-        raise ValueError(f"band: expected one of {BANDS}, got {band!r}")
-    direct, diffuse = weather.direct_normal, weather.diffuse_horizontal
     towards = sun_module.sun_directions(weather, model=sun_model)
-    towards = sun_module.rotated(towards, rotation_deg)
-    model = perez_sky(
-        direct,
-        diffuse,
-        towards,
+    series = given_series(
+        sun_module.rotated(towards, rotation_deg),
+        weather.direct_normal,
+        weather.diffuse_horizontal,
+        band,
         day_of_year=weather.midpoints.day_of_year.to_numpy(),
         dew_point_c=_dew_point(weather),
     )
-    dark = direct + diffuse <= DARK
-    if band == "visible" and measured_illuminance:
-        measured = weather.direct_normal_illuminance, weather.diffuse_horizontal_illuminance
-        if measured[0] is None or measured[1] is None:
-            raise ValueError(f"the weather of {weather.site} has no illuminance")
-        direct, diffuse = measured[0], measured[1]
-    elif band == "visible":
-        direct, diffuse = direct * model.direct_efficacy, diffuse * model.diffuse_efficacy
-    return SkySeries(towards, model, np.where(dark, 0.0, diffuse), np.where(dark, 0.0, direct))
+    if band != "visible" or not measured_illuminance:
+        return series
+    direct, diffuse = weather.direct_normal_illuminance, weather.diffuse_horizontal_illuminance
+    if direct is None or diffuse is None:
+        raise ValueError(f"the weather of {weather.site} has no illuminance")
+    dark = weather.direct_normal + weather.diffuse_horizontal <= DARK
+    return replace(
+        series,
+        diffuse_horizontal=np.where(dark, 0.0, diffuse),
+        direct_normal=np.where(dark, 0.0, direct),
+    )
 
 
 def _dew_point(weather: Weather) -> FloatArray:
@@ -117,6 +164,7 @@ def sky_matrix(
     sun_patches: int = SUN_PATCHES,
     rotation_deg: float = 0.0,
     ground_reflectance: float | None = None,
+    ground: str = "reflected",
     measured_illuminance: bool = False,
     sun_up_only: bool = False,
     hours: ArrayLike | None = None,
@@ -136,15 +184,13 @@ def sky_matrix(
             by 1/(1.002 - cosine of the distance), each share divided by the patch's solid angle.
         rotation_deg: turns sun and sky counter-clockwise seen from above, as `gendaymtx -r`.
         ground_reflectance: the weather's albedo unless given.
+        ground: `reflected` or `gendaylit`, see `mitsuba_cfs.sky.ground`.
         measured_illuminance: use the file's illuminances rather than Perez's efficacies.
         sun_up_only: leave out the time steps where `sun_up` is false.
         hours: only these time steps, by their numbers.
 
     Raises: `ValueError` for an unknown option, or illuminances that the weather does not have.
     """
-    if parts not in PARTS:
-        raise ValueError(f"parts: expected one of {PARTS}, got {parts!r}")
-    sky = ReinhartSky(subdivision)
     series = sky_series(
         weather,
         band,
@@ -154,7 +200,29 @@ def sky_matrix(
     )
     reflectance = weather.albedo if ground_reflectance is None else ground_reflectance
     chosen = sun_module.is_up(series.sun) if sun_up_only else np.ones(len(series.sun), dtype=bool)
-    hours = np.flatnonzero(chosen) if hours is None else np.asarray(hours, dtype=np.int64)
+    return series_matrix(
+        series, np.flatnonzero(chosen) if hours is None else hours, subdivision, parts,
+        sun_patches=sun_patches, ground_reflectance=reflectance, ground=ground, dtype=dtype,
+        progress=progress,
+    )  # fmt: skip
+
+
+def series_matrix(
+    series: SkySeries,
+    hours: ArrayLike,
+    subdivision: int = 1,
+    parts: str = "all",
+    *,
+    sun_patches: int = SUN_PATCHES,
+    ground_reflectance: float = DEFAULT_ALBEDO,
+    ground: str = "reflected",
+    dtype: type = np.float64,
+    progress: Progress = silent,
+) -> NDArray[np.floating]:
+    """Some moments [h] of a series on Reinhart patches [P, h]; options as for `sky_matrix`."""
+    if parts not in PARTS:
+        raise ValueError(f"parts: expected one of {PARTS}, got {parts!r}")
+    sky, hours = ReinhartSky(subdivision), np.asarray(hours, dtype=np.int64)
     lit = np.flatnonzero((series.diffuse_horizontal + series.direct_normal)[hours] > 0)
     result: NDArray[np.floating] = np.zeros((sky.size, len(hours)), dtype=dtype)
     size = max(1, CHUNK_BYTES // (8 * sky.size))
@@ -163,7 +231,7 @@ def sky_matrix(
         h = hours[columns]
         block = np.zeros((sky.size, len(h)))
         if parts != "sun":
-            block[0] = reflectance / np.pi * series.global_horizontal[h]
+            block[0] = series.ground(h, ground_reflectance, ground)
             block[1:] = series.patches(sky, h)
         if parts != "sky":
             _add_sun(block, sky, series.sun[h], series.direct_normal[h], sun_patches)

@@ -6,6 +6,7 @@ Apart from what computes them, so that a command's options are known before anyt
 from __future__ import annotations
 
 SUN_MODELS = ("spa", "radiance")
+GROUNDS = ("reflected", "gendaylit")  # see `mitsuba_cfs.sky.ground`
 LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam
 PARTS = ("all", "sky", "sun")
 SUN_PATCHES = 4  # gendaymtx spreads the sun over this many patches

@@ -10,7 +10,7 @@ import math
 import os
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,17 +24,18 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, flat
+from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.image import picture_matrix_blocks
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
-from mitsuba_cfs.trace.picture_sharing import FACE_STEPS
+from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
+from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
-TILE = 4  # [px]
 NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
 
 
@@ -47,6 +48,7 @@ class ViewMatrices:
     indirect: PictureMatrix  # light after two reflections or more, V - V_d
     lit: PictureMatrix  # light of the windows that falls on what the pixel shows, in V_d
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel, in V_d
+    elements: SunElements | None = None  # of the rows of `indirect`, for the sun's beam
 
     def three_phase(self, luminance: ArrayLike) -> ThreePhasePictures:
         """Pictures of hours with window luminances T D s [G, K, H]."""
@@ -60,7 +62,7 @@ def view_matrices(
     groups: Sequence[WindowGroup],
     view: View,
     *,
-    tile: int = TILE,
+    tile: int | None = None,
     memory: float = MEMORY,
     folder: Path | None = None,
     window_reflectance: ArrayLike | None = None,
@@ -71,15 +73,17 @@ def view_matrices(
 
     Args:
         tile: pixels across of the squares that share their reflected light, each face of each
-            surface for itself; 1: every pixel has its own.
+            surface for itself, by default as of `tile_size`; 1: every pixel has its own.
         memory: budget [bytes]; 800 x 800 pixels and a window group take 45 MB, without tiles 582.
         folder: of the files where they lie on disk (they go with the process); the system's
             temporary folder by default.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
         options: basis, samples, max_depth, seed of `picture_matrix_blocks`.
     """
-    pixels, row, group = _tiles(TracedScene(surfaces, groups), view, tile)
-    m = int(row.max()) + 1
+    tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
+    tile = tile_size(view) if tile is None else tile
+    pixels, row, group, keys = _tiles(tracer, view, tile)
+    m = len(keys)
     columns = len(groups) * options.get("basis", KLEMS_FULL).size
     indirect, lit = (_storage((m, columns), 8 * m * columns > memory, folder) for _ in range(2))
     black = Surfaces(surfaces.triangles, np.zeros_like(surfaces.reflectance), surfaces.surface)
@@ -116,14 +120,25 @@ def view_matrices(
     total = np.maximum(np.bincount(row, share, minlength=m), 0.5 / options.get("samples", 32))
     for rows in (indirect, lit):
         rows /= total[:, None].astype(np.float32)
+    smooth = sparse.csr_array(sparse.eye_array(m, dtype=np.float32))
+    if tile > 1:
+        smooth = smoothing(Tiles(tile, view.width), keys, total).astype(np.float32)
+        for start in range(0, columns, KLEMS_FULL.size):
+            part = slice(start, start + KLEMS_FULL.size)
+            for rows in (indirect, lit):
+                rows[:, part] = smooth @ rows[:, part]
+    elements = None
+    if depth > 1:
+        area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
+        elements = sun_elements(tracer, area, view, pixels, row, seed=seed)
+        mean = sparse.diags_array((1 / total).astype(np.float32)) @ elements.share
+        elements = replace(elements, share=sparse.csr_array(mean), smooth=smooth)
     parts = (PictureMatrix(rows, row, share) for rows in (indirect, lit))
-    return ViewMatrices(view, pixels, *parts, seen)
+    return ViewMatrices(view, pixels, *parts, seen, elements)
 
 
-def _tiles(
-    tracer: TracedScene, view: View, tile: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """The pixels [n] that show something, the number [n] of the row that each shares, its window.
+def _tiles(tracer: TracedScene, view: View, tile: int) -> tuple[NDArray[np.int64], ...]:
+    """The pixels [n] that show something, the row [n] that each shares, its window; rows' keys [m].
 
     A row belongs to a square of pixels and to one face: surface and normal.  The window is the
     group that the pixel's middle shows, OPAQUE where it shows none.
@@ -134,22 +149,16 @@ def _tiles(
     eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(eye, way), coherent=True)
     valid = hit.is_valid()
-    normal = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid).numpy().T
-    surface = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, valid).numpy().astype(np.int64)
     group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
     group = group.numpy().astype(np.int64)
     if tile == 1:
-        return pixels, np.arange(len(pixels)), group
-    face = np.round(normal * FACE_STEPS).astype(np.int64) + FACE_STEPS
-    key = np.ravel_multi_index(tuple(face.T), (2 * FACE_STEPS + 1,) * 3)
-    across = -(-view.width // tile)
-    square = pixels // view.width // tile * across + pixels % view.width // tile
-    table = np.stack([square, surface, group, key])
-    order = np.lexsort(table)
-    change = np.any(np.diff(table[:, order], axis=1) != 0, axis=0)
-    row = np.empty(len(pixels), dtype=np.int64)
-    row[order] = np.concatenate([[0], np.cumsum(change)])
-    return pixels, row, group
+        return pixels, np.arange(len(pixels)), group, np.arange(len(pixels))
+    faces = 1 + face_numbers(tracer.surface.numpy(), tracer.normal.numpy().T)
+    windows = faces.max() + 1 + group  # apart from surfaces in their plane
+    face = faces[np.where(valid.numpy(), hit.prim_index.numpy().astype(np.int64), 0)]
+    face = np.where(valid.numpy(), np.where(group == OPAQUE, face, windows), 0)
+    keys, row = np.unique(Tiles(tile, view.width).of_pixels(pixels, face), return_inverse=True)
+    return pixels, row, group, keys
 
 
 def _add_rows(rows: NDArray, row: NDArray[np.int64], values: NDArray) -> None:
@@ -164,8 +173,11 @@ class FivePhasePictures:
     """Pictures of every hour by the five-phase method.
 
         L = V T D s - V_d T D_d s_d + direct sun
-          = indirect (T D s) + (lit + seen) (T D s - T D_d s_d) + lit L_s + sun in each pixel
+          = indirect (T D s - b) + (lit + seen) (T D s - T D_d s_d) + lit L_s
+            + what the room reflects of the sun's beam + sun in each pixel
 
+    b is the sun's beam as the patches have it; what the room reflects of it more than once comes
+    from elements of the surfaces instead, lit by the true disc at its own angle (`room_sun`).
     L_s is the sun that the windows scatter, on Klems patches; in a pixel that shows a window it is
     the BSDF's value for the sun and that pixel, and the sun's beam falls on each pixel for itself.
     With `show_outdoors` what a window's straight beam shows is no mean over patches either.
@@ -179,6 +191,8 @@ class FivePhasePictures:
         direct_luminance: ArrayLike,
         directions: ArrayLike,
         illuminance: ArrayLike,
+        *,
+        beam: ArrayLike | None = None,
     ) -> None:
         """From the hours' skies.
 
@@ -187,6 +201,8 @@ class FivePhasePictures:
             direct_luminance: [G, K, H] T D_d s_d: D_d with `max_depth=1` and the seed and samples
                 of D, s_d the sun alone (`sky_matrix(..., parts="sun")`).
             directions: [H, 3] to the sun; illuminance: [H] normal to it [lx].
+            beam: [G, K, H] the beam's part b of T D_d s_d, which the matrices' elements replace;
+                without, the patches' stays.
         """
         self.view, self.pixels = matrices.view, matrices.pixels
         self._matrices, self._sun = matrices, sun
@@ -195,7 +211,11 @@ class FivePhasePictures:
         if rest.min(initial=0) < -NEGATIVE * self._whole.max(initial=0):
             raise ValueError("the direct sun's luminance exceeds the whole: D_d is not part of D")
         self._rest = np.maximum(rest, 0)
-        self._scattered, self._outdoors = self._rest, ()
+        self._reflected, self._elements = self._whole, None
+        if beam is not None and matrices.elements is not None:  # below 0 by rounding alone
+            self._reflected = np.maximum(self._whole - flat(beam, len(self._whole)), 0)
+            self._elements = matrices.elements
+        self._scattered, self._outdoors = self._rest, None
         self._directions = np.asarray(directions, dtype=float)
         self._illuminance = np.asarray(illuminance, dtype=float)
         expected = self._whole.shape[1]
@@ -221,10 +241,7 @@ class FivePhasePictures:
         outside = np.matmul(daylight, sky) + np.matmul(daylight - direct, sun)
         beam = (seen.beam[:, :, None] * outside).reshape(self._rest.shape)
         self._scattered = np.maximum(self._rest - beam, 0).astype(np.float32)
-        self._outdoors = (
-            (seen.sky, sky.astype(np.float32)),
-            (seen.reflected, (sky + sun).astype(np.float32)),
-        )
+        self._outdoors, self._sky = seen, sky.astype(np.float32)
 
     @property
     def hours(self) -> int:
@@ -233,14 +250,34 @@ class FivePhasePictures:
 
     def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
+        values = self._values(batch)
+        self._sun.add_disc(values, self._directions[batch], self._illuminance[batch])
+        return values
+
+    def without_disc(
+        self, batch: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        discs = self._sun.discs(self._directions[batch], self._illuminance[batch])
+        return self._values(batch), discs
+
+    def _values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Luminance [h, n] without the sun's disc."""
         m, rest = self._matrices, self._rest[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength)
         windows = m.seen @ self._scattered[:, batch]
-        for rows, sky in self._outdoors:
-            windows += rows @ sky[:, batch]
+        seen = self._outdoors
+        if seen is not None:
+            sky = self._sky[:, batch]
+            windows += seen.sky @ sky
         values = np.ascontiguousarray(windows.T, dtype=np.float32)
-        m.indirect.add_to(values, self._whole[:, batch])
+        if seen is not None:
+            seen.sun.add_to(values, suns, strength, seen.reflected @ sky)
+        more = None
+        if self._elements is not None:
+            more = self._sun.on_elements(self._elements, suns, strength)
+        m.indirect.add_to(values, self._reflected[:, batch], more)
         m.lit.add_to(values, rest + scattered.reshape(rest.shape))
         self._sun.add_to(values, suns, strength)
         return values

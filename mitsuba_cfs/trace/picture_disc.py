@@ -1,4 +1,4 @@
-"""The sun's disc in a view's pixels, cut into small pieces: right whatever their size."""
+"""The sun's disc cut into small pieces: in a view's pixels, and for what of it is seen."""
 
 from __future__ import annotations
 
@@ -10,6 +10,32 @@ from mitsuba_cfs.sky.sun import SUN_RADIUS
 
 SUBPIXEL = np.radians(0.025)  # places on the sun's disc lie so close: the disc holds 360
 RAYS = 1 << 20  # tried at a time
+PARTS = 512  # of the disc, for what of it is seen: an edge across it is found to 1 %
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))  # [rad]
+
+
+def disc_parts(sun: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions [PARTS, 3] of equal parts of the disc round a unit vector [3], a sunflower's."""
+    number = np.arange(PARTS) + 0.5
+    cosine = 1 - number / PARTS * (1 - np.cos(SUN_RADIUS))
+    sine, turn = np.sqrt(1 - cosine**2), number * GOLDEN_ANGLE
+    side = np.cross(sun, [1.0, 0, 0] if abs(sun[0]) < 0.7 else [0, 1.0, 0])
+    side /= np.linalg.norm(side)
+    other = np.cross(sun, side)
+    across = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * other
+    return cosine[:, None] * sun + sine[:, None] * across
+
+
+def disc_in_view(
+    directions: NDArray[np.float64], sun: NDArray[np.float64], pixel_size: float
+) -> bool:
+    """Whether a sun [3] stands in one of the pixels that look to directions [n, 3]."""
+    return bool(np.max(directions @ sun, initial=-1.0) > np.cos(pixel_size))
+
+
+def before_eye(view: View, directions: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether directions [.., 3] lie before the eye: at its side the disc is cut in two."""
+    return directions @ np.asarray(view.direction, dtype=float) > 0
 
 
 def disc_reach(pixel_size: float) -> float:

@@ -22,22 +22,30 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.outdoor_sun import OutdoorSun, ShownFaces
+from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, pixel_places
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sun_paths import Places, face_places
 
 BLOCK_BYTES = 128 * 2**20
 PATCH_POINTS = 16  # directions in each window patch, for its mean transmittance
 MAX_DEPTH = 16
+RAYS = 2**20  # at once
 
 
 @dataclass(frozen=True)
 class OutdoorCoefficients:
-    """Luminance of the pixels through the windows' straight beam, per unit luminance of the sky."""
+    """Luminance of the pixels through the windows' straight beam, per unit luminance of the sky.
+
+    What surfaces reflect is added by `sun`; `sky` and `reflected` are for the sky without the sun.
+    """
 
     sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows itself
-    reflected: sparse.csr_array  # [n, P] what surfaces outdoors reflect to it
+    reflected: sparse.csr_array  # [C, P] irradiance of the faces in each tile
     beam: NDArray[np.float64]  # [G, K] transmittance of the beam, mean over each window patch
+    sun: OutdoorSun
 
 
 def outdoors(
@@ -50,6 +58,7 @@ def outdoors(
     subdivision: int = 4,
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 8,
+    tile: int | None = None,
     seed: int = 0,
 ) -> OutdoorCoefficients:
     """Trace every pixel through the windows to the sky; arguments as for `direct_sun_matrix`.
@@ -57,20 +66,52 @@ def outdoors(
     Args:
         subdivision: Reinhart's MF of the sky.
         samples: paths for each pixel, at as many places within it.
+        tile: pixels across of the squares that share what varies slowly over a face, by default
+            as of `tile_size`.
     """
     inside = TracedScene(interior, groups)
     outside = TracedScene(exterior, groups, windows_block=False)
-    sky = SkyBins(ReinhartSky(subdivision))
+    sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
-    size = max(256, BLOCK_BYTES // (8 * sky.size))
-    free, whole = [], []
-    for start in range(0, len(pixels), size):
-        block = pixels[start : start + size]
+    faces = face_numbers(outside.surface.numpy(), outside.normal.numpy().T)
+    rays_at_once = max(256, RAYS // samples)
+    free, shown = [], []
+    for start in range(0, len(pixels), rays_at_once):
+        block = pixels[start : start + rays_at_once]
         lanes = _through_windows(inside, scattering, view, block, samples)
-        for rows, depth in ((free, 1), (whole, MAX_DEPTH)):
-            rows.append(_rows(outside, sky, lanes, len(block), depth, seed))
-    free, whole = (sparse.csr_array(sparse.vstack(rows)) for rows in (free, whole))
-    return OutdoorCoefficients(free, (whole - free).maximum(0), _beams(scattering, basis))
+        if not len(lanes.row):
+            free.append(sparse.csr_array((len(block), sky.size), dtype=np.float32))
+            continue
+        rows, met = _looked_at(outside, sky, lanes, len(block))
+        free.append(rows)
+        shown.append(_with_faces(met, block, start, faces, Tiles(tile, view.width)))
+    found, keys = _joined(shown)
+    count = np.bincount(found.tile, minlength=len(keys))
+    smooth = smoothing(Tiles(tile, view.width), keys, count)
+    sun = OutdoorSun(outside, found, smooth, seed)
+    reflected = smooth @ _reflected(outside, sky, found, len(keys), seed)
+    return OutdoorCoefficients(
+        sparse.csr_array(sparse.vstack(free)),
+        sparse.csr_array(reflected.astype(np.float32)),
+        _beams(scattering, basis),
+        sun,
+    )
+
+
+@dataclass(frozen=True)
+class _Lanes:
+    """Rays of a block's pixels through windows."""
+
+    row: NDArray[np.int64]  # [r] of the pixel in its block
+    origin: NDArray[np.float32]  # [3, r]
+    way: NDArray[np.float32]  # [3, r]
+    weight: NDArray[np.float64]  # [r] transmittance over the number of the pixel's rays
+
+    def some(self, chosen: NDArray) -> _Lanes:
+        """Some of them."""
+        return _Lanes(
+            self.row[chosen], self.origin[:, chosen], self.way[:, chosen], self.weight[chosen]
+        )
 
 
 def _through_windows(
@@ -79,8 +120,8 @@ def _through_windows(
     view: View,
     pixels: NDArray[np.int64],
     samples: int,
-) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Rays of a block's pixels that meet a window: row, key, direction [3, r], and weight."""
+) -> _Lanes:
+    """Rays of a block's pixels that meet a window and go straight on."""
     eye = mi.Point3f(*map(float, np.asarray(view.position) - inside.centre))
     row = np.repeat(np.arange(len(pixels)), samples)
     number = pixels[row]
@@ -102,36 +143,75 @@ def _through_windows(
         weight = dr.select(seen, system.through(local), weight)
     weight = weight.numpy() / samples
     lit = np.flatnonzero(weight > 0)
-    place = mi.Point3f(eye + way * hit.t).numpy()[:, lit]
-    keys = number[lit] * samples + lit % samples
-    return row[lit], keys, np.concatenate([place, directions[lit].T]), weight[lit]
+    place = mi.Point3f(eye + way * hit.t).numpy()[:, lit].astype(np.float32)
+    return _Lanes(row[lit], place, directions[lit].T.astype(np.float32), weight[lit].astype(float))
 
 
-def _rows(outside, sky, lanes, count, depth, seed) -> sparse.csr_array:
-    """Rows [count, P] of a block."""
-    row, keys, way, weight = lanes
-    if not len(row):
-        return sparse.csr_array((count, sky.size), dtype=np.float32)
-    used, place = np.unique(row, return_inverse=True)
-    matrix = dr.zeros(mi.Float64, len(used) * sky.size)
-    origin, direction = way[:3].astype(np.float32), way[3:].astype(np.float32)
-    key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-    starts = PathStarts(
-        mi.UInt32(place.astype(np.uint32)),
-        mi.Point3f(origin),
-        mi.Vector3f(direction),
-        path_generator(mi.UInt32(keys.astype(np.uint32)), key),
-        dr.opaque(mi.UInt32, depth),
-        mi.Bool(True),
+def _looked_at(
+    outside: TracedScene, sky: SkyBins, lanes: _Lanes, count: int
+) -> tuple[sparse.csr_array, tuple[_Lanes, NDArray[np.int64], NDArray[np.float32], Places]]:
+    """Rows [count, P] of what is sky; the other lanes, their triangles, reflectances and places."""
+    origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
+    hit = outside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=True)
+    found = hit.is_valid()
+    rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, found).numpy()
+    places = face_places(outside, origin, way, hit, found)
+    met, patch = found.numpy(), sky.index(way).numpy().astype(np.int64)
+    entries = lanes.weight[~met].astype(np.float32), (lanes.row[~met], patch[~met])
+    rows = sparse.csr_array(sparse.coo_array(entries, shape=(count, sky.size)))
+    prim = hit.prim_index.numpy().astype(np.int64)[met]
+    return rows, (lanes.some(met), prim, rho[met], places.some(met))
+
+
+def _with_faces(met, block: NDArray, start: int, faces: NDArray, tiles: Tiles) -> ShownFaces:
+    """What a block's rays met, by face and tile."""
+    lanes, prim, rho, places = met
+    tile = tiles.of_pixels(block[lanes.row], faces[prim])
+    return ShownFaces(start + lanes.row, tile, lanes.weight * rho / np.pi, places)
+
+
+def _joined(shown: Sequence[ShownFaces]) -> tuple[ShownFaces, NDArray[np.int64]]:
+    """The faces of all blocks, their tiles numbered from 0, and the keys of these."""
+    none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
+    pixel, tile = (
+        np.concatenate([none, *(getattr(s, name) for s in shown)]) for name in ("pixel", "tile")
     )
-    add_daylight_paths(outside, sky, matrix, starts)
-    values = matrix.numpy().reshape(len(used), sky.size)
-    mean = np.bincount(place, weight) / np.bincount(place)
-    found = sparse.csr_array((values * mean[:, None]).astype(np.float32))
-    spread = sparse.csr_array(
-        (np.ones(len(used), dtype=np.float32), (used, np.arange(len(used)))), (count, len(used))
-    )
-    return sparse.csr_array(spread @ found)
+    value = np.concatenate([nothing, *(s.value for s in shown)])
+    numbers, tile = np.unique(tile, return_inverse=True)
+    return ShownFaces(pixel, tile, value, Places.joined([s.places for s in shown])), numbers
+
+
+def _reflected(
+    outside: TracedScene, sky: SkyBins, shown: ShownFaces, count: int, seed: int
+) -> sparse.csr_array:
+    """Irradiance of the faces in tiles per unit luminance of the sky [C, P]."""
+    order = np.argsort(shown.tile, kind="stable")
+    ends = np.searchsorted(shown.tile[order], np.arange(count + 1))
+    size = max(16, BLOCK_BYTES // (8 * sky.size))
+    blocks = [sparse.csr_array((0, sky.size), dtype=np.float32)]
+    for start in range(0, count, size):
+        end = min(start + size, count)
+        mine = order[ends[start] : ends[end]]
+        tile, places = shown.tile[mine] - start, shown.places.some(mine)
+        matrix = dr.zeros(mi.Float64, (end - start) * sky.size)
+        generator = path_generator(
+            mi.UInt32(mine.astype(np.uint32)), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+        )
+        u = mi.Point2f(generator.next_float32(), generator.next_float32())
+        away = mi.warp.square_to_cosine_hemisphere(u)
+        starts = PathStarts(
+            mi.UInt32(tile.astype(np.uint32)),
+            places.points(),
+            mi.Frame3f(places.normals()).to_world(away),
+            generator,
+            dr.opaque(mi.UInt32, MAX_DEPTH - 1),
+            mi.Bool(True),
+        )
+        add_daylight_paths(outside, sky, matrix, starts)
+        values = matrix.numpy().reshape(end - start, sky.size)
+        values *= np.pi / np.bincount(tile, minlength=end - start)[:, None]
+        blocks.append(sparse.csr_array(values.astype(np.float32)))
+    return sparse.csr_array(sparse.vstack(blocks))
 
 
 def _beams(scattering: Sequence[Scattering], basis: KlemsBasis) -> NDArray[np.float64]:

@@ -20,18 +20,23 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles, rays
+from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
-from mitsuba_cfs.trace.picture_disc import disc_rays, disc_reach
-from mitsuba_cfs.trace.picture_sharing import SharedLight, Tiles, face_numbers
+from mitsuba_cfs.trace.path_disc import add_disc, eye_of
+from mitsuba_cfs.trace.picture_sharing import (
+    STEPS,
+    SharedLight,
+    Tiles,
+    face_numbers,
+    tile_size,
+)
 from mitsuba_cfs.trace.point_in_time import (
     Vertex,
     add_paths,
     leave,
     on_disc,
-    straight_to_sky,
     sun_at,
     window_parts,
 )
@@ -40,9 +45,7 @@ from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixe
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 BLOCK = 2**19  # paths traced at a time
-TILE, LARGEST_TILE = np.radians(0.9), 16  # across; [px]
-DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
-SURFACE_STEPS, WINDOW_STEPS = (1, 2), (1,)  # [tiles] of the smoothing, one after the other
+WINDOW_STEPS = (1,)  # [tiles] of the smoothing where windows scatter
 
 
 def point_in_time_picture(
@@ -54,6 +57,7 @@ def point_in_time_picture(
     tile: int | None = None,
     max_depth: int = 24,
     seed: int = 0,
+    disc: bool = True,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
     """Luminance (radiance) picture [ny, nx] under one sky.
@@ -63,9 +67,9 @@ def point_in_time_picture(
         tile: pixels across of the squares that share slowly varying light, by default 0.9 degrees
             (2 pixels at least); 1: every pixel for itself, without smoothing, for a picture free
             of any assumption.
+        disc: the sun's disc too; without it, it is to be rated apart (`path_disc.disc_seen`).
     """
-    if tile is None:
-        tile = int(np.clip(round(TILE / _pixel_size(view)), 2, LARGEST_TILE))
+    tile = tile_size(view) if tile is None else tile
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
@@ -84,7 +88,8 @@ def point_in_time_picture(
             rows.append(light.by_tile(pixels, samples, tiles))
         progress("picture", (start + len(pixels)) / len(shown))
     _add_shared(picture, tiles, pairs, rows, numbers.windows)
-    _add_disc(picture, shown, room, sky, view)
+    if disc:
+        add_disc(picture, room, sky, view)
     return picture.astype(np.float32).reshape(view.height, view.width)
 
 
@@ -116,36 +121,10 @@ def _add_shared(
     light = SharedLight(tiles, key, total, count)
     if tiles.size > 1:
         glass = light.faces < windows
-        for step in SURFACE_STEPS:
+        for step in STEPS:
             light = light.smoothed(step, None if step in WINDOW_STEPS else ~glass)
     pixel, face, weight = (np.concatenate(part) for part in zip(*pairs, strict=True))
     np.add.at(picture, pixel, weight * light.at(pixel, face))
-
-
-def _add_disc(picture: NDArray, shown: NDArray, room: LitRoom, sky: Sky, view: View) -> None:
-    """Add the sun's disc seen through the straight beam, by its share of each pixel."""
-    sun = sky.sun.numpy().ravel()
-    size = _pixel_size(view)
-    directions = pixel_directions(view)[0].reshape(-1, 3)[shown]
-    near = shown[directions @ sun > np.cos(disc_reach(size))]
-    pixel, way, share = disc_rays(view, near, np.tile(sun, (len(near), 1)), size, step=DISC_STEP)
-    if not len(pixel) or not sky.sun_radiance.numpy()[0]:
-        return
-    towards = mi.Vector3f(way.T.astype(np.float32))
-    tau = straight_to_sky(
-        room, _eye(room, view), towards, mi.Bool(False), dr.full(mi.Bool, True, len(pixel))
-    )
-    seen = np.bincount(pixel, tau.numpy(), minlength=len(near))
-    picture[near] += seen * share * sky.sun_radiance.numpy()[0]
-
-
-def _pixel_size(view: View) -> float:
-    """The largest angle [rad] across a pixel."""
-    return float(np.sqrt(pixel_solid_angles(view).max()))
-
-
-def _eye(room: LitRoom, view: View) -> mi.Point3f:
-    return mi.Point3f(*map(float, np.asarray(view.position) - room.inside.centre))
 
 
 class _Faces:
@@ -218,7 +197,7 @@ class _Kernel:
         self._room, self._sky, self._view, self._faces = room, sky, view, faces
         self._tiles = tiles
         self._samples, self._places = samples, pixel_places(samples)
-        self._eye = _eye(room, view)
+        self._eye = eye_of(room, view)
         self._depth = dr.opaque(mi.UInt32, max_depth)
         self._key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
         self._beams = any(system.beam is not None for system in room.systems)

@@ -11,14 +11,22 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
-from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.picture_disc import disc_rays, disc_reach
+from mitsuba_cfs.trace.picture_disc import (
+    before_eye,
+    disc_parts,
+    disc_rays,
+    disc_reach,
+)
+from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sun_paths import on_disc_of, place_and_hour
 
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
 WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
@@ -89,19 +97,57 @@ class PictureSun:
             self._panes.append((pane, mi.Point3f(point + step), towards))
 
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
-        """Add the sun's luminance [cd/m2] to the pixels' values [h, n].
+        """Add the sun's light on surfaces and windows [cd/m2] to the pixels' values [h, n].
+
+        Its disc is apart: `add_disc`, `discs`.
 
         Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
         """
-        facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
-        lit = np.flatnonzero(facing & (illuminance > 0) & (suns[:, 2] > 0))
+        lit = self._shining(suns, illuminance)
         if not len(lit):
             return
         towards, strength = suns[lit], illuminance[lit]
         self._add(values, lit, self._surface, towards, strength, self._beam_on_surfaces)
         for g, (pane, _, _) in enumerate(self._panes):
             self._add(values, lit, pane, towards, strength, self._scattered_in_panes, g)
-        self._add_disc(values, lit, towards, strength)
+
+    def on_elements(
+        self, elements: SunElements, suns: NDArray, illuminance: NDArray
+    ) -> NDArray[np.float32]:
+        """Luminance [m, h] of a picture's rows by the sun that parts of the room reflect."""
+        found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
+        lit, places = self._shining(suns, illuminance), elements.places
+        if not places.size or not len(lit):
+            return found
+        step = max(1, LANES // places.size)
+        for start in range(0, len(lit), step):
+            hours = lit[start : start + step]
+            point, normal, to_sun = place_and_hour(places, suns[hours])
+            cosine = dr.dot(normal, to_sun)
+            tau = self._straight(point, to_sun, cosine > 0)
+            light = dr.select(tau > 0, tau * cosine, 0.0).numpy().reshape(places.size, len(hours))
+            found[:, hours] = elements.rows(light * illuminance[hours].astype(np.float32))
+        return found
+
+    def _shining(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.int64]:
+        """The hours in which the sun stands before a window."""
+        facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
+        return np.flatnonzero(facing & (illuminance > 0) & (suns[:, 2] > 0))
+
+    def discs(self, suns: NDArray, illuminance: NDArray) -> list[SunDisc | None]:
+        """The sun's disc [h] as the eye sees it through the straight beam, None where hidden."""
+        found: list[SunDisc | None] = [None] * len(suns)
+        lit = self._shining(suns, illuminance)
+        lit = lit[self._tree.query(suns[lit])[0] < self._size] if len(lit) else lit
+        if not len(lit):
+            return found
+        ways = np.stack([disc_parts(suns[hour]) for hour in lit])
+        towards = mi.Vector3f(ways.reshape(-1, 3).T.astype(np.float32))
+        tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
+        tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
+        for hour, way, part in zip(lit, ways, tau * before_eye(self._view, ways), strict=True):
+            found[hour] = seen_disc(way, part * (illuminance[hour] / SUN_SOLID_ANGLE))
+        return found
 
     def _add(self, values, lit, columns, suns, strength, kernel, *options) -> None:
         """Add what a kernel gives for pairs of hours and pixels, some hours at a time."""
@@ -122,7 +168,7 @@ class PictureSun:
 
     def _beam_on_surfaces(self, pixel, hour, suns, light) -> mi.Float:
         """Luminance of the surfaces where the windows' straight beam falls on them."""
-        to_sun = _on_disc(dr.gather(mi.Vector3f, suns, hour), pixel)
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, suns, hour), pixel)
         cosine = dr.dot(dr.gather(mi.Vector3f, self._normal, pixel), to_sun)
         place = dr.gather(mi.Point3f, self._place, pixel)
         tau = self._straight(place, to_sun, cosine > 0)
@@ -152,7 +198,7 @@ class PictureSun:
     def _scattered_in_panes(self, pixel, hour, suns, light, g: int) -> mi.Float:
         """Luminance of window pixels: f(sun, pixel) times the sun's illuminance on the pane."""
         _, place, towards = self._panes[g]
-        to_sun = _on_disc(dr.gather(mi.Vector3f, suns, hour), pixel)
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, suns, hour), pixel)
         local = self._inside.to_group(g, to_sun)
         lit = local.z > 0
         if not self._free:
@@ -200,8 +246,10 @@ class PictureSun:
         hidden = self._outside.scene.ray_test(ray, coherent=False)
         return 1.0 - hidden.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
 
-    def _add_disc(self, values, lit, suns, strength) -> None:
-        """Add the sun's disc seen through the straight beam, by its share of each pixel."""
+    def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
+        """Add the disc as the eye sees it, by its share of each pixel; arguments of `add_to`."""
+        lit = self._shining(suns, illuminance)
+        suns, strength = suns[lit], illuminance[lit]
         reach = 2 * np.sin(disc_reach(self._size) / 2)
         near = self._tree.query_ball_point(suns, reach)
         hour = np.repeat(np.arange(len(lit)), [len(found) for found in near])
@@ -215,10 +263,3 @@ class PictureSun:
         tau = self._straight(mi.Point3f(self._eye), way, mi.Bool(True)).numpy()
         seen = np.bincount(pair, tau, minlength=len(hour)) * share
         np.add.at(values, (lit[hour], pixel), seen * strength[hour] / SUN_SOLID_ANGLE)
-
-
-def _on_disc(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
-    """A direction on the sun's disc, another one for each pixel: the edges of shadows are soft."""
-    u = lattice_2d(number, mi.UInt32(0x5BD1E995), 2)
-    local = mi.warp.square_to_uniform_cone(u, float(np.cos(SUN_RADIUS)))
-    return mi.Frame3f(centre).to_world(local)

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
@@ -14,7 +16,7 @@ from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering, Scattering
-from mitsuba_cfs.trace.lit_room import PatchBeam, PathOptics
+from mitsuba_cfs.trace.lit_room import AngularBeam, PatchBeam, PathOptics
 
 WINDOW_UP = (0, 1, 0)  # of a plugin that is asked in the window's own frame
 
@@ -42,6 +44,23 @@ def lit_system(bsdf: Bsdf) -> PathOptics:
     rest = replace(full, transmission_front=front.scattered, transmission_back=back.scattered)
     beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
     return PathOptics(_loaded(klems_plugin(rest)), beam)
+
+
+class AngularScattering:
+    """What passes by its angle of incidence alone: straight on, and scattered evenly."""
+
+    def __init__(self, straight: ArrayLike, scattered: ArrayLike) -> None:
+        """From shares [n], [m] at even steps of the cosine of incidence, 0 to 1."""
+        self._straight, self._scattered = AngularBeam(straight), AngularBeam(scattered)
+        self.key: object = ("angular", np.asarray(straight), np.asarray(scattered))
+
+    def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return self._scattered.at(sun) * dr.inv_pi + dr.zeros(mi.Float, dr.width(outward))
+
+    def through(self, sun: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return self._straight.at(sun)
 
 
 class TreeBeam:

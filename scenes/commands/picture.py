@@ -65,7 +65,6 @@ def command(
     start = time.perf_counter()
     options = PictureOptions(*room_files(building, weather, system), **chosen)
     read = read_files(options)  # before anything heavy is loaded
-    from mitsuba_cfs.glare.evaluation import evaluate
     from scenes.commands.progress_bar import ProgressBar
     from scenes.view_picture import room_picture, write_picture
 
@@ -73,13 +72,9 @@ def command(
         found = room_picture(options, progress, read)
     for file in out:
         write_picture(found, file, print_like=tone)
-    view, lit = found.view, found.luminance
+    view, rated = found.view, found.glare
     says = f"{found.room}, {found.time:%d %B %H:%M}: {view.width} x {view.height} pixels"
-    if (
-        view.kind in ("angular", "hemispherical")
-        and view.horizontal_deg == view.vertical_deg == 180
-    ):
-        rated = evaluate(lit, view)
+    if rated is not None:
         says += f", Ev {rated.Ev:,.0f} lx, DGP {rated.dgp:.3f}, {rated.count} glare source(s)"
     click.echo(f"{says}; {time.perf_counter() - start:.1f} s")
     for note in found.notes:

@@ -6,10 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mitsuba_cfs.glare.evaluation import evaluate
-from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.methods.glare import pictures
+from mitsuba_cfs.methods.glare import rated_pictures
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress
@@ -53,11 +51,9 @@ def room_glare(
     """
     progress("pictures", 0.0)
     columns = np.searchsorted(light.sky.lit, hours)
-    geometry = GlareView(view)
     rated = []
-    made = pictures(light, columns, state, progress=progress)
-    for hour, luminance in zip(hours, made, strict=True):
-        result = evaluate(luminance, geometry)
+    made = rated_pictures(light, columns, state, progress=progress)
+    for hour, (luminance, result) in zip(hours, made, strict=True):
         glare = {
             "ev": result.Ev,
             "dgp": result.dgp,

@@ -21,7 +21,6 @@ from mitsuba_cfs.glare.classes import (
     hour_not_exceeded,
     protection_level,
 )
-from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import format_view
 from scenes.figures.carpet import day_grid
@@ -43,9 +42,8 @@ def write_view(year: GlareYear, rated: ViewYear, folder: Path) -> dict[str, obje
     write_table(rated.ratings, folder / f"{name}.parquet")
     row = view_row(year, rated)
     write_heat_map(folder / f"{name}_heat_map.png", year, rated)
-    for moment, picture in rated.pictures.items():
+    for moment, (picture, result) in rated.pictures.items():
         where = folder / f"{name}_{moment:%m-%d_%Hh}"
-        result = evaluate(picture, rated.view.view)
         title = f"{moment:%d %B %H:%M}, {year.options.metric} {rated.ratings.dgp[moment]:.2f}"
         write_falsecolour(where.with_suffix(".png"), picture, title=title)
         write_check_picture(Path(f"{where}_sources.png"), result, title=title)

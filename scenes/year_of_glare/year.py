@@ -17,10 +17,11 @@ from bim.ifc.corrections import corrections_file
 from bim.model import Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
+from mitsuba_cfs.glare.evaluation import GlareResult
 from mitsuba_cfs.images.view import View, format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.matrices.cache import digest as content_digest
-from mitsuba_cfs.methods.glare import hourly_glare, pictures
+from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
@@ -47,7 +48,7 @@ class ViewYear:
 
     view: NamedView
     ratings: pd.DataFrame  # [L, figures] by the time of each lit hour
-    pictures: dict[pd.Timestamp, NDArray[np.float32]]  # [ny, nx] [cd/m2], none for sDGP
+    pictures: dict[pd.Timestamp, tuple[NDArray[np.float32], GlareResult]]  # none for sDGP
     seconds: float
 
 
@@ -151,13 +152,13 @@ def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iter
 
 def _pictures(
     light: PhaseLight, year: GlareYear, found: AnnualGlare
-) -> dict[pd.Timestamp, NDArray[np.float32]]:
-    """Pictures of the worst lit hours."""
+) -> dict[pd.Timestamp, tuple[NDArray[np.float32], GlareResult]]:
+    """Pictures of the worst lit hours, and their glare."""
     hours = found.worst(year.options.worst)
     if not len(hours) or year.options.metric == "sDGP":
         return {}
     times = year.weather.midpoints[year.sky.lit[hours]]
-    return dict(zip(times, pictures(light, hours), strict=True))
+    return dict(zip(times, rated_pictures(light, hours), strict=True))
 
 
 def used_dgp(year: GlareYear, dgp: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -79,9 +79,9 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path):
         view, pixels, hours = VIEW, pictures.pixels, pictures.hours
 
         @staticmethod
-        def values(batch):
+        def without_disc(batch):
             asked.extend(batch)
-            return pictures.values(batch)
+            return pictures.without_disc(batch)
 
     again = annual_glare(Watched, keep=file)
     assert asked == [3, 4, 5]

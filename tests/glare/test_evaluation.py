@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from glare_pictures import AHEAD, PICTURES, VIEWS, disc, room, window
 
+from mitsuba_cfs.glare.areas import Zones
 from mitsuba_cfs.glare.evaluation import (
     GlareOptions,
     Task,
     evaluate,
 )
 from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order, in_scan_order
+from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View, parse_view
 
 
@@ -134,3 +136,48 @@ def test_solid_angles_of_a_lifted_view_are_where_the_pixels_are():
     picture = disc(view, room(view), (0.2, 1, -0.4), 0.1, 9000)
     omega = evaluate(picture, view).sources.solid_angle
     assert omega == pytest.approx(2 * np.pi * (1 - np.cos(0.1)), rel=0.03)  # cut into pixels
+
+
+def test_each_bright_pixel_is_a_source_by_raytools_sum():
+    picture = disc(AHEAD, np.full((220, 220), 100.0), (0.3, 1.0, 0.2), 0.1, 1e4)
+    picture = disc(AHEAD, picture, (0.3, 1.0, 0.2), 0.05, 4e4)
+    one, each = (evaluate(picture, AHEAD, grouping=name) for name in ("evalglare", "pixels"))
+    geometry = GlareView(AHEAD)
+    L, omega, P = in_scan_order(picture), geometry.solid_angle, geometry.guth
+    bright = (L > 2000) & geometry.valid
+    expected = float((L**2 * omega / P**2)[bright].sum())
+    assert each.contrast == pytest.approx(expected, rel=1e-6)
+    assert each.count == np.count_nonzero(bright) and one.count == 1
+    # the mean of two luminances, squared, is less than the mean of their squares
+    assert one.contrast < 0.8 * each.contrast
+    assert one.Ev == each.Ev and one.Ev_direct == pytest.approx(each.Ev_direct, rel=1e-12)
+    assert "evalglare" in one.options.rule and "raytools" in each.options.rule
+
+
+def test_the_disc_counts_where_it_is_seen_and_bright():
+    towards = np.array([0.3, 1.0, 0.2]) / np.linalg.norm([0.3, 1.0, 0.2])
+    picture = np.full((220, 220), 100.0)
+    dim, bright = (SunDisc(towards, L, 6e-5) for L in (1500.0, 1e6))
+    bare = evaluate(picture, AHEAD)
+    rated = evaluate(picture, AHEAD, disc=dim)
+    assert rated.count == 0 and rated.disc is None
+    assert rated.Ev - bare.Ev == pytest.approx(1500 * 6e-5 * towards[1], rel=1e-6)
+    for grouping in ("evalglare", "pixels"):
+        rated = evaluate(picture, AHEAD, disc=bright, grouping=grouping)
+        assert rated.count == 1 and rated.largest_luminance == 1e6
+        assert rated.Ev_direct == pytest.approx(1e6 * 6e-5 * towards[1], rel=1e-9)
+        assert rated.background_luminance == pytest.approx(bare.background_luminance, rel=1e-9)
+        row, column = (int(i[0]) for i in np.nonzero(rated.labels))
+        assert row < 110 < column
+    # 80 degrees to the side: outside the 51 that both eyes see
+    aside = SunDisc(np.array([np.sin(1.4), np.cos(1.4), 0]), 1e6, 6e-5)
+    assert evaluate(picture, AHEAD, disc=aside, field_of_view="both eyes").count == 0
+    assert evaluate(picture, AHEAD, disc=aside).count == 1
+
+
+def test_rules_that_are_none_are_refused():
+    for wrong in ({"grouping": "heaps"}, {"sun": "moon"}):
+        with pytest.raises(ValueError, match="expected"):
+            GlareOptions(**wrong)
+    with pytest.raises(ValueError, match="zones"):
+        GlareOptions(grouping="pixels", zones=Zones(1, 1, 0.1))

@@ -9,7 +9,9 @@ from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import annual_glare, full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.glare.position_index import position_index
 from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces
 from tests.trace import rooms
 
@@ -45,6 +47,7 @@ def sun_picture(system, sun, *, exterior=rooms.NOTHING, scale=1.0, view=VIEW):
     found = PictureSun(room, exterior, groups, [system], view)
     values = np.zeros((1, len(found.pixels)), dtype=np.float32)
     found.add_to(values, sun[None], LUX)
+    found.add_disc(values, sun[None], LUX)
     return full_picture(values[0], found.pixels, view)
 
 
@@ -73,6 +76,84 @@ def test_half_of_a_disc_behind_an_edge_is_missing():
         sun_picture(clear(), SUN, scale=0.0, exterior=rooms.surfaces([(wall, 0.2)]))
     )
     assert half / whole == pytest.approx(0.5, abs=0.03)  # rows of 20 pieces: half of one, 2.5 %
+
+
+def source(system, *, exterior=rooms.NOTHING, size=200):
+    """The disc apart from the picture, and the picture without it."""
+    from mitsuba_cfs.trace.picture_sun import PictureSun
+
+    room, groups = rooms.test_room(0.0)
+    view = fisheye(EYE, (0.0, -1.0, 0.0), size)
+    return PictureSun(room, exterior, groups, [system], view).discs(SUN[None], LUX)[0]
+
+
+@pytest.mark.parametrize("size", [90, 200, 800])
+def test_the_disc_is_a_source_with_its_own_luminance_whatever_the_pixel(size):
+    view = fisheye(EYE, (0.0, -1.0, 0.0), size)
+    disc = source(clear(), size=size)
+    assert disc.luminance == pytest.approx(0.8 * LUX[0] / SUN_SOLID_ANGLE, rel=1e-5)
+    assert disc.solid_angle == pytest.approx(SUN_SOLID_ANGLE, rel=1e-5)
+    rated = evaluate(np.full((size, size), 100.0), view, disc=disc)
+    assert np.degrees(np.linalg.norm(disc.direction - SUN)) < 1e-3
+    P = position_index(disc.direction[None], view)[0]
+    assert rated.count == 1 and rated.disc is disc
+    assert rated.Ev == pytest.approx(100 * np.pi - 0.8 * LUX[0] * SUN[1], rel=2e-3)  # the rim
+    contrast = disc.luminance**2 * SUN_SOLID_ANGLE / P**2
+    assert rated.contrast == pytest.approx(contrast, rel=1e-5)
+    # in the pixels its light is spread over more than the disc: L^2 omega is lost
+    smeared = evaluate(sun_picture(clear(), SUN, scale=0.0, view=view), view)
+    assert smeared.contrast < 0.9 * contrast
+    assert smeared.Ev == pytest.approx(rated.Ev - 100 * np.pi, rel=0.02)
+
+
+def test_an_edge_cuts_the_source_and_leaves_its_luminance():
+    across = np.cross(SUN, [0, 0, 1.0])
+    edge = EYE + 30 * SUN
+    far, high = edge + 30 * across, np.array([0, 0, 30])
+    wall = rooms.quad(edge - high, far - high, far + high, edge + high)
+    disc = source(clear(), exterior=rooms.surfaces([(wall, 0.2)]))
+    assert disc.solid_angle == pytest.approx(SUN_SOLID_ANGLE / 2, rel=0.01)
+    assert disc.luminance == pytest.approx(0.8 * LUX[0] / SUN_SOLID_ANGLE, rel=1e-5)
+    away = np.degrees(np.arccos(np.clip(disc.direction @ SUN, -1, 1)))
+    assert away == pytest.approx(0.2665 * 4 / (3 * np.pi), rel=0.02)  # centroid of half a disc
+    assert disc.direction @ across < 0
+    nearer = EYE + 10 * SUN
+    whole = rooms.quad(*(nearer + 5 * (a * across + np.array([0, 0, b]))
+                         for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))))  # fmt: skip
+    assert source(clear(), exterior=rooms.surfaces([(whole, 0.2)])) is None
+
+
+@pytest.mark.parametrize(("beyond", "share"), [(-0.3, 1.0), (0.0, 0.5), (0.3, 0.0)])
+def test_the_disc_ends_where_the_eye_does(beyond, share):
+    """A sun at the side of a fisheye, its middle so many degrees behind the eye."""
+    from mitsuba_cfs.trace.picture_sun import PictureSun
+
+    room, groups = rooms.test_room(0.0)
+    turn = np.radians(90 + beyond)
+    across = np.cross(SUN, [0, 0, 1.0]) / np.linalg.norm(np.cross(SUN, [0, 0, 1.0]))
+    view = fisheye(EYE, np.cos(turn) * SUN + np.sin(turn) * across, 200)
+    disc = PictureSun(room, rooms.NOTHING, groups, [clear()], view).discs(SUN[None], LUX)[0]
+    seen = 0.0 if disc is None else disc.solid_angle / SUN_SOLID_ANGLE
+    assert seen == pytest.approx(share, abs=0.01)
+
+
+def test_paths_see_the_same_disc():
+    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.path_disc import disc_seen, with_disc
+    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+
+    room, groups = rooms.test_room()
+    lit = LitRoom(room, rooms.NOTHING, groups, [PathOptics(None, AngularBeam(np.full(16, 0.8)))])
+    sky = Sky(np.full(146, 1000.0), SUN, LUX[0] / SUN_SOLID_ANGLE)
+    disc = disc_seen(lit, sky, VIEW)
+    assert disc.luminance == pytest.approx(source(clear()).luminance, rel=1e-5)
+    assert disc.solid_angle == pytest.approx(source(clear()).solid_angle, rel=1e-5)
+    view = fisheye(EYE, (0.0, -1.0, 0.0), 100)
+    bare, whole = (
+        point_in_time_picture(lit, sky, view, samples=2, disc=disc) for disc in (False, True)
+    )
+    np.testing.assert_allclose(with_disc(bare, lit, sky, view), whole, rtol=1e-6)
+    assert whole.max() > 100 * bare.max()
 
 
 def test_the_beam_falls_on_the_floor_where_the_window_lets_it():

@@ -74,23 +74,27 @@ def _read_year(options, *_others):
 
 
 def _rate_views(year, kept, _progress):
+    from mitsuba_cfs.glare.evaluation import evaluate
     from scenes.year_of_glare.year import FIGURES, ViewYear
 
     times = year.weather.midpoints[year.sky.lit]
     ratings = pd.DataFrame({name: np.linspace(0.2, 0.5, len(times)) for name in FIGURES}, times)
     (kept / "0123456789abcdef01234567.npy").write_bytes(b"ratings")
     picture = np.full((64, 64), 500.0, np.float32)
+    rated = evaluate(picture, year.views[0].view)
     worst = year.sky.lit[0 if year.options.seed == 0 else 1]  # other hours with another seed
-    yield ViewYear(year.views[0], ratings, {year.weather.midpoints[worst]: picture}, 1.0)
+    yield ViewYear(year.views[0], ratings, {year.weather.midpoints[worst]: (picture, rated)}, 1.0)
 
 
 def _room_picture(_options, *_others):
+    from mitsuba_cfs.glare.evaluation import evaluate
     from mitsuba_cfs.images.view import fisheye
     from scenes.view_picture import RoomPicture
 
     view = fisheye([0, 0, 1], [0, 1, 0], 64)
     luminance = np.full((64, 64), 500.0, np.float32)
-    return RoomPicture(luminance, view, "A", pd.Timestamp("2000-06-21 12:30"), ())
+    rated = evaluate(luminance, view)
+    return RoomPicture(luminance, view, "A", pd.Timestamp("2000-06-21 12:30"), (), rated)
 
 
 def _calibrated(size, **_options):

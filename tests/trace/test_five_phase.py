@@ -245,10 +245,11 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     view, direct_view = matrices.sensors.values, matrices.direct_sensors
     expected = phases.three_phase(view, t, matrices.daylight.values, sky.whole)
     expected -= phases.three_phase(direct_view, t, matrices.direct_daylight, sky.sun)
-    expected += phases.beam_at_sun_angle(
-        view - direct_view, t, patch_beams(ways, KLEMS_FULL),
+    by_patch, at_sun = phases.sun_beams(
+        t, patch_beams(ways, KLEMS_FULL),
         through_beams(scene.groups, ways, sky.direction), matrices.direct_daylight, sky.sun,
     )  # fmt: skip
+    expected += np.einsum("sgk,gkh->sh", view - direct_view, at_sun - by_patch)
     expected += exact.values * sky.illuminance / SUN_SOLID_ANGLE
     assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision
 

@@ -213,6 +213,7 @@ def test_sun_of_several_groups_with_trees_is_that_of_paths():
         found = PictureSun(interior, exterior, groups, ways[::order], view)
         values = np.zeros((1, len(found.pixels)), dtype=np.float32)
         found.add_to(values, sun[None], np.array([lux]))
+        found.add_disc(values, sun[None], np.array([lux]))
         values = full_picture(values[0], found.pixels, view)
         sky = Sky(DARK, sun, SUN_LUMINANCE)
         truth = picture(systems[::order], sky, scene, view, samples=64, tile=1)

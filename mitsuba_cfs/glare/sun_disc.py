@@ -1,0 +1,37 @@
+"""The sun's disc as an eye sees it: a glare source with its own luminance, whatever the pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+
+
+@dataclass(frozen=True, slots=True)
+class SunDisc:
+    """What of the disc nothing covers, dimmed by what it shines through."""
+
+    direction: NDArray[np.float64]  # [3] unit vector to the middle of what is seen
+    luminance: float  # [cd/m2]
+    solid_angle: float  # [sr]
+
+
+def seen_disc(directions: ArrayLike, luminance: ArrayLike) -> SunDisc | None:
+    """The disc from the luminance [n] of equal parts of it in directions [n, 3]; None if hidden.
+
+    Its luminance and solid angle are those that keep both sum L omega and sum L^2 omega of the
+    parts: where all of the seen parts are as bright, their luminance and their solid angle.
+    """
+    L = np.asarray(luminance, dtype=float)
+    if not L.any():
+        return None
+    flux, square = L.sum(), (L**2).sum()
+    middle = L @ np.asarray(directions, dtype=float)
+    return SunDisc(
+        middle / np.linalg.norm(middle),
+        float(square / flux),
+        float(flux**2 / square * SUN_SOLID_ANGLE / len(L)),
+    )

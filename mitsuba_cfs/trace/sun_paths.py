@@ -1,0 +1,135 @@
+"""Where light that surfaces reflect comes from: places that paths meet, for shadow rays to the sun.
+
+What reaches a place x by reflection is the mean over cosine-sampled paths from it,
+
+    E(x) = mean of sum over the surfaces y that a path meets, product of rho up to y, E_sun(y)
+
+Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.sky.sun import SUN_RADIUS
+from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.scene import TracedScene
+
+BOUNCES = 5  # surfaces that a path meets at most
+ROULETTE = 0.5  # share of light below which paths are thinned out
+
+
+@dataclass(frozen=True)
+class Places:
+    """Points on surfaces and the sides of them that are meant."""
+
+    point: NDArray[np.float32]  # [m, 3] in the tracer's coordinates, clear of the surface
+    normal: NDArray[np.float32]  # [m, 3] unit
+
+    @property
+    def size(self) -> int:
+        """How many there are."""
+        return len(self.point)
+
+    def some(self, chosen: NDArray) -> Places:
+        """Some of them."""
+        return Places(self.point[chosen], self.normal[chosen])
+
+    def points(self) -> mi.Point3f:
+        """The points as a kernel takes them."""
+        return mi.Point3f(self.point.T)
+
+    def normals(self) -> mi.Vector3f:
+        """The normals as a kernel takes them."""
+        return mi.Vector3f(self.normal.T)
+
+    @staticmethod
+    def joined(parts: list[Places]) -> Places:
+        """All of several."""
+        nowhere = np.empty((0, 3), dtype=np.float32)
+        return Places(
+            np.concatenate([nowhere, *(p.point for p in parts)]),
+            np.concatenate([nowhere, *(p.normal for p in parts)]),
+        )
+
+
+@dataclass(frozen=True)
+class ReflectingPlaces:
+    """What paths meet; axis q."""
+
+    path: NDArray[np.int64]  # [q] number of the path
+    weight: NDArray[np.float64]  # [q] product of reflectances, that of the place itself the last
+    places: Places  # [q]
+
+
+def reflecting_places(tracer: TracedScene, start: Places, seed: int) -> ReflectingPlaces:
+    """The surfaces that one path from each place meets, one after the other."""
+    path, weight, places = np.arange(start.size), np.ones(start.size), start
+    paths, weights, met = [np.empty(0, dtype=np.int64)], [np.empty(0)], []
+    key = dr.opaque(mi.UInt32, (seed ^ 0x2545F491) & 0xFFFFFFFF)
+    for bounce in range(BOUNCES):
+        if not len(path):
+            break
+        number = mi.UInt32((path * BOUNCES + bounce).astype(np.uint32))
+        kept, places, rho, luck = _next(tracer, places, path_generator(number, key))
+        path, weight = path[kept], weight[kept] * rho
+        paths.append(path)
+        weights.append(weight)
+        met.append(places)
+        survival = np.minimum(weight / ROULETTE, 1.0)
+        on = luck < survival
+        path, places, weight = path[on], places.some(on), weight[on] / survival[on]
+    return ReflectingPlaces(np.concatenate(paths), np.concatenate(weights), Places.joined(met))
+
+
+def _next(
+    tracer: TracedScene, places: Places, generator: mi.PCG32
+) -> tuple[NDArray[np.bool_], Places, NDArray[np.float32], NDArray[np.float32]]:
+    """Which paths meet a surface that reflects; where, its reflectance, a number for roulette."""
+    point, normal = places.points(), places.normals()
+    u = mi.Point2f(generator.next_float32(), generator.next_float32())
+    way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
+    hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
+    found, luck = hit.is_valid(), generator.next_float32()
+    after = face_places(tracer, point, way, hit, found)
+    rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found).numpy()
+    kept = found.numpy() & (rho > 0)
+    return kept, after.some(kept), rho[kept], luck.numpy()[kept]
+
+
+def face_places(
+    tracer: TracedScene,
+    origin: mi.Point3f,
+    way: mi.Vector3f,
+    hit: mi.PreliminaryIntersection3f,
+    found: mi.Bool,
+) -> Places:
+    """Where rays meet surfaces, on the side that they come from."""
+    face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, found)
+    face = dr.mulsign(face, -dr.dot(face, way))
+    point = mi.Point3f(origin + way * hit.t + face * tracer.epsilon)
+    return Places(point.numpy().T, face.numpy().T)
+
+
+def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
+    """A direction on the sun's disc, another one for each number: the edges of shadows are soft."""
+    u = lattice_2d(number, mi.UInt32(0x5BD1E995), 2)
+    local = mi.warp.square_to_uniform_cone(u, float(np.cos(SUN_RADIUS)))
+    return mi.Frame3f(centre).to_world(local)
+
+
+def place_and_hour(
+    places: Places, suns: NDArray[np.float64]
+) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
+    """Point, normal and a direction to the sun of all pairs of places and hours [m * h]."""
+    lane = dr.arange(mi.UInt32, places.size * len(suns))
+    count = dr.opaque(mi.UInt32, len(suns))
+    place = lane // count
+    towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), lane - place * count)
+    point = dr.gather(mi.Point3f, places.points(), place)
+    return point, dr.gather(mi.Vector3f, places.normals(), place), on_disc_of(towards, place)
