@@ -9,14 +9,14 @@ from pydantic import Field, model_validator
 
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.closure import Closure
-from thermal.glazing import Gap
+from thermal.glazing import GASES, Gap
 
 
 class GapTable(TomlTable):
     """The gas gap of a double glazing, for `u_model = "gap"`."""
 
     width: Positive  # [m]
-    gas: dict[str, Share] = Field({"argon": 0.9, "air": 0.1})
+    gas: dict[Literal[tuple(GASES)], Share] = Field({"argon": 0.9, "air": 0.1})
     emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
 
 

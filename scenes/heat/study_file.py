@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
+from bim.model import BOX_PARTS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods import METHODS
 from scenes.fenestration.tables import StateTable
@@ -17,6 +18,7 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
+Part = Literal[BOX_PARTS]  # a side of the box, or all its faces of a kind
 RUN = RoomOptions()  # what is not stated otherwise is as in `cfs run`
 
 
@@ -50,12 +52,12 @@ class BoxTable(TomlTable):
     facing_deg: float = 180.0
     recess: Annotated[float, Field(ge=0)] = 0.0
     window: tuple[WindowTable, ...]
-    reflectance: dict[str, Share] = Field(default_factory=dict)
-    adjacency: dict[str, Literal["outside", "ground", "space", "adiabatic"]] = Field(
+    reflectance: dict[Part, Share] = Field(default_factory=dict)
+    adjacency: dict[Part, Literal["outside", "ground", "space", "adiabatic"]] = Field(
         default_factory=dict
     )
     # by side or kind, outermost first
-    construction: dict[str, tuple[LayerTable, ...]] = Field(default_factory=dict)
+    construction: dict[Part, tuple[LayerTable, ...]] = Field(default_factory=dict)
 
 
 class ComfortTable(TomlTable):
@@ -111,6 +113,9 @@ class StudyFile(OperationTables):
     def _fits(self) -> StudyFile:
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `[box]`")
+        for key in ("spaces", "join", "couple") if self.box is not None else ():
+            if getattr(self, key):
+                raise ValueError(f"{key}: belongs to a `building`; a box is one room")
         if not self.system:
             if self.box is not None:
                 raise ValueError("system: is missing; a box holds no fenestration data")

@@ -6,14 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    create_model,
-    model_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from mitsuba_cfs.errors import DataError
 from scenes.calibration.durations import seconds_of, share_of
@@ -22,14 +15,14 @@ from scenes.quick import ROOM, picks
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import Hours
 from scenes.room.options import RoomOptions, named_types
-from scenes.toml_file import read_table, validated
+from scenes.toml_file import TomlTable, read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
 Name = Annotated[str, Field(min_length=1)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+class _Table(TomlTable):
+    model_config = ConfigDict(validate_default=True)
 
 
 class RoomTable(_Table):

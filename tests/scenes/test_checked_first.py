@@ -195,7 +195,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "pv, weather": (lambda p: _pv(weather="short.epw"), SHORT),
     "pv, key": (
         lambda p: _pv_file(p, f"[module]{MODULE}cell = 60"),
-        "pv.toml: module.cells: is missing (and 1 more)",
+        "pv.toml: module.cell: no such key; did you mean cells? (and 1 more)",
     ),
     "pv, datasheet": (
         lambda p: _pv_file(p, f"[module]{MODULE}cells = 6"),
