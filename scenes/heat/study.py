@@ -131,7 +131,7 @@ def _year(study: StudyFile, room: RoomZone, result: ZoneResult, weather: Weather
         result.name,
         room.space.floor_area,
         hourly_table(result, room.state, room.daylight, weather, study.comfort),
-        *year_summary(result, weather, study),
+        *year_summary(result, weather, room.occupied),
     )
 
 

@@ -12,6 +12,7 @@ from bim.ifc.head import check_head
 from bim.model import BOX_PARTS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods import METHODS
+from scenes import plausible
 from scenes.fenestration.tables import StateTable
 from scenes.quick import HEAT, picks
 from scenes.room.operation_tables import OperationTables
@@ -19,6 +20,7 @@ from scenes.room.options import RoomOptions
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 Part = Literal[BOX_PARTS]  # a side of the box, or all its faces of a kind
+Length = Annotated[Positive, plausible.LENGTH]  # [m]
 RUN = RoomOptions()  # what is not stated otherwise is as in `cfs run`
 
 
@@ -26,10 +28,10 @@ class LayerTable(TomlTable):
     """A layer of a construction."""
 
     name: str = "layer"
-    thickness: Positive  # [m]
-    conductivity: Positive  # [W/(m K)]
-    density: Positive  # [kg/m3]
-    heat_capacity: Positive  # [J/(kg K)]
+    thickness: Annotated[Positive, plausible.LAYER]  # [m]
+    conductivity: Annotated[float, plausible.CONDUCTIVITY]  # [W/(m K)]
+    density: Annotated[Positive, plausible.DENSITY]  # [kg/m3]
+    heat_capacity: Annotated[float, plausible.HEAT_CAPACITY]  # [J/(kg K)]
 
 
 class WindowTable(TomlTable):
@@ -37,8 +39,8 @@ class WindowTable(TomlTable):
 
     x: float
     sill: float
-    width: Positive
-    height: Positive
+    width: Length
+    height: Length
     side: Literal["front", "right", "back", "left", "ceiling"] = "front"
     frame: Annotated[float, Field(ge=0)] = 0.0
 
@@ -46,9 +48,9 @@ class WindowTable(TomlTable):
 class BoxTable(TomlTable):
     """A box-shaped room in place of a building file."""
 
-    width: Positive
-    depth: Positive
-    height: Positive
+    width: Length
+    depth: Length
+    height: Length
     facing_deg: float = 180.0
     recess: Annotated[float, Field(ge=0)] = 0.0
     window: tuple[WindowTable, ...]
@@ -79,8 +81,8 @@ class TraceTable(TomlTable):
     sun_points: Annotated[int, Field(ge=16)] = RUN.sampling.sun_points
     path_samples: Annotated[int, Field(ge=16)] = RUN.sampling.hour_samples
     sky_subdivision: Literal[1, 2, 4, 6] = 1
-    sensor_spacing: Positive = RUN.grid.spacing  # [m]
-    sensor_height: Positive = RUN.grid.height  # above the floor [m]
+    sensor_spacing: Length = RUN.grid.spacing  # [m]
+    sensor_height: Length = RUN.grid.height  # above the floor [m]
     sensor_margin: Annotated[float, Field(ge=0)] = RUN.grid.margin  # from the walls [m]
     picture_size: Annotated[int, Field(ge=64)] = RUN.outputs.picture_size  # for `limit_dgp`
     picture_samples: Annotated[int, Field(ge=1)] = RUN.sampling.view_samples

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from scenes import plausible
 from scenes.fenestration.tables import StateTable
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.zone import IdealLoads
@@ -13,16 +14,20 @@ from thermal.zone import IdealLoads
 CLOCK = 24  # hours of a schedule
 
 
-def _in_order(hours: tuple[int, int]) -> tuple[int, int]:
-    """Two clock times of one day: the balance takes no span over midnight."""
+def _clock(hours: tuple[int, int]) -> tuple[int, int]:
+    """Two clock times as `working_hours` takes them: 22 to 6 is the night."""
     start, end = hours
-    if not 0 <= start < end <= 24:
-        raise ValueError(f"expected two hours of one day, 0 <= from < to <= 24, got {list(hours)}")
+    if not (0 <= start < 24 and 0 <= end <= 24 and start != end):
+        raise ValueError(
+            f"expected two different hours, from 0 to 23 and to 0 to 24, got {list(hours)}"
+        )
     return hours
 
 
 Hours = Annotated[
-    tuple[int, int], AfterValidator(_in_order), Field(description="clock times from and to")
+    tuple[int, int],
+    AfterValidator(_clock),
+    Field(description="clock times from and to, over midnight too"),
 ]
 
 
@@ -32,13 +37,15 @@ class ControlTable(TomlTable):
     rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
     state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
     schedule: tuple[int, ...] = ()  # "schedule": 24 states
-    close_above: Positive = 200.0  # "irradiance" on the windows [W/m2]
-    open_below: Annotated[float, Field(ge=0)] | None = None
-    limit_lx: Positive = 3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
+    close_above: Annotated[Positive, plausible.SUN] = 200.0  # "irradiance" on the windows [W/m2]
+    open_below: Annotated[float, plausible.SUN] | None = None
+    limit_lx: Annotated[Positive, plausible.EYE] = (
+        3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
+    )
     limit_dgp: Share | None = None  # "glare": DGP of every hour's picture in place of Ev
     slat_tilts_deg: tuple[float, ...] = ()  # "cut-off": of each state
-    slat_width: Positive = 0.08  # [m]
-    slat_spacing: Positive = 0.072  # [m]
+    slat_width: Annotated[Positive, plausible.SLAT] = 0.08  # [m]
+    slat_spacing: Annotated[Positive, plausible.SLAT] = 0.072  # [m]
 
     def fault(self, states: int) -> tuple[str, str] | None:
         """The key that does not fit windows of so many states, and what is wrong with it."""
@@ -55,11 +62,13 @@ class ControlTable(TomlTable):
 class GainsTable(TomlTable):
     """Heat in the room during the occupied hours."""
 
-    equipment_w_m2: Annotated[float, Field(ge=0)] = 8.0
-    persons: Annotated[float, Field(ge=0)] = 1.0
-    person_w: Annotated[float, Field(ge=0)] = 75.0
-    lighting_w_m2: Annotated[float, Field(ge=0)] = 0.0
-    lighting_target_lx: Positive = 500.0  # of the mean on the work plane; daylight dims
+    equipment_w_m2: Annotated[float, plausible.GAIN] = 8.0
+    persons: Annotated[float, plausible.PERSONS] = 1.0
+    person_w: Annotated[float, plausible.PERSON] = 75.0
+    lighting_w_m2: Annotated[float, plausible.LAMPS] = 0.0
+    lighting_target_lx: Annotated[Positive, plausible.TARGET] = (
+        500.0  # of the mean on the work plane; daylight dims
+    )
     radiant_share: Share = 0.5
     occupied: Hours = (8, 18)
 
@@ -67,20 +76,20 @@ class GainsTable(TomlTable):
 class AirTable(TomlTable):
     """Outdoor air."""
 
-    infiltration_ach: Annotated[float, Field(ge=0)] = 0.5
-    night_ach: Annotated[float, Field(ge=0)] = 0.0  # more of it in these hours
+    infiltration_ach: Annotated[float, plausible.AIR_CHANGE] = 0.5
+    night_ach: Annotated[float, plausible.AIR_CHANGE] = 0.0  # more of it in these hours
     night: Hours = (0, 7)
     # each way through every open door between coupled rooms [m3/s]; 0: the doors are shut
-    door_m3_s: Annotated[float, Field(ge=0)] = 0.0
+    door_m3_s: Annotated[float, plausible.DOOR_FLOW] = 0.0
 
 
 class LoadsTable(TomlTable):
     """Ideal heating and cooling; without set points the room floats."""
 
-    heating_c: float | None = None
-    cooling_c: float | None = None
-    heating_limit_w: Positive | None = None
-    cooling_limit_w: Positive | None = None
+    heating_c: Annotated[float, plausible.TEMPERATURE] | None = None
+    cooling_c: Annotated[float, plausible.TEMPERATURE] | None = None
+    heating_limit_w: Annotated[Positive, plausible.POWER] | None = None
+    cooling_limit_w: Annotated[Positive, plausible.POWER] | None = None
 
     @model_validator(mode="after")
     def _do_not_cross(self) -> LoadsTable:

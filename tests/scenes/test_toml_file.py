@@ -35,7 +35,8 @@ GOOD = {"weather": "a.epw", "building": "a.ifc", "system": [{"bsdf": "a.xml"}]}
         ({"loads": {"xyz": 1}}, "s.toml: loads.xyz: no such key; there are heating_c, cooling_c"),
         ({"couple": 7}, "s.toml: couple: expected true or false, got 7"),
         ({"system": [{}]}, "s.toml: system.0.bsdf: is missing"),
-        ({"air": {"night": [22, 6]}}, "s.toml: air.night: expected two hours of one day"),
+        ({"air": {"night": [6, 6]}}, "s.toml: air.night: expected two different hours"),
+        ({"air": {"night": [24, 6]}}, "s.toml: air.night: expected two different hours"),
     ],
 )
 def test_a_wrong_key_is_named_with_the_nearest(tmp_path, more, words) -> None:
@@ -75,7 +76,7 @@ LAYER = {"thickness": 0.1, "conductivity": 1, "density": 1000, "heat_capacity": 
         ({"system": {"bsdf": "a"}}, "system: expected a list of tables, [[system]], got a table"),
         ({"gains": 3}, "gains: expected a table, got 3"),
         ({"gains": {"persons": "two"}}, "gains.persons: expected a number, got 'two'"),
-        ({"gains": {"persons": -1}}, "gains.persons: expected a number of at least 0, got -1"),
+        ({"gains": {"persons": -1}}, "gains.persons: expected 0 to 10000 persons"),
         ({"gains": {"persons": float("nan")}}, "gains.persons: expected a finite number, got nan"),
         ({"gains": {"occupied": [8]}}, "gains.occupied.1: expected 2 values"),
         ({"spaces": "A"}, "spaces: expected a list, got 'A'"),
@@ -147,6 +148,48 @@ def test_the_file_beside_a_bsdf_is_checked_as_well(tmp_path) -> None:
     path.write_text("u_valeu = 1.1\n")
     with pytest.raises(DataError, match=r"blind.toml: u_valeu: no such key; did you mean u_value"):
         ThermalFile.read(path)
+
+
+SLIPS = [
+    ({"loads": {"heating_c": 293.15}}, "loads.heating_c: expected -30 to 60 C ", "K would be 20 C"),
+    ({"loads": {"cooling_c": 78}}, "loads.cooling_c: expected -30 to 60 C ", "78 F would be 25.6"),
+    ({"loads": {"heating_c": -40}}, "loads.heating_c: expected -30 to 60 C ", "got -40"),
+    ({"air": {"infiltration_ach": 50_000}}, "air.infiltration_ach: expected 0 to 200 1/h", "50000"),
+    ({"air": {"door_m3_s": 300}}, "air.door_m3_s: expected 0 to 50 m3/s", "m3/h would be 0.0833"),
+    ({"gains": {"equipment_w_m2": 8000}}, "gains.equipment_w_m2: expected 0 to 3000 W/m2", "8000"),
+    ({"gains": {"lighting_w_m2": 800}}, "gains.lighting_w_m2: expected 0 to 500 W/m2", "got 800"),
+    ({"box": BOX | {"width": 4000}}, "box.width: expected 0 to 500 m", "4000 mm would be 4 m"),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"thickness": 140}]}}},
+        "box.construction.wall.0.thickness: expected 0 to 5 m ", "140 mm would be 0.14 m",
+    ),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"conductivity": 5000}]}}},
+        "box.construction.wall.0.conductivity: expected 0.001 to 500 W/(m K)", "got 5000",
+    ),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"density": 1e6}]}}},
+        "box.construction.wall.0.density: expected 0 to 20000 kg/m3", "got 1e+06",
+    ),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"heat_capacity": 1.0}]}}},
+        "box.construction.wall.0.heat_capacity: expected 50 to 10000 J/(kg K)", "no kJ), got 1",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("more", "start", "words"), SLIPS)
+def test_a_slip_of_unit_or_digit_is_named_with_the_unit(tmp_path, more, start, words) -> None:
+    with pytest.raises(DataError) as error:
+        validated(StudyFile, BOXED | more, tmp_path / "s.toml")
+    assert str(error.value).startswith(str(tmp_path / f"s.toml: {start}"))
+    assert words in str(error.value)
+
+
+def test_hours_may_pass_midnight(tmp_path) -> None:
+    tables = {"air": {"night": [22, 6]}, "gains": {"occupied": [18, 8]}}
+    study = validated(StudyFile, BOXED | tables, tmp_path / "s.toml")
+    assert study.air.night == (22, 6) and study.gains.occupied == (18, 8)
 
 
 def test_how_many_more_faults_there_are_is_said(tmp_path) -> None:
