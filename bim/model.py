@@ -153,6 +153,7 @@ class Space:
     stated_volume: float | None = None  # the file's own volume [m3]
     long_name: str = ""
     area_to_middles: float | None = None  # floor to the middle of the walls, if that is stated [m2]
+    type_name: str = ""  # of the IfcSpaceType, or the space's ObjectType
 
     @property
     def label(self) -> str:

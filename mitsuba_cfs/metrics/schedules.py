@@ -38,7 +38,7 @@ def working_hours(
     hour = np.mod(np.asarray(hour), 24.0)
     after, before = hour >= start_h, hour < end_h
     mask = after & before if start_h < end_h else after | before
-    return mask & (t.day_of_week.to_numpy() < 5) if weekdays_only else mask
+    return mask & (weather.weekday < 5) if weekdays_only else mask
 
 
 def lm83_hours(weather: Weather, *, clock_ahead_h: ArrayLike = 0.0) -> Mask:

@@ -15,6 +15,7 @@ from mitsuba_cfs.methods import METHODS
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
 from scenes.quick import HEAT, picks
+from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
@@ -122,9 +123,10 @@ class StudyFile(OperationTables):
             if self.box is not None:
                 raise ValueError("system: is missing; a box holds no fenestration data")
             return self
-        fault = self.control.fault(len(self.system))
-        if fault is not None:
-            raise ValueError("control.{}: {}".format(*fault))
+        for one in self.variants:
+            fault = one.control.fault(len(self.system))
+            if fault is not None:
+                raise ValueError("control.{}: {}".format(*fault))
         return self
 
 
@@ -135,7 +137,7 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
 
     Raises: `DataError` naming the file and the field.
     """
-    study = validated(StudyFile, read_table(path), path)
+    study = schedules_there(validated(StudyFile, read_table(path), path), path)
     here = path.parent
     systems = tuple(s.model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system)
     found = {"weather": _there(here, study.weather, path), "system": systems}

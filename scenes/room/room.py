@@ -44,6 +44,7 @@ from scenes.room.daylight import room_daylight, room_scene
 from scenes.room.glare import default_hours, room_glare
 from scenes.room.holes import hole_problems
 from scenes.room.operation import Operation
+from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
@@ -140,7 +141,7 @@ class RoomSimulation:
     ) -> None:
         """See `compute_room`."""
         if operation is not None:
-            options = options.changed(occupied=operation.gains.occupied)
+            operation = operation.of_room(building, space)
         self.building, self.space, self.weather, self.options = building, space, weather, options
         self.sampling, self.outputs = options.sampling, options.outputs
         self.operation, self.cache, self.progress = operation, cache, progress
@@ -197,7 +198,7 @@ class RoomSimulation:
         if self.operation is None or not self.space.windows:
             return np.zeros(self.skies.hours, dtype=np.int64)
         return shading_states(
-            self.operation.control,
+            self.operation,
             self.space,
             self.weather,
             self.windows.states,
@@ -286,6 +287,8 @@ class RoomSimulation:
     @cached_property
     def occupied(self) -> NDArray[np.bool_]:
         """The hours with people [H]."""
+        if self.operation is not None:
+            return OperationHours(self.operation, self.weather).present > 0
         return working_hours(self.weather, *self.options.occupancy.hours)
 
     @cached_property

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from bim.to_thermal import ThermalRoom, coupled_rooms, door_links
-from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import Occupancy
 from thermal.balance import ZoneResult, simulate_zones
@@ -117,17 +117,17 @@ def operated(
     Args: daylight: [H] mean illuminance of the work plane, which dims the lamps [lx]; None: nothing
         dims them.
     """
-    gains, air = tables.gains, tables.air
-    present = working_hours(weather, *gains.occupied)
-    power = gains.equipment_w_m2 * floor_area + gains.persons * gains.person_w
-    lamps = gains.lighting_w_m2 * floor_area * present
+    hours, gains = OperationHours(tables, weather), tables.gains
+    lamps = hours.lamps(floor_area)
     if daylight is not None:
         lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
     found = replace(
         zone,
-        infiltration_ach=air.infiltration_ach + air.night_ach * working_hours(weather, *air.night),
-        gains=split_gains(power * present, gains.radiant_share, (lamps, gains.radiant_share)),
-        loads=tables.loads.ideal(),
+        infiltration_ach=hours.air_changes(),
+        gains=split_gains(
+            hours.heat(floor_area), gains.radiant_share, (lamps, gains.radiant_share)
+        ),
+        loads=hours.loads(),
     )
     return found, lamps
 
