@@ -92,7 +92,7 @@ def run_study(
 def _check_states(study: StudyFile, in_windows: Mapping[str, States]) -> None:
     """Raise `DataError` where the control names states that no window of the model has."""
     most = max(map(len, in_windows.values()), default=0)
-    for fault in (one.control.fault(most) for one in study.variants if most):
+    for fault in (one.control_fault(most) for one in study.variants if most):
         if fault is None:
             continue
         field, message = fault

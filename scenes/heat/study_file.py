@@ -124,7 +124,7 @@ class StudyFile(OperationTables):
                 raise ValueError("system: is missing; a box holds no fenestration data")
             return self
         for one in self.variants:
-            fault = one.control.fault(len(self.system))
+            fault = one.control_fault(len(self.system))
             if fault is not None:
                 raise ValueError("control.{}: {}".format(*fault))
         return self

@@ -39,7 +39,7 @@ def shading_states(
     """
     control, hours = operation.control, len(weather.times)
     if control.rule == "schedule":
-        return np.minimum(OperationHours(operation, weather).states(), states - 1)
+        return OperationHours(operation, weather).states(states)
     if control.rule == "irradiance":
         closed = control.state or states - 1
         brightest = irradiance().max(axis=1)

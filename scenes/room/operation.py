@@ -74,7 +74,7 @@ def read_state(table: StateTable, path: Path, *, by: str = "") -> FenestrationSy
 
 def check_states(operation: Operation, states: int) -> None:
     """Raise `DataError` where the control names states that the windows do not have."""
-    for fault in (one.control.fault(states) for one in operation.tables.variants):
+    for fault in (one.control_fault(states) for one in operation.tables.variants):
         if fault is None:
             continue
         field, message = fault

@@ -86,12 +86,16 @@ class OperationHours:
         fan = self._while_occupied("air", "ventilation_ach")
         return self._of("air", "infiltration_ach") + night + fan
 
-    def states(self) -> NDArray[np.int64]:
-        """Shading states of the rule "schedule" [H]."""
+    def states(self, count: int) -> NDArray[np.int64]:
+        """Shading states of the rule "schedule" [H], of windows that have so many."""
         control = self.tables.control
         if not isinstance(control.schedule, str):
             return by_schedule(control.schedule, len(self.weather.times))
-        return self._of("control", "schedule").astype(np.int64)
+        values = self._of("control", "schedule")
+        if not np.isin(values, range(count)).all():  # of a file: stated ones are checked before
+            message = f"schedule {control.schedule!r}: a state outside 0 to {count - 1}"
+            raise DataError(message, field="control.schedule")
+        return values.astype(np.int64)
 
     def loads(self) -> IdealLoads:
         """Set points and limits; none stated means never, and without limit."""

@@ -141,6 +141,16 @@ class OperationTables(TomlTable):
                         raise ValueError(f"{place}{part}.{key}: {fault}")
         return self
 
+    def control_fault(self, states: int) -> tuple[str, str] | None:
+        """The key of `control` that does not fit windows of so many states, and what is wrong."""
+        name = self.control.schedule
+        if self.control.rule != "schedule" or not isinstance(name, str):
+            return self.control.fault(states)
+        wrong = sorted(set(self.schedules[name].stated) - set(range(states)))
+        if wrong:
+            return "schedule", f"{name!r} has state {wrong[0]:g}: the windows have {states}, from 0"
+        return None
+
     def with_rooms(self, rooms: RoomsTable) -> OperationTables:
         """The tables with what an entry of `rooms` states."""
         found = {}

@@ -116,6 +116,14 @@ class ScheduleTable(DaysTable):
             raise ValueError("season: a season needs its own `weekday`")
         return self
 
+    @property
+    def stated(self) -> tuple[float, ...]:
+        """Every value that the table itself states."""
+        days = (self, *self.season)
+        profiles = (getattr(one, key) for one in days for key in DaysTable.model_fields)
+        values = [one.value for profile in profiles if profile is not None for one in profile]
+        return tuple(self.peak * value for value in (self.otherwise, *values))
+
     def hourly(self, weather: Weather, holidays: tuple[str, ...]) -> FloatArray:
         """The values [H]; `holidays`: MM-DD, for a schedule that names none."""
         if self.csv is not None:
