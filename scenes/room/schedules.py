@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -43,7 +43,7 @@ Hours = Annotated[tuple[int, int], AfterValidator(_clock)]
 def _date(text: str) -> str:
     """A day of the year, MM-DD."""
     try:
-        return pd.Timestamp(f"2024-{text}").strftime("%m-%d")
+        return datetime.strptime(f"2024-{text}", "%Y-%m-%d").strftime("%m-%d")  # a leap year
     except ValueError:
         raise ValueError(f"expected a day as MM-DD, got {text!r}") from None
 

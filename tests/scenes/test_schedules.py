@@ -166,6 +166,9 @@ FAULTS = {
     "schedules.x.holidays.0: expected a day as MM-DD, got '25.12.'": (
         '[schedules.x]\nweekday = 1\nholidays = ["25.12."]\n'
     ),
+    "schedules.x.holidays.0: expected a day as MM-DD, got '5'": (
+        '[schedules.x]\nweekday = 1\nholidays = ["5"]\n'
+    ),
     "schedules.x.wekday: no such key; did you mean weekday?": "[schedules.x]\nwekday = 1\n",
     "schedules.x: give either `weekday` or `csv`": "[schedules.x]\nweekend = 1\n",
     "schedules.x.csv: no such file: none.csv": (
