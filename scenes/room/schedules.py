@@ -128,21 +128,23 @@ class ScheduleTable(DaysTable):
         """The values [H]; `holidays`: MM-DD, for a schedule that names none."""
         if self.csv is not None:
             return self.peak * _column(self.csv, self.column, len(weather.times))
-        date = weather.midpoints.strftime("%m-%d").to_numpy(dtype=str)
-        free = np.isin(date, holidays if self.holidays is None else self.holidays)
+        days = weather.midpoints
+        date = 100 * days.month.to_numpy() + days.day.to_numpy()
+        named = holidays if self.holidays is None else self.holidays
+        free = np.isin(date, [_number(day) for day in named])
         kinds = np.where(weather.weekday == SATURDAY, "saturday", "weekday")
         kinds = np.where(weather.weekday == SUNDAY, "sunday", kinds)
         kinds = np.where(free, "holiday", kinds)
         values, open_ = np.full(len(date), self.otherwise), np.ones(len(date), dtype=bool)
-        for days in (*self.season, self):
+        for part in (*self.season, self):
             inside = open_.copy()
-            if isinstance(days, SeasonTable):
-                start, end = days.dates
+            if isinstance(part, SeasonTable):
+                start, end = map(_number, part.dates)
                 after, before = date >= start, date <= end
                 inside &= after & before if start <= end else after | before
             open_ &= ~inside
             for kind in np.unique(kinds[inside]):
-                for one in days.day(kind):
+                for one in part.day(kind):
                     values[inside & (kinds == kind) & working_hours(weather, *one.hours)] = (
                         one.value
                     )
@@ -212,6 +214,11 @@ def unknown_name(name: str, known: Mapping[str, object]) -> str:
     near = get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known) or 'none'}"
     return f"no schedule {name!r}; {hint}"
+
+
+def _number(date: str) -> int:
+    """A day MM-DD as 100 times its month, and its day."""
+    return int(date[:2]) * 100 + int(date[3:])
 
 
 def _column(path: Path, column: str, hours: int) -> FloatArray:
