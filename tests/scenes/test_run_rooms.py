@@ -262,9 +262,9 @@ def test_rules_of_the_control(tmp_path, weather) -> None:
     eye[0, 200], eye[1, 200] = 9000.0, 5000.0
 
     def states(text: str, dgp=None):
-        control = read_operation(operation_file(tmp_path, text)).tables.control
+        operated = read_operation(operation_file(tmp_path, text)).tables
         return shading_states(
-            control, ROOM, weather, 3,
+            operated, ROOM, weather, 3,
             irradiance=lambda: bright, eye=lambda: eye, dgp=dgp or pytest.fail,
         )  # fmt: skip
 
