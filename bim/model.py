@@ -17,6 +17,9 @@ from bim.names import found_by_name, label_of
 from mitsuba_cfs.errors import DataError
 
 FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "reveal")
+# Sides of a box-shaped room as seen from outdoors in front of it, and the other kinds of its faces
+BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
+BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
 
@@ -150,6 +153,7 @@ class Space:
     stated_volume: float | None = None  # the file's own volume [m3]
     long_name: str = ""
     area_to_middles: float | None = None  # floor to the middle of the walls, if that is stated [m2]
+    type_name: str = ""  # of the IfcSpaceType, or the space's ObjectType
 
     @property
     def label(self) -> str:

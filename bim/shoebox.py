@@ -11,13 +11,12 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.defaults import ROOM_REFLECTANCE, default_construction
-from bim.model import Building, Construction, Element, Face, Space, Window
+from bim.model import BOX_SIDES, Building, Construction, Element, Face, Space, Window
 from bim.planes import Facet, Plane, plane_through, polygons_of
 from bim.shell import conforming_triangles
 from mitsuba_cfs.errors import RoomError
 
 T = TypeVar("T")
-SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +27,7 @@ class WindowRectangle:
     sill: float  # lower edge above the floor; for "ceiling" from the front [m]
     width: float  # [m]
     height: float  # [m]
-    side: str = "front"  # one of SIDES but "floor"
+    side: str = "front"  # one of BOX_SIDES but "floor"
     frame: float = 0.0  # width of an opaque frame all round inside the opening [m]
 
 
@@ -76,8 +75,8 @@ def shoebox(
     if min(width, depth, height) <= 0 or recess < 0:
         raise RoomError("width, depth and height must be positive, the recess not negative")
     for w in windows:
-        if w.side not in SIDES or w.side == "floor":
-            raise ValueError(f"window side {w.side!r}: expected one of {SIDES}, not the floor")
+        if w.side not in BOX_SIDES or w.side == "floor":
+            raise ValueError(f"window side {w.side!r}: expected one of {BOX_SIDES}, not the floor")
     facets: list[SideFacet] = []
     for side, (plane, size) in _side_planes(width, depth, height, facing_deg).items():
         holes = [(i, w) for i, w in enumerate(windows) if w.side == side]

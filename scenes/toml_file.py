@@ -1,4 +1,8 @@
-"""TOML files as checked tables: every fault is one line that names the file and the key."""
+"""TOML files as checked tables: every fault is one line that names the file and the key.
+
+What a key is called, what a table holds and what a value may be comes from the models alone: a
+new field of a table needs no word here.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,8 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -16,11 +21,29 @@ T = TypeVar("T", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
+# What is wrong with a value, by pydantic's name of the fault; its `ctx` fills the braces
+WANTED = {
+    "greater_than": "a number above {gt:g}",
+    "greater_than_equal": "a number of at least {ge:g}",
+    "less_than": "a number below {lt:g}",
+    "less_than_equal": "a number of at most {le:g}",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
+    "string_too_short": "a text that is not empty",
+    "finite_number": "a finite number",
+    "literal_error": "{expected}",
+}
+KINDS = {  # by the first word of "float_type", "float_parsing" and the like
+    "float": "a number", "int": "a whole number", "bool": "true or false", "string": "a text",
+    "path": "the path of a file", "tuple": "a list", "list": "a list", "dict": "a table",
+    "model": "a table",
+}  # fmt: skip
+
 
 class TomlTable(BaseModel):
     """A table that takes no key which it does not know."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def read_table(path: Path) -> dict[str, Any]:
@@ -34,39 +57,112 @@ def read_table(path: Path) -> dict[str, Any]:
 
 
 def validated(model: type[T], table: dict[str, Any], path: Path) -> T:
-    """The table as the model; `DataError` that names the first wrong key and how many more."""
+    """The table as the model; `DataError` that names the first wrong key and how many more.
+
+    A key that there is not comes first: what is missing or wrong besides often follows from it.
+    """
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        first, *others = error.errors(include_url=False)
-        field = ".".join(str(part) for part in first["loc"])
+        faults = sorted(error.errors(include_url=False), key=lambda fault: not _is_key(fault))
+        first, *others = faults
+        place = [str(part) for part in first["loc"] if part != "[key]"]
         more = f" (and {len(others)} more)" if others else ""
-        raise DataError(_said(first, model) + more, file=path, field=field or None) from error
+        field = ".".join(place) or None
+        raise DataError(_said(first, model) + more, file=path, field=field) from error
 
 
-def _said(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
-    """A fault in words: those of pydantic, but for keys that there are not."""
-    if fault["type"] == "missing":
-        return "is missing"
-    if fault["type"] != "extra_forbidden":
-        return fault["msg"].removeprefix("Value error, ")
-    *place, key = fault["loc"]
-    known = _keys(model, place)
-    near = get_close_matches(str(key), known, n=1)
-    return f"no such key; {f'did you mean {near[0]}?' if near else 'there are ' + ', '.join(known)}"
-
-
-def _keys(model: type[BaseModel], place: list[str | int]) -> list[str]:
-    """The keys of the table at a place inside a model."""
-    for part in place:
-        field = None if isinstance(part, int) else model.model_fields.get(part)
-        if field is not None:
-            model = next(_models(field.annotation), model)
-    return list(model.model_fields)
-
-
-def _models(annotation: object) -> Iterator[type[BaseModel]]:
+def tables_of(annotation: object) -> Iterator[type[BaseModel]]:
+    """The models inside a type: its own, in its alternatives, entries or values."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for inner in get_args(annotation):
-        yield from _models(inner)
+        yield from tables_of(inner)
+
+
+def keys_of(annotation: object) -> tuple[str, ...] | None:
+    """The keys that a type of table takes; None where it takes any, or is no table."""
+    for one in _alternatives(annotation):
+        if isinstance(one, type) and issubclass(one, BaseModel):
+            return tuple(one.model_fields)
+        if get_origin(one) is dict:
+            key = next(_alternatives(get_args(one)[0]))
+            return tuple(map(str, get_args(key))) if get_origin(key) is Literal else None
+    return None
+
+
+def _is_key(fault: Mapping[str, Any]) -> bool:
+    return fault["type"] == "extra_forbidden" or fault["loc"][-1:] == ("[key]",)
+
+
+def _said(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """A fault in words of ours: what is expected, and what stands there."""
+    *place, last = fault["loc"] or ("",)
+    if last == "[key]":
+        *place, last = place
+    kind = fault["type"]
+    if _is_key(fault):
+        return f"no such key; {_instead(str(last), keys_of(_at(model, place)) or ())}"
+    if kind == "missing":
+        return f"expected {last + 1} values" if isinstance(last, int) else "is missing"
+    if kind == "value_error":
+        return fault["msg"].removeprefix("Value error, ")
+    wanted = WANTED.get(kind, "").format_map(fault.get("ctx", {}))
+    if not wanted:
+        wanted = KINDS.get(kind.partition("_")[0], fault["msg"])
+    if kind == "tuple_type" and any(tables_of(_at(model, [*place, last]))):
+        wanted = f"a list of tables, [[{'.'.join(map(str, [*place, last]))}]]"
+    if "literal" in kind:
+        return f"expected {wanted}, got {_shown(fault['input'])}{_near(fault, model)}"
+    return f"expected {wanted}, got {_shown(fault['input'])}"
+
+
+def _near(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """The choice that a wrong one most resembles."""
+    choices = [str(c) for one in _alternatives(_at(model, fault["loc"])) for c in get_args(one)]
+    near = get_close_matches(str(fault["input"]), choices, n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def _instead(key: str, known: tuple[str, ...]) -> str:
+    """The known key that a wrong one most resembles, else all of them."""
+    folded = {one.casefold(): one for one in known}
+    near = get_close_matches(key.casefold(), folded, n=1)
+    return f"did you mean {folded[near[0]]}?" if near else "there are " + ", ".join(known)
+
+
+def _shown(value: object) -> str:
+    """A value as it may stand in a line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table"
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _at(annotation: object, place: list[str | int] | tuple[str | int, ...]) -> object:
+    """The type of what stands at a place inside a type."""
+    for part in place:
+        found = None
+        for one in _alternatives(annotation):
+            if isinstance(one, type) and issubclass(one, BaseModel):
+                field = one.model_fields.get(str(part))
+                found = found or (field and field.annotation)
+            elif get_origin(one) is dict:
+                found = found or get_args(one)[1]
+            elif get_origin(one) in (tuple, list) and isinstance(part, int):
+                found = found or get_args(one)[0]
+        annotation = found
+    return annotation
+
+
+def _alternatives(annotation: object) -> Iterator[object]:
+    """The types that a type may be, without what annotates them."""
+    if get_origin(annotation) is Annotated:
+        yield from _alternatives(get_args(annotation)[0])
+    elif get_origin(annotation) in (Union, UnionType):
+        for one in get_args(annotation):
+            yield from _alternatives(one)
+    else:
+        yield annotation

@@ -88,6 +88,30 @@ def test_study_files_in_the_docs_are_read(folder):
     assert found
 
 
+def test_tables_of_the_heat_page_have_no_unknown_keys(folder):
+    from scenes.heat.study_file import StudyFile
+    from scenes.room.operation_tables import OperationTables
+    from scenes.toml_file import read_table, validated
+
+    study, schedules = examples(REPOSITORY / "docs" / "thermal.md", "toml")
+    for model, code in ((StudyFile, study), (OperationTables, schedules)):
+        path = folder / "heat.toml"
+        path.write_text(code)
+        validated(model, read_table(path), path)
+
+
+TUTORIALS = sorted((REPOSITORY / "docs" / "tutorials").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.name)
+def test_tutorial_files_are_whole_studies_of_heat(path):
+    """Everything that a run reads of them before it traces."""
+    from scenes.heat.files import read_files
+    from scenes.heat.study_file import read_study
+
+    read_files(read_study(path), path)
+
+
 def test_commands_in_the_docs_exist():
     """Every `cfs NAME` at the start of a line of an example, with options that it has."""
     import click

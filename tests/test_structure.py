@@ -25,8 +25,8 @@ RANKS = {
         {"methods"},
     ),
     "scenes": (
-        {"demo", "figures", "quick", "result_folder", "results", "streams", "toml_file",
-         "user_errors", "pictures", "picture_options", "room_views",
+        {"demo", "figures", "plausible", "quick", "result_folder", "results", "streams",
+         "toml_file", "user_errors", "pictures", "picture_options", "room_views",
          "bsdf_combination", "bsdf_generation", "bsdf_plots"},
         {"fenestration", "cost", "report", "plots", "photovoltaics"},
         {"room"},

@@ -130,15 +130,6 @@ def adaptive_comfort(
     return AdaptiveComfort(band, low, high, applicable, applicable & (excess == 0.0), excess)
 
 
-def hours_between(start: int, end: int, hours: int) -> NDArray[np.bool_]:
-    """Mask [H] of the hours that lie between two clock times, every day."""
-    require(
-        0 <= start < end <= 24, "clock times", f"expected 0 <= start < end <= 24: {start}, {end}"
-    )
-    hour_end = np.arange(hours) % 24 + 1
-    return (hour_end > start) & (hour_end <= end)
-
-
 @dataclass(frozen=True, slots=True)
 class ComfortSummary:
     """Comfort of one room over the chosen hours."""

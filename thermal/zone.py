@@ -192,10 +192,15 @@ def scheduled(weekday_profile: ArrayLike, hours: int = 8760) -> NDArray[np.float
 
 
 def work_hours(start: int, end: int, hours: int = 8760) -> NDArray[np.float64]:
-    """Hourly factors [H]: 1 in the hours that lie between two clock times, 0 elsewhere."""
-    require(0 <= start < end <= 24, "schedule", f"expected 0 <= start < end <= 24: {start}, {end}")
-    hour_end = np.arange(1, 25)
-    return scheduled((hour_end > start) & (hour_end <= end), hours)
+    """Hourly factors [H]: 1 in the hours that lie between two clock times, 0 elsewhere.
+
+    An end before the start is that of the next day: 22 to 6 is the night.
+    """
+    fits = 0 <= start < 24 and 0 <= end <= 24 and start != end
+    require(fits, "schedule", f"expected start and end of 0 to 24 that differ: {start}, {end}")
+    hour = np.arange(24)
+    after, before = hour >= start, hour < end
+    return scheduled(after & before if start < end else after | before, hours)
 
 
 def _same_length(values: ArrayLike, other: ArrayLike) -> NDArray[np.float64]:

@@ -194,6 +194,7 @@ def _space(
     space = Space(
         record.solid.guid, record.name, record.storey, volume, area, tuple(faces), tuple(windows),
         record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
+        record.type_name,
     )  # fmt: skip
     return space, problems + _assumptions(record, assumed) + _soundness(space)
 

@@ -141,4 +141,5 @@ def _joined(parts: list[SpaceRecord], ways: list[Passage]) -> SpaceRecord | None
         " + ".join(part.long_name for part in parts if part.long_name), first.storey,
         body.volume(), None if None in areas else sum(areas),
         None if None in volumes else sum(volumes),
+        first.type_name if len({part.type_name for part in parts}) == 1 else "",
     )  # fmt: skip

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ifcopenshell
+import ifcopenshell.util.element
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,6 +40,7 @@ class SpaceRecord:
     volume: float  # of the solid as drawn [m3]
     stated_area: float | None
     stated_volume: float | None
+    type_name: str = ""
 
     @property
     def guid(self) -> str:
@@ -102,9 +104,16 @@ def read_spaces(
                 solid.volume(),
                 area,
                 volume,
+                _type_name(space),
             )
         )
     return records, problems
+
+
+def _type_name(space: ifcopenshell.entity_instance) -> str:
+    """What kind of room it is: the name of its IfcSpaceType, else its ObjectType."""
+    kind = ifcopenshell.util.element.get_type(space)
+    return (kind.Name if kind is not None else space.ObjectType) or ""
 
 
 def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict]) -> bool:

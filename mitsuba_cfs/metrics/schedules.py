@@ -24,18 +24,21 @@ def working_hours(
 ) -> Mask:
     """Time steps [H] whose middle lies from `start_h` to `end_h` of the local clock.
 
+    An end before the start is that of the next day: 22 to 6 is the night.
+
     Args:
         weekdays_only: leave out Saturdays and Sundays of the weather's calendar.
         clock_ahead_h: hours that the clock is ahead of standard time (daylight saving), a number
             or [H].
     """
-    if not 0 <= start_h < end_h <= 24:
-        raise ValueError(f"expected 0 <= start < end <= 24, got {start_h} to {end_h}")
+    if not (0 <= start_h < 24 and 0 <= end_h <= 24 and start_h != end_h):
+        raise ValueError(f"expected start and end of 0 to 24 that differ, got {start_h}, {end_h}")
     t = weather.midpoints
     hour = t.hour + t.minute / 60 + t.second / 3600 + np.asarray(clock_ahead_h, dtype=float)
     hour = np.mod(np.asarray(hour), 24.0)
-    mask = (hour >= start_h) & (hour < end_h)
-    return mask & (t.day_of_week.to_numpy() < 5) if weekdays_only else mask
+    after, before = hour >= start_h, hour < end_h
+    mask = after & before if start_h < end_h else after | before
+    return mask & (weather.weekday < 5) if weekdays_only else mask
 
 
 def lm83_hours(weather: Weather, *, clock_ahead_h: ArrayLike = 0.0) -> Mask:

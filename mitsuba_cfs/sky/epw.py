@@ -64,6 +64,7 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         horizontal_infrared=_infrared(column, dry, dew),
         ground_depth_m=depth,
         ground_temperature_c=ground,
+        first_weekday=weather_table.epw_first_weekday(head),
         notes=notes,
         file=Path(path),
     )

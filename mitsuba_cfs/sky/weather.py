@@ -45,6 +45,7 @@ class Weather:
     ground_depth_m: FloatArray | None = None  # [G]
     ground_temperature_c: FloatArray | None = None  # [G, 12] monthly, January first
     turned_deg: float = 0.0  # north is so far counter-clockwise of +y, see `turned`
+    first_weekday: int | None = None  # of January 1, Monday 0, where the file says it
     notes: tuple[str, ...] = ()  # what the reader made up, or found to be odd
     file: Path | None = None  # that it was read from
 
@@ -85,6 +86,14 @@ class Weather:
         return replace(
             self, turned_deg=(self.turned_deg + angle_deg) % 360.0, wind_direction_deg=wind
         )
+
+    @property
+    def weekday(self) -> NDArray[np.int64]:
+        """Day of the week [H], Monday 0: counted from the file's first day, else the year's own."""
+        days = self.midpoints
+        if self.first_weekday is None:
+            return days.day_of_week.to_numpy().astype(np.int64)
+        return (self.first_weekday + days.day_of_year.to_numpy().astype(np.int64) - 1) % 7
 
     @property
     def midpoints(self) -> pd.DatetimeIndex:

@@ -17,6 +17,7 @@ FilePath = str | PathLike[str]
 # Years that stand for a file whose months come from different years: 1 January is a Sunday, as
 # nearly every EPW header says.
 TYPICAL_YEAR, TYPICAL_LEAP_YEAR = 2017, 2012
+WEEK = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday")
 STEPS_PER_DAY = 24
 
 # EPW field: column, value that means "missing" (at or above it), least and greatest valid value.
@@ -143,6 +144,12 @@ def epw_location(head: list[str], path: FilePath) -> Location:
     )
     name = ", ".join(part for part in (parts[1], parts[3]) if part not in ("", "-"))
     return location(path, name, (latitude, longitude, zone, elevation))
+
+
+def epw_first_weekday(head: list[str]) -> int | None:
+    """The day on which the data begin, Monday 0; None where the line of their period says none."""
+    parts = [part.strip().casefold() for part in head[7].split(",")]
+    return WEEK.index(parts[4]) if len(parts) > 4 and parts[4] in WEEK else None
 
 
 def epw_ground(

@@ -58,7 +58,7 @@ _DEFAULT = YearOptions(Path(), Path())
 )  # fmt: skip
 @click.option(
     "--occupied", type=click.IntRange(0, 24), nargs=2, default=_DEFAULT.occupied,
-    show_default=True, help="Clock hours of use, every day.",
+    show_default=True, help="Clock hours of use, every day; over midnight too: 18 8.",
 )  # fmt: skip
 @click.option(
     "--worst", type=click.IntRange(0, 100), default=_DEFAULT.worst, show_default=True,
@@ -83,8 +83,8 @@ def command(
     if chosen["views"] and (chosen["grid"] is not None or chosen["directions"] > 1):
         raise click.UsageError("--view gives the views: not with --grid or --directions")
     start, end = chosen["occupied"]
-    if start >= end:
-        raise click.UsageError(f"--occupied {start} {end}: expected the first hour before the last")
+    if start == end or start == 24:
+        raise click.UsageError(f"--occupied {start} {end}: expected two different hours, 0 to 24")
     from scenes.result_folder import ResultFolder
     from scenes.year_of_glare.files import read_files
 

@@ -34,7 +34,7 @@ def command(study: Path, out: Path, quick: bool) -> None:
     parsed = read_study(study, quick=quick)
     inputs = (study, parsed.weather, parsed.building, *(one.bsdf for one in parsed.system))
     folder = ResultFolder(out, "thermal", inputs=inputs)
-    files = read_files(parsed)  # before anything heavy is loaded
+    files = read_files(parsed, study)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.heat.study import run_study

@@ -7,16 +7,19 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from scenes import plausible
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.closure import Closure
-from thermal.glazing import Gap
+from thermal.glazing import GASES, Gap
+
+Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 
 
 class GapTable(TomlTable):
     """The gas gap of a double glazing, for `u_model = "gap"`."""
 
-    width: Positive  # [m]
-    gas: dict[str, Share] = Field({"argon": 0.9, "air": 0.1})
+    width: Annotated[Positive, plausible.GAP]  # [m]
+    gas: dict[Literal[tuple(GASES)], Share] = Field({"argon": 0.9, "air": 0.1})
     emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
 
 
@@ -25,8 +28,8 @@ class ClosureTable(TomlTable):
 
     u_model: Literal["constant", "linear", "gap"] = "constant"  # with the temperatures
     gap: GapTable | None = None
-    realised_inner_resistance: Positive | None = None  # [m2 K/W], see thermal.blackbox
-    realised_outer_resistance: Positive | None = None
+    realised_inner_resistance: Film | None = None  # [m2 K/W], see thermal.blackbox
+    realised_outer_resistance: Film | None = None
 
     @model_validator(mode="after")
     def _has_its_gap(self) -> ClosureTable:

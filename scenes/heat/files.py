@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, Given
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.study_file import StudyFile
 from scenes.room.operation import read_state
+from scenes.room.operation_hours import check_schedules
 from scenes.run.files import check_names
 from scenes.run.inputs import read_weather
 
@@ -22,8 +24,10 @@ class HeatFiles:
     given: Given  # the same as what the study file gives for all windows
 
 
-def read_files(study: StudyFile) -> HeatFiles:
+def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
     """Weather and shading states of a study; its box is checked too.
+
+    Args: file: the study's own, for messages.
 
     Raises: `DataError` for what cannot be used.
     """
@@ -33,6 +37,7 @@ def read_files(study: StudyFile) -> HeatFiles:
 
         box_building(study.box)
     weather = read_weather(study.weather)
+    check_schedules(study, weather, file)
     by = "[[system]] of the study,"
     systems = tuple(read_state(table, table.bsdf, by=by) for table in study.system)
     for one, table in zip(systems, study.system, strict=True):

@@ -92,8 +92,9 @@ def run_study(
 def _check_states(study: StudyFile, in_windows: Mapping[str, States]) -> None:
     """Raise `DataError` where the control names states that no window of the model has."""
     most = max(map(len, in_windows.values()), default=0)
-    fault = study.control.fault(most) if most else None
-    if fault is not None:
+    for fault in (one.control_fault(most) for one in study.variants if most):
+        if fault is None:
+            continue
         field, message = fault
         raise DataError(message, file=study.building, field=f"control.{field}")
 
@@ -131,7 +132,7 @@ def _year(study: StudyFile, room: RoomZone, result: ZoneResult, weather: Weather
         result.name,
         room.space.floor_area,
         hourly_table(result, room.state, room.daylight, weather, study.comfort),
-        *year_summary(result, weather, study),
+        *year_summary(result, weather, room.occupied),
     )
 
 

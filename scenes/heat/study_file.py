@@ -9,14 +9,19 @@ from pydantic import Field, model_validator
 
 from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
+from bim.model import BOX_PARTS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods import METHODS
+from scenes import plausible
 from scenes.fenestration.tables import StateTable
 from scenes.quick import HEAT, picks
+from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
+Part = Literal[BOX_PARTS]  # a side of the box, or all its faces of a kind
+Length = Annotated[Positive, plausible.LENGTH]  # [m]
 RUN = RoomOptions()  # what is not stated otherwise is as in `cfs run`
 
 
@@ -24,10 +29,10 @@ class LayerTable(TomlTable):
     """A layer of a construction."""
 
     name: str = "layer"
-    thickness: Positive  # [m]
-    conductivity: Positive  # [W/(m K)]
-    density: Positive  # [kg/m3]
-    heat_capacity: Positive  # [J/(kg K)]
+    thickness: Annotated[Positive, plausible.LAYER]  # [m]
+    conductivity: Annotated[float, plausible.CONDUCTIVITY]  # [W/(m K)]
+    density: Annotated[Positive, plausible.DENSITY]  # [kg/m3]
+    heat_capacity: Annotated[float, plausible.HEAT_CAPACITY]  # [J/(kg K)]
 
 
 class WindowTable(TomlTable):
@@ -35,8 +40,8 @@ class WindowTable(TomlTable):
 
     x: float
     sill: float
-    width: Positive
-    height: Positive
+    width: Length
+    height: Length
     side: Literal["front", "right", "back", "left", "ceiling"] = "front"
     frame: Annotated[float, Field(ge=0)] = 0.0
 
@@ -44,18 +49,18 @@ class WindowTable(TomlTable):
 class BoxTable(TomlTable):
     """A box-shaped room in place of a building file."""
 
-    width: Positive
-    depth: Positive
-    height: Positive
+    width: Length
+    depth: Length
+    height: Length
     facing_deg: float = 180.0
     recess: Annotated[float, Field(ge=0)] = 0.0
     window: tuple[WindowTable, ...]
-    reflectance: dict[str, Share] = Field(default_factory=dict)
-    adjacency: dict[str, Literal["outside", "ground", "space", "adiabatic"]] = Field(
+    reflectance: dict[Part, Share] = Field(default_factory=dict)
+    adjacency: dict[Part, Literal["outside", "ground", "space", "adiabatic"]] = Field(
         default_factory=dict
     )
     # by side or kind, outermost first
-    construction: dict[str, tuple[LayerTable, ...]] = Field(default_factory=dict)
+    construction: dict[Part, tuple[LayerTable, ...]] = Field(default_factory=dict)
 
 
 class ComfortTable(TomlTable):
@@ -77,8 +82,8 @@ class TraceTable(TomlTable):
     sun_points: Annotated[int, Field(ge=16)] = RUN.sampling.sun_points
     path_samples: Annotated[int, Field(ge=16)] = RUN.sampling.hour_samples
     sky_subdivision: Literal[1, 2, 4, 6] = 1
-    sensor_spacing: Positive = RUN.grid.spacing  # [m]
-    sensor_height: Positive = RUN.grid.height  # above the floor [m]
+    sensor_spacing: Length = RUN.grid.spacing  # [m]
+    sensor_height: Length = RUN.grid.height  # above the floor [m]
     sensor_margin: Annotated[float, Field(ge=0)] = RUN.grid.margin  # from the walls [m]
     picture_size: Annotated[int, Field(ge=64)] = RUN.outputs.picture_size  # for `limit_dgp`
     picture_samples: Annotated[int, Field(ge=1)] = RUN.sampling.view_samples
@@ -111,13 +116,17 @@ class StudyFile(OperationTables):
     def _fits(self) -> StudyFile:
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `[box]`")
+        for key in ("spaces", "join", "couple") if self.box is not None else ():
+            if getattr(self, key):
+                raise ValueError(f"{key}: belongs to a `building`; a box is one room")
         if not self.system:
             if self.box is not None:
                 raise ValueError("system: is missing; a box holds no fenestration data")
             return self
-        fault = self.control.fault(len(self.system))
-        if fault is not None:
-            raise ValueError("control.{}: {}".format(*fault))
+        for one in self.variants:
+            fault = one.control_fault(len(self.system))
+            if fault is not None:
+                raise ValueError("control.{}: {}".format(*fault))
         return self
 
 
@@ -128,7 +137,7 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
 
     Raises: `DataError` naming the file and the field.
     """
-    study = validated(StudyFile, read_table(path), path)
+    study = schedules_there(validated(StudyFile, read_table(path), path), path)
     here = path.parent
     systems = tuple(s.model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system)
     found = {"weather": _there(here, study.weather, path), "system": systems}

@@ -7,12 +7,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
-from scenes.heat.study_file import ComfortTable, StudyFile
+from scenes.heat.study_file import ComfortTable
 from thermal.balance import ZoneResult
 from thermal.comfort import (
     ADAPTIVE_BANDS,
     adaptive_comfort,
-    hours_between,
     pmv_ppd,
     running_mean,
     running_mean_en16798,
@@ -56,10 +55,9 @@ def hourly_table(
 
 
 def year_summary(
-    result: ZoneResult, weather: Weather, study: StudyFile
+    result: ZoneResult, weather: Weather, occupied: NDArray[np.bool_]
 ) -> tuple[dict[str, float], pd.DataFrame]:
-    """Energy, peaks and comfort of the occupied hours, and their discomfort by month."""
-    occupied = hours_between(*study.gains.occupied, hours=len(result.air_c))
+    """Energy, peaks and comfort of the occupied hours [H], and their discomfort by month."""
     month = weather.midpoints.month.to_numpy()
     found = {
         "heating_kwh": result.heating.sum() / 1e3,

@@ -5,21 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mitsuba_cfs.errors import DataError
 from scenes.photovoltaics.two_diode import Datasheet, fitted_cell
-from scenes.toml_file import read_table, validated
-
-Positive = Annotated[float, Field(gt=0)]
-Share = Annotated[float, Field(ge=0, lt=1)]
+from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ModuleTable(_Table):
+class ModuleTable(TomlTable):
     """A module at standard test conditions, and how its cells lie."""
 
     select: str  # ifcopenshell selector: by material, type, name, GUID
@@ -42,7 +35,7 @@ class ModuleTable(_Table):
         )  # fmt: skip
 
 
-class SubsystemTable(_Table):
+class SubsystemTable(TomlTable):
     """Modules on one input of an inverter."""
 
     name: str
@@ -50,14 +43,14 @@ class SubsystemTable(_Table):
     in_series: bool = True  # else each module at its own best point
 
 
-class PvStudy(_Table):
+class PvStudy(TomlTable):
     """The whole file."""
 
     module: ModuleTable
     subsystem: tuple[SubsystemTable, ...] = ()  # by orientation if there is none
     leave_out: tuple[str, ...] = ()  # selectors: trees that do not exist
-    surroundings: Annotated[float, Field(ge=0, le=1)] | None = None  # reflectance of all opaque
-    other_losses: Share = 0.03  # soiling, cables, ageing
+    surroundings: Share | None = None  # reflectance of all opaque
+    other_losses: Annotated[float, Field(ge=0, lt=1)] = 0.03  # soiling, cables, ageing
     inverter_efficiency: Annotated[float, Field(gt=0.5, le=1)] = 0.96
 
 

@@ -11,14 +11,15 @@ from bim.model import Space
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
-from scenes.room.operation_tables import ControlTable
-from thermal.control import always, by_cut_off, by_glare, by_irradiance, by_schedule
+from scenes.room.operation_hours import OperationHours
+from scenes.room.operation_tables import OperationTables
+from thermal.control import always, by_cut_off, by_glare, by_irradiance
 
 FloatArray = NDArray[np.float64]
 
 
 def shading_states(
-    control: ControlTable,
+    operation: OperationTables,
     space: Space,
     weather: Weather,
     states: int,
@@ -36,9 +37,9 @@ def shading_states(
         eye: gives [J, H] vertical illuminance at the eye in each state [lx].
         dgp: gives [J, H].
     """
-    hours = len(weather.times)
+    control, hours = operation.control, len(weather.times)
     if control.rule == "schedule":
-        return by_schedule(control.schedule, hours)
+        return OperationHours(operation, weather).states(states)
     if control.rule == "irradiance":
         closed = control.state or states - 1
         brightest = irradiance().max(axis=1)

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from typing import TypeVar
 
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.tables import StateTable
 from scenes.room.operation_tables import OperationTables
 from scenes.toml_file import read_table, validated
+
+Tables = TypeVar("Tables", bound=OperationTables)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +26,10 @@ class Operation:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The BSDF files that it names."""
-        return tuple(self.file.parent / table.bsdf for table in self.tables.system)
+        """The BSDF files and the tables of schedules that it names."""
+        tables = (one.csv for one in self.tables.schedules.values())
+        named = [self.file.parent / table.bsdf for table in self.tables.system]
+        return (*named, *(path for path in tables if path is not None))
 
 
 def read_operation(path: str | PathLike[str]) -> Operation:
@@ -33,7 +38,7 @@ def read_operation(path: str | PathLike[str]) -> Operation:
     Raises: `DataError` that names file and field.
     """
     path = Path(path)
-    tables = validated(OperationTables, read_table(path), path)
+    tables = schedules_there(validated(OperationTables, read_table(path), path), path)
     systems = []
     for number, one in enumerate(tables.system):
         place = path.parent / one.bsdf
@@ -44,6 +49,18 @@ def read_operation(path: str | PathLike[str]) -> Operation:
             system = replace(system, name=place.stem)
         systems.append(system)
     return Operation(path, tables, tuple(systems))
+
+
+def schedules_there(tables: Tables, path: Path) -> Tables:
+    """The tables of a file with absolute paths of the schedules' CSV files, which are there."""
+    found = {}
+    for name, one in tables.schedules.items():
+        place = None if one.csv is None else (path.parent / one.csv).absolute()
+        if place is not None and not place.is_file():
+            field = f"schedules.{name}.csv"
+            raise DataError(f"no such file: {one.csv}", file=path, field=field)
+        found[name] = one.model_copy(update={"csv": place})
+    return tables.model_copy(update={"schedules": found})
 
 
 def read_state(table: StateTable, path: Path, *, by: str = "") -> FenestrationSystem:
@@ -57,7 +74,8 @@ def read_state(table: StateTable, path: Path, *, by: str = "") -> FenestrationSy
 
 def check_states(operation: Operation, states: int) -> None:
     """Raise `DataError` where the control names states that the windows do not have."""
-    fault = operation.tables.control.fault(states)
-    if fault is not None:
+    for fault in (one.control_fault(states) for one in operation.tables.variants):
+        if fault is None:
+            continue
         field, message = fault
         raise DataError(message, file=operation.file, field=f"control.{field}")

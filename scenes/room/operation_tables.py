@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
+from bim.model import Building, Space
+from mitsuba_cfs.errors import DataError
+from scenes import plausible
 from scenes.fenestration.tables import StateTable
+from scenes.room.schedules import (
+    CLOCK,
+    CalendarTable,
+    Hours,
+    OrSchedule,
+    ScheduleTable,
+    clock_or_name,
+    scheduled_fields,
+    states_or_name,
+    unknown_name,
+)
 from scenes.toml_file import Positive, Share, TomlTable
-from thermal.zone import IdealLoads
-
-CLOCK = 24  # hours of a schedule
-
-
-def _in_order(hours: tuple[int, int]) -> tuple[int, int]:
-    """Two clock times of one day: the balance takes no span over midnight."""
-    start, end = hours
-    if not 0 <= start < end <= 24:
-        raise ValueError(f"expected two hours of one day, 0 <= from < to <= 24, got {list(hours)}")
-    return hours
-
-
-Hours = Annotated[
-    tuple[int, int], AfterValidator(_in_order), Field(description="clock times from and to")
-]
 
 
 class ControlTable(TomlTable):
@@ -31,17 +29,22 @@ class ControlTable(TomlTable):
 
     rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
     state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
-    schedule: tuple[int, ...] = ()  # "schedule": 24 states
-    close_above: Positive = 200.0  # "irradiance" on the windows [W/m2]
-    open_below: Annotated[float, Field(ge=0)] | None = None
-    limit_lx: Positive = 3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
+    # "schedule": 24 states, or the name of a schedule of states
+    schedule: Annotated[tuple[int, ...] | str, OrSchedule(plausible.STATE, states_or_name)] = ()
+    close_above: Annotated[Positive, plausible.SUN] = 200.0  # "irradiance" on the windows [W/m2]
+    open_below: Annotated[float, plausible.SUN] | None = None
+    limit_lx: Annotated[Positive, plausible.EYE] = (
+        3473.0  # "glare": vertical illuminance of the eye; sDGP 0.40
+    )
     limit_dgp: Share | None = None  # "glare": DGP of every hour's picture in place of Ev
     slat_tilts_deg: tuple[float, ...] = ()  # "cut-off": of each state
-    slat_width: Positive = 0.08  # [m]
-    slat_spacing: Positive = 0.072  # [m]
+    slat_width: Annotated[Positive, plausible.SLAT] = 0.08  # [m]
+    slat_spacing: Annotated[Positive, plausible.SLAT] = 0.072  # [m]
 
     def fault(self, states: int) -> tuple[str, str] | None:
         """The key that does not fit windows of so many states, and what is wrong with it."""
+        if isinstance(self.schedule, str):
+            return None  # its states are known with the weather
         if self.rule == "schedule" and len(self.schedule) != CLOCK:
             return "schedule", f"expected {CLOCK} states, got {len(self.schedule)}"
         wanted = self.schedule if self.rule == "schedule" else (self.state,)
@@ -55,49 +58,64 @@ class ControlTable(TomlTable):
 class GainsTable(TomlTable):
     """Heat in the room during the occupied hours."""
 
-    equipment_w_m2: Annotated[float, Field(ge=0)] = 8.0
-    persons: Annotated[float, Field(ge=0)] = 1.0
-    person_w: Annotated[float, Field(ge=0)] = 75.0
-    lighting_w_m2: Annotated[float, Field(ge=0)] = 0.0
-    lighting_target_lx: Positive = 500.0  # of the mean on the work plane; daylight dims
+    equipment_w_m2: Annotated[float | str, OrSchedule(plausible.GAIN)] = 8.0
+    persons: Annotated[float | str, OrSchedule(plausible.PERSONS)] = 1.0
+    person_w: Annotated[float, plausible.PERSON] = 75.0
+    lighting_w_m2: Annotated[float | str, OrSchedule(plausible.LAMPS)] = 0.0
+    lighting_target_lx: Annotated[Positive, plausible.TARGET] = (
+        500.0  # of the mean on the work plane; daylight dims
+    )
     radiant_share: Share = 0.5
-    occupied: Hours = (8, 18)
+    # clock hours of every day, or a schedule of the share that is there: numbers above hold then
+    occupied: Annotated[tuple[int, int] | str, OrSchedule(plausible.SHARE, clock_or_name)] = (8, 18)
 
 
 class AirTable(TomlTable):
     """Outdoor air."""
 
-    infiltration_ach: Annotated[float, Field(ge=0)] = 0.5
-    night_ach: Annotated[float, Field(ge=0)] = 0.0  # more of it in these hours
+    infiltration_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.5
+    night_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0  # by night
     night: Hours = (0, 7)
+    # of a fan, while occupied; the name of a schedule says its own hours
+    ventilation_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0
     # each way through every open door between coupled rooms [m3/s]; 0: the doors are shut
-    door_m3_s: Annotated[float, Field(ge=0)] = 0.0
+    door_m3_s: Annotated[float, plausible.DOOR_FLOW] = 0.0
 
 
 class LoadsTable(TomlTable):
     """Ideal heating and cooling; without set points the room floats."""
 
-    heating_c: float | None = None
-    cooling_c: float | None = None
-    heating_limit_w: Positive | None = None
-    cooling_limit_w: Positive | None = None
+    heating_c: Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)] = None
+    cooling_c: Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)] = None
+    heating_limit_w: Annotated[Positive, plausible.POWER] | None = None
+    cooling_limit_w: Annotated[Positive, plausible.POWER] | None = None
 
     @model_validator(mode="after")
     def _do_not_cross(self) -> LoadsTable:
-        if self.heating_c is not None and self.cooling_c is not None:
+        if isinstance(self.heating_c, float) and isinstance(self.cooling_c, float):
             if self.heating_c > self.cooling_c:
                 raise ValueError("the set points cross: heating_c lies above cooling_c")
         return self
 
-    def ideal(self) -> IdealLoads:
-        """Set points and limits; none stated means never, and without limit."""
-        infinity = float("inf")
-        return IdealLoads(
-            -infinity if self.heating_c is None else self.heating_c,
-            infinity if self.cooling_c is None else self.cooling_c,
-            self.heating_limit_w or infinity,
-            self.cooling_limit_w or infinity,
-        )
+
+class RoomsTable(TomlTable):
+    """Rooms that are operated otherwise: what is stated here goes before the file's own tables."""
+
+    spaces: tuple[str, ...] = ()  # names or GUIDs
+    types: tuple[str, ...] = ()  # of the IFC's space types
+    control: ControlTable = ControlTable()
+    gains: GainsTable = GainsTable()
+    air: AirTable = AirTable()
+    loads: LoadsTable = LoadsTable()
+
+    @model_validator(mode="after")
+    def _names_some(self) -> RoomsTable:
+        if not self.spaces and not self.types:
+            raise ValueError("name `spaces` or `types`")
+        return self
+
+
+PARTS = ("control", "gains", "air", "loads")
 
 
 class OperationTables(TomlTable):
@@ -108,3 +126,59 @@ class OperationTables(TomlTable):
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
     loads: LoadsTable = LoadsTable()
+    rooms: tuple[RoomsTable, ...] = ()  # the first that names a room holds for it
+    schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
+    calendar: CalendarTable = CalendarTable()
+
+    @model_validator(mode="after")
+    def _schedules_are_there(self) -> OperationTables:
+        for number, tables in enumerate((self, *self.rooms), -1):
+            for part in PARTS:
+                for key, (name, _) in scheduled_fields(getattr(tables, part)).items():
+                    if name not in self.schedules:
+                        place = "" if number < 0 else f"rooms.{number}."
+                        fault = unknown_name(name, self.schedules)
+                        raise ValueError(f"{place}{part}.{key}: {fault}")
+        return self
+
+    def control_fault(self, states: int) -> tuple[str, str] | None:
+        """The key of `control` that does not fit windows of so many states, and what is wrong."""
+        name = self.control.schedule
+        if self.control.rule != "schedule" or not isinstance(name, str):
+            return self.control.fault(states)
+        wrong = sorted(set(self.schedules[name].stated) - set(range(states)))
+        if wrong:
+            return "schedule", f"{name!r} has state {wrong[0]:g}: the windows have {states}, from 0"
+        return None
+
+    def with_rooms(self, rooms: RoomsTable) -> OperationTables:
+        """The tables with what an entry of `rooms` states."""
+        found = {}
+        for part in PARTS:
+            stated = getattr(rooms, part)
+            update = {key: getattr(stated, key) for key in stated.model_fields_set}
+            found[part] = getattr(self, part).model_copy(update=update)
+        return self.model_copy(update=found)
+
+    @property
+    def variants(self) -> tuple[OperationTables, ...]:
+        """The tables of all rooms, then those of each entry of `rooms`."""
+        return (self, *map(self.with_rooms, self.rooms))
+
+    def of_room(self, building: Building, space: Space) -> OperationTables:
+        """The tables of one room.
+
+        Raises: `DataError` for a room or a type that the building does not have.
+        """
+        chosen = self
+        for number, rooms in reversed(tuple(enumerate(self.rooms))):
+            guids = {building.room(name).space.guid for name in rooms.spaces}
+            kinds = {one.type_name for one in building.spaces}
+            for name in rooms.types:
+                if name not in kinds:
+                    there = ", ".join(sorted(filter(None, kinds))) or "none"
+                    message = f"no space is of type {name!r}; there are: {there}"
+                    raise DataError(message, file=building.file, field=f"rooms.{number}.types")
+            if space.guid in guids or space.type_name in rooms.types:
+                chosen = self.with_rooms(rooms)
+        return chosen

@@ -30,6 +30,7 @@ from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
@@ -43,6 +44,7 @@ from scenes.room.daylight import room_daylight, room_scene
 from scenes.room.glare import default_hours, room_glare
 from scenes.room.holes import hole_problems
 from scenes.room.operation import Operation
+from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
@@ -139,7 +141,7 @@ class RoomSimulation:
     ) -> None:
         """See `compute_room`."""
         if operation is not None:
-            options = options.changed(occupied=operation.gains.occupied)
+            operation = operation.of_room(building, space)
         self.building, self.space, self.weather, self.options = building, space, weather, options
         self.sampling, self.outputs = options.sampling, options.outputs
         self.operation, self.cache, self.progress = operation, cache, progress
@@ -196,7 +198,7 @@ class RoomSimulation:
         if self.operation is None or not self.space.windows:
             return np.zeros(self.skies.hours, dtype=np.int64)
         return shading_states(
-            self.operation.control,
+            self.operation,
             self.space,
             self.weather,
             self.windows.states,
@@ -283,11 +285,18 @@ class RoomSimulation:
         return [[thermal_system(system) for system in states] for states in self.windows.systems]
 
     @cached_property
+    def occupied(self) -> NDArray[np.bool_]:
+        """The hours with people [H]."""
+        if self.operation is not None:
+            return OperationHours(self.operation, self.weather).present > 0
+        return working_hours(self.weather, *self.options.occupancy.hours)
+
+    @cached_property
     def surfaces(self) -> ThermalRoom:
         """The room's surfaces and windows as a zone, with the gains and the air of the options."""
         group, heats = self.windows.group, self.thermals
         first = heats[group[0]][0].fenestration if len(group) else None
-        gains = internal_gains(self.space, self.skies.hours, self.options.occupancy)
+        gains = internal_gains(self.space, self.occupied, self.options.occupancy)
         air = self.options.infiltration_ach
         try:
             room = thermal_room(self.space, first, infiltration_ach=air, gains=gains)
@@ -308,15 +317,15 @@ class RoomSimulation:
     @cached_property
     def zone(self) -> RoomZone:
         """The room as the heat balance takes it."""
-        room, lamps, hours = self.surfaces, np.zeros(self.skies.hours), self.skies.hours
+        room, lamps = self.surfaces, np.zeros(self.skies.hours)
         sun, state, plane = self.sun, self.state, self.plane  # stages of their own before this one
         self.progress("heat", 0.0)
         if self.operation is not None:
             area = self.space.floor_area
-            zone, lamps = operated(room.zone, self.operation, area, hours, plane)
+            zone, lamps = operated(room.zone, self.operation, area, self.weather, plane)
             room = replace(room, zone=zone)
         solar, gains = sun.switched(self.windows, self.thermals, state)
-        return RoomZone(self.space, room, solar, gains, state, lamps, plane)
+        return RoomZone(self.space, room, solar, gains, state, lamps, self.occupied, plane)
 
     def thermal(self) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort, and the balance they come from."""
@@ -324,8 +333,7 @@ class RoomSimulation:
         (balance,) = balances([self.zone], self.weather, step_s, progress=self.progress)
         self.progress("heat", 1.0)
         table = fenestration_table(self.windows, self.thermals)
-        occupied = self.options.occupancy.hours
-        return thermal_result(self.zone, balance, self.weather, occupied, table), balance
+        return thermal_result(self.zone, balance, self.weather, self.occupied, table), balance
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""

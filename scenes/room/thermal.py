@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
@@ -12,7 +14,7 @@ from scenes.results import ThermalResult
 from scenes.room.windows import RoomWindows
 from scenes.room.zone import RoomZone
 from thermal.balance import ZoneResult
-from thermal.comfort import adaptive_comfort, hours_between, running_mean, summarise
+from thermal.comfort import adaptive_comfort, running_mean, summarise
 from thermal.zone import Zone
 
 BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
@@ -22,12 +24,12 @@ def thermal_result(
     room: RoomZone,
     result: ZoneResult,
     weather: Weather,
-    occupied: tuple[int, int],
+    occupied: NDArray[np.bool_],
     fenestration: Iterator[dict[str, float | str]],
 ) -> ThermalResult:
     """The tables of a room's year.
 
-    Args: occupied: clock hours from and to; fenestration: `fenestration_table` of its windows.
+    Args: occupied: [H]; fenestration: `fenestration_table` of its windows.
     """
     comfort, summary = _comfort(result, weather, occupied)
     return ThermalResult(
@@ -80,11 +82,10 @@ def _temperatures(result: ZoneResult, zone: Zone, weather: Weather) -> pd.DataFr
 
 
 def _comfort(
-    result: ZoneResult, weather: Weather, hours: tuple[int, int]
+    result: ZoneResult, weather: Weather, occupied: NDArray[np.bool_]
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Adaptive comfort (ASHRAE 55) of every hour, and its shares of the occupied ones."""
     mean = running_mean(weather.dry_bulb_c)
-    occupied = hours_between(*hours, hours=len(mean))
     table = {"occupied": occupied, "running_mean_c": mean}
     summary: dict[str, float] = {}
     for name, band in BANDS.items():

@@ -13,6 +13,7 @@ from bim.to_thermal import ThermalRoom, coupled_rooms, door_links
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import Occupancy
 from thermal.balance import ZoneResult, simulate_zones
@@ -20,7 +21,7 @@ from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.gains import dimmed_share, split_gains
 from thermal.kernel import advance
 from thermal.records import must_compile
-from thermal.zone import Gains, Zone, work_hours
+from thermal.zone import Gains, Zone
 
 FloatArray = NDArray[np.float64]
 COMPILING = "compiling the heat balance, once: about 10 s"
@@ -37,6 +38,7 @@ class RoomZone:
     gains: dict[str, FloatArray]  # [H] sums of the sun by name [W]
     state: NDArray[np.int64]  # [H] shading state
     lamps: FloatArray  # [H] power [W]
+    occupied: NDArray[np.bool_]  # [H]
     daylight: FloatArray | None  # [H] mean on the work plane [lx]; None: nothing asked for it
 
     @property
@@ -95,12 +97,11 @@ def per_window(solar: Solar, zone: Zone) -> Solar:
     return replace(solar, state=np.minimum(solar.state, most))
 
 
-def internal_gains(space: Space, hours: int, occupancy: Occupancy) -> Gains:
-    """Heat of people and equipment during the occupied hours."""
+def internal_gains(space: Space, present: NDArray[np.bool_], occupancy: Occupancy) -> Gains:
+    """Heat of people and equipment during the occupied hours [H]."""
     power = space.floor_area * (
         occupancy.equipment_w_m2 + occupancy.person_w / occupancy.floor_per_person
     )
-    present = work_hours(*occupancy.hours, hours=hours)
     return Gains((1 - RADIANT_SHARE) * power * present, RADIANT_SHARE * power * present)
 
 
@@ -108,7 +109,7 @@ def operated(
     zone: Zone,
     tables: OperationTables,
     floor_area: float,
-    hours: int,
+    weather: Weather,
     daylight: FloatArray | None,
 ) -> tuple[Zone, FloatArray]:
     """The zone with the gains, air and set points of the tables, and the lamps' power [H] [W].
@@ -116,17 +117,17 @@ def operated(
     Args: daylight: [H] mean illuminance of the work plane, which dims the lamps [lx]; None: nothing
         dims them.
     """
-    gains, air = tables.gains, tables.air
-    present = work_hours(*gains.occupied, hours=hours)
-    power = gains.equipment_w_m2 * floor_area + gains.persons * gains.person_w
-    lamps = gains.lighting_w_m2 * floor_area * present
+    hours, gains = OperationHours(tables, weather), tables.gains
+    lamps = hours.lamps(floor_area)
     if daylight is not None:
         lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
     found = replace(
         zone,
-        infiltration_ach=air.infiltration_ach + air.night_ach * work_hours(*air.night, hours=hours),
-        gains=split_gains(power * present, gains.radiant_share, (lamps, gains.radiant_share)),
-        loads=tables.loads.ideal(),
+        infiltration_ach=hours.air_changes(),
+        gains=split_gains(
+            hours.heat(floor_area), gains.radiant_share, (lamps, gains.radiant_share)
+        ),
+        loads=hours.loads(),
     )
     return found, lamps
 

@@ -16,6 +16,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, Given, read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.room.operation import Operation, check_states, read_operation
+from scenes.room.operation_hours import check_schedules
 from scenes.room.picture_hours import check_hours, wanted_hours
 from scenes.run.inputs import read_weather
 from scenes.run.options import JobOptions
@@ -51,6 +52,7 @@ def read_files(options: JobOptions) -> JobFiles:
         checked_system(system, options.system)
     if operation is not None:
         _check_operation(operation, system)
+        check_schedules(operation.tables, weather, operation.file)
     _check_sun(hours, weather)
     states = () if operation is None else operation.systems
     states = states if system is None else (system,)

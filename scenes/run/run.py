@@ -191,6 +191,7 @@ def _rooms(
                     if other.guid in found
                     and not found[other.guid].template
                     and same_systems(other, space, inputs.systems)
+                    and _operated_alike(inputs, other, space)
                     and same_light(inputs.building, other, space, sampling, cache)
                 ),
                 None,
@@ -215,6 +216,13 @@ def _rooms(
         if on_room is not None:
             on_room(found[space.guid])
     return list(found.values()), problems, notes
+
+
+def _operated_alike(inputs: JobInputs, one: Space, other: Space) -> bool:
+    if inputs.operation is None:
+        return True
+    tables, building = inputs.operation.tables, inputs.building
+    return tables.of_room(building, one) == tables.of_room(building, other)
 
 
 def _manifest(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.calibration.choice import Demand, MethodChoice, choose
 from scenes.calibration.costs import Calibration, Workload
@@ -17,7 +18,6 @@ from scenes.study.case import AUTO, Case, with_method
 from scenes.study.one_case import case_systems
 from scenes.study.plan import StudyPlan
 from scenes.study.study_file import Study
-from thermal.comfort import hours_between
 
 
 def settled(study: Study, plan: StudyPlan, calibration: Calibration | None = None) -> StudyPlan:
@@ -58,7 +58,7 @@ def work_of(cases: list[Case]) -> Workload:
     for case in cases:
         if case.weather not in hours:
             weather = read_weather(case.weather.path)
-            used = hours_between(*case.options.occupancy.hours, hours=len(weather.times))
+            used = working_hours(weather, *case.options.occupancy.hours)
             up = is_up(sun_directions(weather))
             hours[case.weather] = np.array([np.count_nonzero(used & up), np.count_nonzero(up)])
     rated, lit = sum(hours[case.weather] for case in cases) / (scenes * systems)

@@ -12,6 +12,7 @@ from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.box import box_building
 from scenes.room.operation import check_states, read_operation
+from scenes.room.operation_hours import check_schedules
 from scenes.run.files import check_names
 from scenes.run.inputs import read_weather
 from scenes.study.study_file import Study
@@ -29,12 +30,14 @@ def check_files(study: Study) -> None:
             corrections_beside(room.building)
         else:
             box_building(room.box)
-    if study.operation is not None:
-        operation = read_operation(study.operation)
+    operation = None if study.operation is None else read_operation(study.operation)
+    if operation is not None:
         if study.system:
             check_states(operation, 1)
     for climate in study.climate:
-        read_weather(climate.weather)
+        weather = read_weather(climate.weather)
+        if operation is not None:
+            check_schedules(operation.tables, weather, operation.file)
     for system in study.system:
         read = read_system(system.bsdf, u_value=system.u_value, g_value=system.g_value)
         checked_system(read, system.bsdf)

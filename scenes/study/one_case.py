@@ -17,6 +17,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -30,7 +31,6 @@ from scenes.room.room import compute_room, skies_for
 from scenes.run.inputs import read_weather
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
-from thermal.comfort import hours_between
 
 WARM_C = 26.0  # operative temperature above which hours are counted
 KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
@@ -122,7 +122,7 @@ def case_systems(case: Case, space: Space) -> dict[str, States]:
 
 def _rated_hours(weather: Weather, occupied: tuple[int, int]) -> NDArray[np.int64]:
     """Hours of the year whose glare counts: occupied, and the sun up."""
-    used = hours_between(*occupied, hours=len(weather.times))
+    used = working_hours(weather, *occupied)
     return np.flatnonzero(used & is_up(sun_directions(weather)))
 
 
@@ -135,7 +135,7 @@ def glare_figures(
 
     Args: dgp: [h] of the occupied hours with the sun up.
     """
-    used = int(np.count_nonzero(hours_between(*occupied, hours=len(weather.times))))
+    used = int(np.count_nonzero(working_hours(weather, *occupied)))
     every = np.concatenate([dgp, np.zeros(used - len(dgp))])
     hours = class_hours(every) * weather.step_h
     found: dict[str, float | str] = {

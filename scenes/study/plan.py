@@ -10,6 +10,7 @@ from bim.ifc.building import read_ifc
 from bim.ifc.fenestration_read import read_fenestration
 from bim.model import Building, Space
 from scenes.heat.box import box_building
+from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
 from scenes.run.inputs import chosen_spaces
 from scenes.study.case import AUTO, Case, InputFile, program_version
@@ -48,12 +49,14 @@ def plan_of(study: Study) -> StudyPlan:
     systems = systems or [{"system": AS_HELD, "bsdf": None, "thermal": None} | NOTHING_GIVEN]
     climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
     operation = None if study.operation is None else InputFile.of(study.operation)
+    operated = () if study.operation is None else read_operation(study.operation).files
     found: list[Case] = []
     rooms = {}
     for room in study.room:
         building, spaces = rooms_of(room)
         source = room.box if room.box is not None else InputFile.of(room.building)
         referenced = () if study.system else _referenced(room.building)
+        referenced += tuple(map(InputFile.of, operated))
         for space in spaces:
             about = {
                 "room": room.name,

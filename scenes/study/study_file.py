@@ -6,30 +6,31 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    create_model,
-    model_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from mitsuba_cfs.errors import DataError
+from scenes import plausible
 from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
 from scenes.quick import ROOM, picks
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import Hours
 from scenes.room.options import RoomOptions, named_types
-from scenes.toml_file import read_table, validated
+from scenes.toml_file import TomlTable, read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
+# Options that mean what a key of an operation file means
+OF_TABLES = {
+    "occupied": Hours,
+    "infiltration_ach": Annotated[float, plausible.AIR_CHANGE],
+    "equipment_w_m2": Annotated[float, plausible.GAIN],
+    "person_w": Annotated[float, plausible.PERSON],
+}
 Name = Annotated[str, Field(min_length=1)]
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+class _Table(TomlTable):
+    model_config = ConfigDict(validate_default=True)
 
 
 class RoomTable(_Table):
@@ -79,7 +80,7 @@ def _options_table() -> type[BaseModel]:
     columns: dict[str, Any] = {}
     for name, default in RoomOptions().named().items():
         if name not in OF_THE_GRID:
-            kind = Hours if name == "occupied" else kinds[name]
+            kind = OF_TABLES.get(name, kinds[name])
             if kind in (int, float):
                 kind = Annotated[kind, Field(ge=0)]
             columns[name] = (kind, default)

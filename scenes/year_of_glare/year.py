@@ -102,7 +102,7 @@ def read_year(
     hashes.append(content_digest(*([s.visible, s.fine] for s in viewed.systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
     digest = hashlib.sha256(json.dumps([*chosen, viewed.space.guid]).encode()).hexdigest()
-    used = working_hours(weather, *map(float, options.occupied))
+    used = working_hours(weather, *options.occupied)
     notes = (*viewed.notes(), *weather.notes)
     return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,

@@ -49,6 +49,14 @@ def test_daylight_saving_moves_the_clock():
     assert weather.midpoints[mask & (summer == 0)].hour.min() == 8
 
 
+def test_hours_over_midnight_are_the_evening_and_the_morning():
+    night, day = (schedules.working_hours(year(), *hours) for hours in ((22, 6), (6, 22)))
+    assert not np.any(night & day) and np.all(night | day)
+    assert sorted(set(year().midpoints[night].hour)) == [0, 1, 2, 3, 4, 5, 22, 23]
+    late = schedules.working_hours(year(), 22, 0)
+    np.testing.assert_array_equal(late, schedules.working_hours(year(), 22, 24))
+
+
 def test_weekdays():
     mask = schedules.working_hours(year(), weekdays_only=True)
     assert mask.sum() == 10 * 260  # 2017 starts and ends on a Sunday
@@ -288,6 +296,6 @@ def test_wrong_areas_limits_and_rules():
     with pytest.raises(ValueError, match="ranked_by"):
         schedules.daylight_hours(year(), ranked_by="colour")
     with pytest.raises(ValueError, match="start"):
-        schedules.working_hours(year(), 18, 8)
+        schedules.working_hours(year(), 8, 8)
     with pytest.raises(ValueError, match="outdoor_horizontal"):
         daylight_factor([1.0], 0.0)

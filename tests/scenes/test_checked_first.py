@@ -120,10 +120,10 @@ def _pv_file(place: Place, text: str) -> list:
 
 
 def _night(place: Place) -> str:
-    return place.operation("[air]\nnight = [22, 6]")
+    return place.operation("[air]\nnight = [6, 6]")
 
 
-SHORT, HOURS = "short.epw: length", "expected two hours of one day"
+SHORT, HOURS = "short.epw: length", "expected two different hours"
 FLOOR = "g: 0.01 is below the solar transmittance 0.154, the least that g can be"
 MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "run, head": (lambda p: _run(building="word.ifc"), "word.ifc: not an IFC file"),
@@ -150,7 +150,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "run, folder": (lambda p: _run("--out", p.folder), "--out: "),
     "thermal, weather": (lambda p: ["thermal", p.heat(weather="short.epw"), "--out", "out"], SHORT),
     "thermal, night": (
-        lambda p: ["thermal", p.heat("[air]\nnight = [22, 6]"), "--out", "out"],
+        lambda p: ["thermal", p.heat("[air]\nnight = [6, 6]"), "--out", "out"],
         f"heat.toml: air.night: {HOURS}",
     ),
     "thermal, g": (lambda p: ["thermal", p.heat(system="g_value = 0.01"), "--out", "out"], FLOOR),
@@ -172,7 +172,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     ),
     "study, g": (lambda p: ["study", p.study(system="g_value = 0.01"), "--out", "out"], FLOOR),
     "study, occupied": (
-        lambda p: ["study", p.study("[options]\noccupied = [18, 8]"), "--out", "out"],
+        lambda p: ["study", p.study("[options]\noccupied = [8, 8]"), "--out", "out"],
         f"options.occupied: {HOURS}",
     ),
     "study, operation": (
@@ -197,7 +197,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "pv, weather": (lambda p: _pv(weather="short.epw"), SHORT),
     "pv, key": (
         lambda p: _pv_file(p, f"[module]{MODULE}cell = 60"),
-        "pv.toml: module.cells: is missing (and 1 more)",
+        "pv.toml: module.cell: no such key; did you mean cells? (and 1 more)",
     ),
     "pv, datasheet": (
         lambda p: _pv_file(p, f"[module]{MODULE}cells = 6"),

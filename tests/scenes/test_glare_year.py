@@ -121,8 +121,8 @@ def test_views_that_mean_nothing_are_refused(view, message):
 def test_wrong_words_and_a_strange_folder_end_with_one_line(tmp_path, capsys):
     both = ["--out", str(tmp_path / "a"), "--view", INSIDE, "--grid", "1"]
     assert "not with --grid" in CliRunner().invoke(command, both).output
-    hours = ["--out", str(tmp_path / "a"), "--occupied", "18", "8"]
-    assert "the first hour before the last" in CliRunner().invoke(command, hours).output
+    hours = ["--out", str(tmp_path / "a"), "--occupied", "8", "8"]
+    assert "expected two different hours" in CliRunner().invoke(command, hours).output
     (tmp_path / "letter.txt").write_text("mine")
     assert run(["dgp", "--out", str(tmp_path)]) == 1
     printed = capsys.readouterr().err.strip()

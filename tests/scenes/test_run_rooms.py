@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -274,9 +275,9 @@ def test_rules_of_the_control(tmp_path, weather) -> None:
     eye[0, 200], eye[1, 200] = 9000.0, 5000.0
 
     def states(text: str, dgp=None):
-        control = read_operation(operation_file(tmp_path, text)).tables.control
+        operated = read_operation(operation_file(tmp_path, text)).tables
         return shading_states(
-            control, ROOM, weather, 3,
+            operated, ROOM, weather, 3,
             irradiance=lambda: bright, eye=lambda: eye, dgp=dgp or pytest.fail,
         )  # fmt: skip
 
@@ -355,6 +356,33 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
     assert [r.space.name for r in results] == ["room", "other", "twin"]
     assert [r.template for r in results] == ["", "", "room"]
     assert len(notes) == 1 and "twin" in notes[0] and "room" in notes[0]
+
+
+def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
+    variant, tmp_path, weather, skies, glass, monkeypatch
+) -> None:
+    from scenes.run import run
+
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    building = replace(BOX, spaces=(ROOM, twin))
+    systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
+    computed = []
+
+    def noted(building, space, *others, **options):
+        computed.append(space.name)
+        return SimpleNamespace(template="", space=space)
+
+    monkeypatch.setattr(run, "compute_room", noted)
+    monkeypatch.setattr(run, "moved_result", lambda result, space: result)
+    options = JobOptions(Path(), Path(), cache=False, room=SMALL)
+    path = tmp_path / "operation.toml"
+    cooler = '[[rooms]]\nspaces = ["twin"]\n[rooms.loads]\nheating_c = 16\n'
+    for rooms, names in (("", ["room"]), (cooler, ["room", "twin"])):
+        path.write_text(f"[loads]\nheating_c = 20\n{rooms}")
+        inputs = run.JobInputs(building, [ROOM, twin], weather, systems, read_operation(path))
+        run._rooms(inputs, skies, options, silent)
+        assert computed == names
+        computed.clear()
 
 
 def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glass) -> None:

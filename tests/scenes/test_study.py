@@ -38,10 +38,10 @@ WRONG = {
     "no system": ("", BOX + CLIMATE, "system: is missing"),
     "unknown key": ("colour = 1\n", BOX + SYSTEM + CLIMATE, "colour: no such key; there are title"),
     "unknown method": (
-        'methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: Input should be",
+        'methods = ["six-phase"]\n', BOX + SYSTEM + CLIMATE, "methods.0: expected 'three-phase', ",
     ),
     "no number": (
-        'orientations_deg = ["south"]\n', BOX + SYSTEM + CLIMATE, "orientations_deg.0: Input",
+        'orientations_deg = ["south"]\n', BOX + SYSTEM + CLIMATE, "orientations_deg.0: expected a",
     ),
     "one orientation twice": (
         "orientations_deg = [0, 360]\n", BOX + SYSTEM + CLIMATE, "orientations_deg: 0.0 comes",

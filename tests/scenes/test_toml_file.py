@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any, get_args, get_origin
+
 import pytest
+from pydantic import BaseModel
 
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.thermal_file import ThermalFile, ThermalTable
 from scenes.heat.study_file import StudyFile
-from scenes.toml_file import read_table, validated
+from scenes.photovoltaics.study_file import PvStudy
+from scenes.room.operation_tables import OperationTables
+from scenes.study.study_file import Study
+from scenes.toml_file import keys_of, read_table, tables_of, validated
 
 GOOD = {"weather": "a.epw", "building": "a.ifc", "system": [{"bsdf": "a.xml"}]}
 
@@ -25,15 +33,165 @@ GOOD = {"weather": "a.epw", "building": "a.ifc", "system": [{"bsdf": "a.xml"}]}
             "s.toml: system.0.gap.gases: no such key; did you mean gas?",
         ),
         ({"loads": {"xyz": 1}}, "s.toml: loads.xyz: no such key; there are heating_c, cooling_c"),
-        ({"couple": 7}, "s.toml: couple: Input should be a valid boolean"),
+        ({"couple": 7}, "s.toml: couple: expected true or false, got 7"),
         ({"system": [{}]}, "s.toml: system.0.bsdf: is missing"),
-        ({"air": {"night": [22, 6]}}, "s.toml: air.night: expected two hours of one day"),
+        ({"air": {"night": [6, 6]}}, "s.toml: air.night: expected two different hours"),
+        ({"air": {"night": [24, 6]}}, "s.toml: air.night: expected two different hours"),
     ],
 )
 def test_a_wrong_key_is_named_with_the_nearest(tmp_path, more, words) -> None:
     with pytest.raises(DataError) as error:
         validated(StudyFile, GOOD | more, tmp_path / "s.toml")
     assert str(error.value).startswith(str(tmp_path / words))
+
+
+BOX = {"width": 3, "depth": 4, "height": 3, "window": []}
+BOXED = {"weather": "a.epw", "box": BOX, "system": [{"bsdf": "a.xml"}]}
+LAYER = {"thickness": 0.1, "conductivity": 1, "density": 1000, "heat_capacity": 1000}
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (
+            {"box": BOX | {"construction": {"facade": [LAYER]}}},
+            "box.construction.facade: no such key; there are front, right, back, left, floor, ",
+        ),
+        (
+            {"box": BOX | {"construction": {"wall": [LAYER | {"thicknes": 1}]}}},
+            "box.construction.wall.0.thicknes: no such key; did you mean thickness?",
+        ),
+        (
+            {"box": BOX | {"reflectance": {"wals": 0.9}}},
+            "box.reflectance.wals: no such key; did you mean wall?",
+        ),
+        ({"box": BOX | {"adjacency": {"facade": "adiabatic"}}}, "box.adjacency.facade: no such"),
+        (
+            {"box": BOX | {"adjacency": {"wall": "adiabatik"}}},
+            "box.adjacency.wall: expected 'outside', 'ground', 'space' or 'adiabatic', got "
+            "'adiabatik'; did you mean 'adiabatic'?",
+        ),
+        ({"spaces": ["a"]}, "spaces: belongs to a `building`; a box is one room"),
+        ({"couple": True}, "couple: belongs to a `building`"),
+        ({"system": {"bsdf": "a"}}, "system: expected a list of tables, [[system]], got a table"),
+        ({"gains": 3}, "gains: expected a table, got 3"),
+        ({"gains": {"persons": "two"}}, "gains.persons: no schedule 'two'; there are none"),
+        ({"gains": {"persons": -1}}, "gains.persons: expected 0 to 10000 persons"),
+        ({"box": BOX | {"facing_deg": float("nan")}}, "box.facing_deg: expected a finite number"),
+        ({"gains": {"occupied": [8]}}, "gains.occupied: expected two hours or the name of"),
+        ({"air": {"night": [8]}}, "air.night.1: expected 2 values"),
+        ({"gains": {"person_w": "two"}}, "gains.person_w: expected a number, got 'two'"),
+        ({"spaces": "A"}, "spaces: expected a list, got 'A'"),
+        ({"weather": 3}, "weather: expected the path of a file, got 3"),
+    ],
+)
+def test_what_is_wrong_is_said_in_our_words(tmp_path, more, words) -> None:
+    with pytest.raises(DataError) as error:
+        validated(StudyFile, BOXED | more, tmp_path / "s.toml")
+    assert str(error.value).startswith(str(tmp_path / f"s.toml: {words}"))
+    assert "Input" not in str(error.value) and "\n" not in str(error.value)
+
+
+KINDS_OF_FILE = (StudyFile, OperationTables, Study, PvStudy, ThermalTable)
+Place = tuple[str | int, ...]
+
+
+def places(annotation: Any, place: Place = ()) -> Iterator[tuple[Place, Any]]:
+    """Every table inside a type with its place: models, and tables whose keys are free or few."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield place, annotation
+        for name, field in annotation.model_fields.items():
+            yield from places(field.annotation, (*place, name))
+    elif get_origin(annotation) is dict:
+        keys = keys_of(annotation)
+        yield place, annotation
+        yield from places(get_args(annotation)[1], (*place, keys[0] if keys else "any"))
+    else:
+        deeper = (0,) if get_origin(annotation) in (tuple, list) else ()
+        for inner in get_args(annotation):
+            yield from places(inner, (*place, *deeper))
+
+
+def planted(place: Place) -> Any:
+    """A document that holds nothing but an unknown key at a place."""
+    if not place:
+        return {"no_such_thing": 1}
+    inner = planted(place[1:])
+    return [inner] if place[0] == 0 else {place[0]: inner}
+
+
+EVERY_TABLE = [
+    pytest.param(model, place, id=f"{model.__name__}:{'.'.join(map(str, place))}")
+    for model in KINDS_OF_FILE
+    for place, table in places(model)
+    if isinstance(table, type) or keys_of(table)
+]
+
+
+@pytest.mark.parametrize(("model", "place"), EVERY_TABLE)
+def test_every_table_at_every_depth_refuses_an_unknown_key(tmp_path, model, place) -> None:
+    with pytest.raises(DataError) as error:
+        validated(model, planted(place), tmp_path / "s.toml")
+    field = ".".join(map(str, (*place, "no_such_thing")))
+    assert error.value.field == field and "no such key; " in str(error.value)
+
+
+def test_no_table_takes_keys_that_nobody_knows() -> None:
+    """Free keys only where they name tables of the user's own."""
+    assert len(EVERY_TABLE) > 30
+    for model in KINDS_OF_FILE:
+        for place, table in places(model):
+            if get_origin(table) is dict and keys_of(table) is None:
+                assert any(tables_of(get_args(table)[1])), place
+
+
+def test_the_file_beside_a_bsdf_is_checked_as_well(tmp_path) -> None:
+    path = tmp_path / "blind.toml"
+    path.write_text("u_valeu = 1.1\n")
+    with pytest.raises(DataError, match=r"blind.toml: u_valeu: no such key; did you mean u_value"):
+        ThermalFile.read(path)
+
+
+SLIPS = [
+    ({"loads": {"heating_c": 293.15}}, "loads.heating_c: expected -30 to 60 C ", "K would be 20 C"),
+    ({"loads": {"cooling_c": 78}}, "loads.cooling_c: expected -30 to 60 C ", "78 F would be 25.6"),
+    ({"loads": {"heating_c": -40}}, "loads.heating_c: expected -30 to 60 C ", "got -40"),
+    ({"air": {"infiltration_ach": 50_000}}, "air.infiltration_ach: expected 0 to 200 1/h", "50000"),
+    ({"air": {"door_m3_s": 300}}, "air.door_m3_s: expected 0 to 50 m3/s", "m3/h would be 0.0833"),
+    ({"gains": {"equipment_w_m2": 8000}}, "gains.equipment_w_m2: expected 0 to 3000 W/m2", "8000"),
+    ({"gains": {"lighting_w_m2": 800}}, "gains.lighting_w_m2: expected 0 to 500 W/m2", "got 800"),
+    ({"box": BOX | {"width": 4000}}, "box.width: expected 0 to 500 m", "4000 mm would be 4 m"),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"thickness": 140}]}}},
+        "box.construction.wall.0.thickness: expected 0 to 5 m ", "140 mm would be 0.14 m",
+    ),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"conductivity": 5000}]}}},
+        "box.construction.wall.0.conductivity: expected 0.001 to 500 W/(m K)", "got 5000",
+    ),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"density": 1e6}]}}},
+        "box.construction.wall.0.density: expected 0 to 20000 kg/m3", "got 1e+06",
+    ),
+    (
+        {"box": BOX | {"construction": {"wall": [LAYER | {"heat_capacity": 1.0}]}}},
+        "box.construction.wall.0.heat_capacity: expected 50 to 10000 J/(kg K)", "no kJ), got 1",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("more", "start", "words"), SLIPS)
+def test_a_slip_of_unit_or_digit_is_named_with_the_unit(tmp_path, more, start, words) -> None:
+    with pytest.raises(DataError) as error:
+        validated(StudyFile, BOXED | more, tmp_path / "s.toml")
+    assert str(error.value).startswith(str(tmp_path / f"s.toml: {start}"))
+    assert words in str(error.value)
+
+
+def test_hours_may_pass_midnight(tmp_path) -> None:
+    tables = {"air": {"night": [22, 6]}, "gains": {"occupied": [18, 8]}}
+    study = validated(StudyFile, BOXED | tables, tmp_path / "s.toml")
+    assert study.air.night == (22, 6) and study.gains.occupied == (18, 8)
 
 
 def test_how_many_more_faults_there_are_is_said(tmp_path) -> None:

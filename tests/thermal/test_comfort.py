@@ -8,7 +8,6 @@ from pythermalcomfort.models import adaptive_ashrae, adaptive_en
 
 from thermal.comfort import (
     adaptive_comfort,
-    hours_between,
     mean_radiant_temperature,
     operative_from_films,
     operative_temperature,
@@ -21,6 +20,7 @@ from thermal.comfort import (
     summarise,
 )
 from thermal.errors import ThermalInputError
+from thermal.zone import work_hours
 
 
 def test_means_of_a_constant_year_are_that_constant():
@@ -85,7 +85,7 @@ def test_summary_counts_add_up():
     rng = np.random.default_rng(3)
     operative, outdoor = rng.uniform(15, 35, 8760), rng.uniform(0, 35, 8760)
     comfort = adaptive_comfort(operative, outdoor)
-    chosen = hours_between(8, 18, 8760)
+    chosen = work_hours(8, 18) > 0
     summary = summarise(comfort, chosen)
     assert summary.hours == 3650
     parts = (summary.comfortable, summary.too_warm, summary.too_cold, summary.not_applicable)

@@ -16,7 +16,8 @@ from scenes.evidence.validation.energyplus_cases import (
     EnergyPlusCase,
     errors,
 )
-from thermal.comfort import adaptive_comfort, hours_between, running_mean
+from thermal.comfort import adaptive_comfort, running_mean
+from thermal.zone import work_hours
 
 FloatArray = NDArray[np.float64]
 WEATHER_NAMES = ("direct normal", "diffuse horizontal", "outdoor temperature")
@@ -125,7 +126,7 @@ def comfort_classification(
 ) -> Classification:
     """Working hours (8 to 18) judged by both programs' operative temperature at the centre."""
     mean = running_mean(outdoor_c)
-    chosen = hours_between(8, 18, len(mean))
+    chosen = work_hours(8, 18, len(mean)) > 0
     chosen[:FIRST_HOUR] = False
     judged = [adaptive_comfort(c.centre, mean, band).comfortable[chosen] for c in (ours, theirs)]
     return classify(*judged)
