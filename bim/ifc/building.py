@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_
 from bim.wall_middles import area_to_wall_middles
 
 STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
+SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
 AGREES = 0.02  # drawn and stated quantities may differ by this share before it is reported
 
 
@@ -58,7 +59,7 @@ def read_ifc(
     source = read_source(path, corrections, tell)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
-    records, problems = _rooms(source, mesh)
+    records, problems = _rooms(source, mesh, lambda fraction: tell("rooms", SEARCH * fraction))
     problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
     attachments, more = _attachments(source.model, source.shapes, records)
     elements, reflectances, faults = bounding_elements(
@@ -68,7 +69,7 @@ def read_ifc(
     around = _surroundings(mesh, source.walls, records, source.ground)
     spaces = []
     for index, record in enumerate(records):
-        tell("rooms", index / len(records))
+        tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
         own = [a for a in attachments if a.room == record.solid.guid]
         try:
             space, more = _space(
@@ -89,7 +90,9 @@ def read_ifc(
     )  # fmt: skip
 
 
-def _rooms(source: Source, mesh: RayMesh) -> tuple[list[SpaceRecord], list[Problem]]:
+def _rooms(
+    source: Source, mesh: RayMesh, tell: Callable[[float], None]
+) -> tuple[list[SpaceRecord], list[Problem]]:
     """The spaces of the file that are rooms; found from geometry where there are none."""
     records, problems = read_spaces(source.model, source.shapes, source.quantity_scales())
     problems += names_of_overlapping(records)
@@ -98,7 +101,7 @@ def _rooms(source: Source, mesh: RayMesh) -> tuple[list[SpaceRecord], list[Probl
     records, more = joined_rooms(source, records)
     problems += more
     if not records:
-        records, more = found_rooms(source)
+        records, more = found_rooms(source, tell)
         problems += more
     return records, problems
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import shutil
 import tempfile
 import zipfile
 from pathlib import Path
@@ -30,7 +31,8 @@ def _open_zipped(path: Path) -> ifcopenshell.file:
     try:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
             inner = Path(folder) / "model.ifc"
-            inner.write_bytes(archive.read(model_name(archive, path)))
+            with archive.open(model_name(archive, path)) as packed, inner.open("wb") as unpacked:
+                shutil.copyfileobj(packed, unpacked)
             return _open_step(inner, path)
     except (zipfile.BadZipFile, NotImplementedError) as error:
         raise DataError(f"cannot be unzipped: {error}", file=path) from None

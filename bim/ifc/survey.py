@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -48,9 +49,13 @@ class Surveyed:
 
 def survey(paths: Iterable[str | Path]) -> Iterator[Surveyed]:
     """Figures of each file in turn; every file has its own process, so that memory is its own."""
-    for path in paths:
+    for path in map(Path, paths):
         with process_pool(1) as pool:
-            yield pool.submit(_surveyed, Path(path)).result()
+            try:
+                yield pool.submit(_surveyed, path).result()
+            except BrokenProcessPool:  # ended by a signal: a native library, or too little memory
+                why = "its process was ended: too little memory, or a fault of a library"
+                yield Surveyed(path.name, path.stat().st_size / 1e6, refused=f"{path}: {why}")
 
 
 def _surveyed(path: Path) -> Surveyed:

@@ -195,6 +195,7 @@ def box_room(
     slab_as_wall: bool = False,
     window: bool = True,
     places: Sequence[tuple[float, ...]] = (OPENING,),
+    post: bool = False,
 ) -> ifcopenshell.file:
     """A room of 4 x 6 x 3 m with one window to the south; each argument plants a defect.
 
@@ -203,6 +204,7 @@ def box_room(
         gap: width of a slit from floor to roof between the south and the east wall [m].
         places: of the windows W1, W2, ... in the south wall.
         shift: how far the window's body lies beside its opening [m].
+        post: whether a thin post stands beside the house.
     """
     small = empty_project(schema, unit=unit, true_north=true_north)
     grey = small.style("wall", 0.5)
@@ -211,6 +213,8 @@ def box_room(
         if name == "east":
             low, size = (low[0], low[1] + gap, low[2]), (size[0], size[1] - gap, size[2])
         walls[name] = small.box("IfcWall", name, low, size, grey)
+    if post:
+        small.box("IfcColumn", "post", (-2.0, 1.0, 0.0), (0.1, 0.1, HEIGHT))
     if doubled_wall:
         small.box("IfcWall", "south again", *WALLS["south"], grey)
     slab = "IfcWall" if slab_as_wall else "IfcSlab"
