@@ -15,12 +15,10 @@ from multiprocessing import connection, get_context, parent_process
 from pathlib import Path
 from typing import Any
 
-from mitsuba_cfs.errors import CfsError
-
 Told = Callable[[str], None]
 
 
-class ProcessEnded(CfsError, RuntimeError):
+class ProcessEnded(RuntimeError):
     """A process of our own ended without an answer; `last`: the last that it told."""
 
     def __init__(self, reason: str, last: str) -> None:

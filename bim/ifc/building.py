@@ -11,13 +11,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.apertures import aperture_of
 from bim.boundaries import ElementRecord, faces_and_windows, floor_area
+from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
-from bim.ifc.fillings import read_fillings
 from bim.ifc.found_rooms import found_rooms
+from bim.ifc.glass_of_rooms import glass_of_rooms
 from bim.ifc.joining import joined_rooms
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
@@ -26,7 +26,7 @@ from bim.model import Building, Element, Problem, Space
 from bim.outdoors import lifted_sites, unblinded
 from bim.planes import SMALLEST_AREA
 from bim.rays import RayMesh, ray_mesh
-from bim.rooms import Attachment, attachments_of, room_pieces
+from bim.rooms import Attachment, room_pieces
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import triangles_of
 from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
@@ -59,18 +59,18 @@ def read_ifc(
     source = read_source(path, corrections, tell)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
-    records, problems = _rooms(source, mesh, lambda fraction: tell("rooms", SEARCH * fraction))
+    read, records, problems = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
     problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
-    attachments, more = _attachments(source.model, source.shapes, records)
+    glass = glass_of_rooms(source, records, mesh)
     elements, reflectances, faults = bounding_elements(
         source.model, source.walls, source.placed.rotation
     )
-    problems += more + faults
+    problems += [*glass.problems, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
     spaces = []
     for index, record in enumerate(records):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
-        own = [a for a in attachments if a.room == record.solid.guid]
+        own = [a for a in glass.attachments if a.room == record.solid.guid]
         try:
             space, more = _space(
                 index, own, records, around, elements=elements, reflectances=reflectances
@@ -84,26 +84,29 @@ def read_ifc(
     tell("surroundings", 0.0)
     outside, more = _outdoors(source, spaces)
     tell("surroundings", 1.0)
+    problems += more
     return Building(
-        source.name, tuple(spaces), outside, tuple(dict.fromkeys([*problems, *more])),
+        source.name, tuple(spaces), outside, tuple(dict.fromkeys(problems)),
         source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
+        account_of(source, read, spaces, glass, problems),
     )  # fmt: skip
 
 
 def _rooms(
     source: Source, mesh: RayMesh, tell: Callable[[float], None]
-) -> tuple[list[SpaceRecord], list[Problem]]:
-    """The spaces of the file that are rooms; found from geometry where there are none."""
+) -> tuple[list[SpaceRecord], list[SpaceRecord], list[Problem]]:
+    """The spaces that are rooms, before and after joining; found where the file has none."""
     records, problems = read_spaces(source.model, source.shapes, source.quantity_scales())
     problems += names_of_overlapping(records)
-    records, more = enclosed_spaces(records, mesh)
+    read, more = enclosed_spaces(records, mesh)
     problems += more
-    records, more = joined_rooms(source, records)
+    records, more = joined_rooms(source, read)
     problems += more
     if not records:
-        records, more = found_rooms(source, tell)
+        read, more = found_rooms(source, tell)
+        records = read
         problems += more
-    return records, problems
+    return read, records, problems
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Problem]]:
@@ -122,37 +125,6 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
     return outdoors.elements, [*problems, *more, *outdoors.problems]
-
-
-def _attachments(
-    model, shapes, records: Sequence[SpaceRecord]
-) -> tuple[list[Attachment], list[Problem]]:
-    """Which part of which window or door each room has."""
-    fillings, problems = read_fillings(model, shapes)
-    solids = [record.solid for record in records]
-    names = {solid.guid: solid.name for solid in solids}
-    attachments: list[Attachment] = []
-    for filling in fillings:
-        aperture, more = aperture_of(filling)
-        problems += more
-        if aperture is None:
-            continue
-        found = attachments_of(aperture, solids)
-        attachments += found
-        if not solids or aperture.glass.is_empty:
-            continue
-        if not found:
-            what = f"{filling.ifc_class} {filling.name}: no room behind it"
-            problems.append(Problem(filling.guid, what, "gives no daylight to any room", "window"))
-        inner = sorted({names[a.room] for a in found if a.neighbour is not None})
-        if inner:
-            what = f"{filling.ifc_class} {filling.name}: glass between {' and '.join(inner)}"
-            problems.append(Problem(filling.guid, what, "taken as opaque", "window"))
-        rooms = sorted({names[a.room] for a in found if a.neighbour is None})
-        if len(rooms) > 1:
-            what = f"{filling.name}: lies before the rooms {', '.join(rooms)}"
-            problems.append(Problem(filling.guid, what, "each gets its part"))
-    return attachments, problems
 
 
 def _surroundings(

@@ -13,6 +13,7 @@ import numpy as np
 
 from bim.defaults import MATERIALS, UNKNOWN_MATERIAL
 from bim.model import MaterialLayer, Problem
+from bim.names import plain_text
 
 PHYSICAL = {  # name -> lowest and highest value of any building material
     "conductivity": (0.005, 500.0),
@@ -151,9 +152,9 @@ class MaterialReader:
 
 def default_material(name: str) -> MaterialLayer:
     """The row of the table whose words occur in the name, in the order of the table."""
-    lower = name.lower()
+    text = plain_text(name)
     for words, material in MATERIALS:
-        if any(word in lower for word in words):
+        if any(plain_text(word) in text for word in words):
             return material
     return UNKNOWN_MATERIAL
 

@@ -25,6 +25,7 @@ SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3
 UNCOVERED = 0.7  # share of the ceiling under the open sky from which a space has no roof
 WALLLESS = 0.5  # share of its sides without anything near from which it has no walls
 SIDE_REACH = 1.0  # how far from a side its wall may be [m]
+OVERLAPPING = "spaces overlap"  # kind of a problem
 INSIDE = 0.3  # rays start this far inside: rooms drawn into their walls and roof [m]
 
 
@@ -141,7 +142,8 @@ def names_of_overlapping(records: Sequence[SpaceRecord]) -> list[Problem]:
             shared = (a.solid.manifold ^ b.solid.manifold).volume()
             if shared > 0.02 * min(a.volume, b.volume):
                 what = f"spaces {a.solid.name} and {b.solid.name} overlap by {shared:.2f} m3"
-                problems.append(Problem(a.solid.guid, what, "both kept as drawn"))
+                done = "both kept as drawn"
+                problems.append(Problem(a.solid.guid, what, done, kind=OVERLAPPING))
     return problems
 
 
