@@ -159,10 +159,10 @@ class Account:
         ):
             if area >= 0.05:
                 parts.append(f"{area:.1f} m2 {what}")
-        without = [s for s in self.storeys if s.glass_out > 0.05 and not s.rooms]
         parts += [
-            f"storey {s.name or 'without a name'} has no rooms but {s.glass_out:.1f} m2 of glass"
-            for s in without
+            f"storey {s.name or 'without a name'} has no rooms and {lost:.1f} m2 of glass unused"
+            for s in self.storeys
+            if not s.rooms and (lost := s.glass_out - s.glass_used) > 0.05
         ]
         return ", ".join(parts)
 

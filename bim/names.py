@@ -42,7 +42,8 @@ def label_of(name: str, long_name: str, guid: str) -> str:
 
 def plain_text(text: str) -> str:
     """Small letters without the accents of Latin ones, to look for words in: béton is beton."""
-    plain = (unicodedata.normalize("NFD", c) for c in unicodedata.normalize("NFKC", text))
+    whole = unicodedata.normalize("NFKC", text).replace("ł", "l").replace("Ł", "L")
+    plain = (unicodedata.normalize("NFD", c) for c in whole)
     kept = (c[0] if c[0].isascii() else unicodedata.normalize("NFC", c) for c in plain)
     return "".join(kept).casefold()
 

@@ -22,14 +22,17 @@ def account_of(
     built: Sequence[Space],
     glass: GlassOfRooms,
     problems: Sequence[Problem],
+    *,
+    repeated: Sequence[str] = (),
 ) -> Account:
     """What of a file came through.
 
     Args:
         read: the spaces that are rooms, before any were joined; found ones where there are none.
         built: the finished rooms.
+        repeated: GUIDs of spaces that draw a room again: not counted.
     """
-    drawn = source.model.by_type("IfcSpace")
+    drawn = [s for s in source.model.by_type("IfcSpace") if s.GlobalId not in repeated]
     failed = {p.where for p in problems if p.lost == "room"}
     kept = [record for record in read if record.guid not in failed]
     guids = {record.guid.split("-")[0] for record in kept}
@@ -40,7 +43,7 @@ def account_of(
     lost = {one.guid: one.out - one.used for one in panes if one.out - one.used > 0.01}
     low = {one.guid for one in panes if one.low}
     return Account(
-        _storeys(source, kept, glass, found),
+        _storeys(source, kept, glass, Counter(map(storey_of, drawn)) if not found else None),
         len(panes),
         sum(one.guid in used for one in panes),
         sum(one.used for one in panes if one.assumed),
@@ -58,11 +61,17 @@ def account_of(
 
 
 def _storeys(
-    source: Source, rooms: Sequence[SpaceRecord], glass: GlassOfRooms, found: bool
+    source: Source,
+    rooms: Sequence[SpaceRecord],
+    glass: GlassOfRooms,
+    drawn: Counter[str] | None,
 ) -> tuple[StoreyAccount, ...]:
-    """Storeys that hold rooms, spaces or glass, in the file's order."""
+    """Storeys that hold rooms, spaces or glass, in the file's order.
+
+    Args: drawn: spaces of the file by storey; None where the rooms were found from geometry.
+    """
     count = Counter(record.storey for record in rooms)
-    spaces = count if found else Counter(storey_of(s) for s in source.model.by_type("IfcSpace"))
+    spaces = count if drawn is None else drawn
     out: Counter[str] = Counter()
     used: Counter[str] = Counter()
     for one in glass.glass:

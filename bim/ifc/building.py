@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
@@ -19,9 +20,10 @@ from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.found_rooms import found_rooms
 from bim.ifc.glass_of_rooms import glass_of_rooms
 from bim.ifc.joining import joined_rooms
+from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
-from bim.ifc.spaces import SpaceRecord, enclosed_spaces, names_of_overlapping, read_spaces
+from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
 from bim.model import Building, Element, Problem, Space
 from bim.outdoors import lifted_sites, unblinded
 from bim.planes import SMALLEST_AREA
@@ -59,7 +61,8 @@ def read_ifc(
     source = read_source(path, corrections, tell)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
-    read, records, problems = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
+    rooms, problems = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
+    records = rooms.records
     problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
     glass = glass_of_rooms(source, records, mesh)
     elements, reflectances, faults = bounding_elements(
@@ -88,16 +91,26 @@ def read_ifc(
     return Building(
         source.name, tuple(spaces), outside, tuple(dict.fromkeys(problems)),
         source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
-        account_of(source, read, spaces, glass, problems),
+        account_of(
+            source, rooms.read, spaces, glass, problems, repeated=[r.guid for r in rooms.repeated]
+        ),
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Rooms:
+    read: list[SpaceRecord]  # the spaces that are rooms, before any are joined
+    records: list[SpaceRecord]  # the rooms
+    repeated: list[SpaceRecord]  # spaces that draw a room again
 
 
 def _rooms(
     source: Source, mesh: RayMesh, tell: Callable[[float], None]
-) -> tuple[list[SpaceRecord], list[SpaceRecord], list[Problem]]:
-    """The spaces that are rooms, before and after joining; found where the file has none."""
+) -> tuple[_Rooms, list[Problem]]:
+    """The spaces that are rooms; found from geometry where the file has none."""
     records, problems = read_spaces(source.model, source.shapes, source.quantity_scales())
-    problems += names_of_overlapping(records)
+    records, repeated, more = one_of_each(source.model, records)
+    problems += more
     read, more = enclosed_spaces(records, mesh)
     problems += more
     records, more = joined_rooms(source, read)
@@ -106,7 +119,7 @@ def _rooms(
         read, more = found_rooms(source, tell)
         records = read
         problems += more
-    return read, records, problems
+    return _Rooms(read, records, repeated), problems
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Problem]]:

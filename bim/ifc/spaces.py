@@ -131,22 +131,6 @@ def closed_space(triangles: NDArray[np.float64]):
     return manifold, "replaced by its outline extruded over its height"
 
 
-def names_of_overlapping(records: Sequence[SpaceRecord]) -> list[Problem]:
-    """A problem for each pair of spaces that share more than 2 % of the smaller one."""
-    problems = []
-    for i, a in enumerate(records):
-        for b in records[i + 1 :]:
-            apart = np.any(a.solid.low > b.solid.high) or np.any(b.solid.low > a.solid.high)
-            if apart:
-                continue
-            shared = (a.solid.manifold ^ b.solid.manifold).volume()
-            if shared > 0.02 * min(a.volume, b.volume):
-                what = f"spaces {a.solid.name} and {b.solid.name} overlap by {shared:.2f} m3"
-                done = "both kept as drawn"
-                problems.append(Problem(a.solid.guid, what, done, kind=OVERLAPPING))
-    return problems
-
-
 def enclosed_spaces(
     records: Sequence[SpaceRecord], building: RayMesh
 ) -> tuple[list[SpaceRecord], list[Problem]]:

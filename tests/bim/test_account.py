@@ -184,7 +184,7 @@ def test_storey_without_spaces_and_window_above_a_low_room_are_named(tmp_path):
     building = read(tmp_path, small)
     assert building.account.share_used == pytest.approx(0.5, rel=1e-3)
     assert building.account.glass_missing == pytest.approx(GLASS_AREA, rel=1e-3)
-    assert "storey attic has no rooms but 3.6 m2 of glass" in building.account.lines[2]
+    assert "storey attic has no rooms and 3.6 m2 of glass unused" in building.account.lines[2]
 
 
 @pytest.mark.parametrize("suffix", ["ifc", "ifczip"])
