@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from bim.account import Account, StoreyAccount
-from bim.ifc.glass_of_rooms import GlassOfRooms
+from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms
 from bim.ifc.project import CUT_OFF, storey_of
 from bim.ifc.source import Source
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
@@ -38,15 +38,17 @@ def account_of(
     guids = {record.guid.split("-")[0] for record in kept}
     found = not any(space.GlobalId in guids for space in drawn) and bool(kept)
     missing = [s for s in drawn if s.GlobalId not in guids] if not found else []
-    used = {window.guid for space in built for window in space.windows}
+    used: Counter[str] = Counter()
+    for window in (window for space in built for window in space.windows):
+        used[window.guid] += window.area
     panes = [one for one in glass.glass if one.out > 0]
     lost = {one.guid: one.out - one.used for one in panes if one.out - one.used > 0.01}
     low = {one.guid for one in panes if one.low}
     return Account(
-        _storeys(source, kept, glass, Counter(map(storey_of, drawn)) if not found else None),
+        _storeys(source, kept, panes, used, Counter(map(storey_of, drawn)) if not found else None),
         len(panes),
-        sum(one.guid in used for one in panes),
-        sum(one.used for one in panes if one.assumed),
+        sum(used[one.guid] > 0 for one in panes),
+        sum(min(used[one.guid], one.out) for one in panes if one.assumed),
         sum(area for guid, area in lost.items() if guid in low),
         sum(area for guid, area in lost.items() if guid not in low),
         sum(p.glass for p in problems if p.kind.startswith(PHANTOM)),
@@ -63,24 +65,27 @@ def account_of(
 def _storeys(
     source: Source,
     rooms: Sequence[SpaceRecord],
-    glass: GlassOfRooms,
+    panes: Sequence[GlassAccount],
+    used: Mapping[str, float],
     drawn: Counter[str] | None,
 ) -> tuple[StoreyAccount, ...]:
     """Storeys that hold rooms, spaces or glass, in the file's order.
 
-    Args: drawn: spaces of the file by storey; None where the rooms were found from geometry.
+    Args:
+        used: glass before a room [m2] by GUID.
+        drawn: spaces of the file by storey; None where the rooms were found from geometry.
     """
     count = Counter(record.storey for record in rooms)
     spaces = count if drawn is None else drawn
     out: Counter[str] = Counter()
-    used: Counter[str] = Counter()
-    for one in glass.glass:
+    lit: Counter[str] = Counter()
+    for one in panes:
         out[one.storey] += one.out
-        used[one.storey] += one.used
+        lit[one.storey] += min(used[one.guid], one.out)
     names = [storey.Name or "" for storey in source.model.by_type("IfcBuildingStorey")]
     held = [*dict.fromkeys([*names, *spaces, *out])]
     return tuple(
-        StoreyAccount(name, count[name], spaces[name], float(out[name]), float(used[name]))
+        StoreyAccount(name, count[name], spaces[name], float(out[name]), float(lit[name]))
         for name in held
         if spaces[name] or out[name] > 0.01
     )
