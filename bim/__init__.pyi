@@ -1,5 +1,6 @@
 """The names of `import bim`, and the modules that they come from."""
 
+from .account import Account as Account
 from .fenestration import ShadingState as ShadingState
 from .ifc.building import read_ifc as read_ifc
 from .ifc.corrections import Corrections as Corrections, read_corrections as read_corrections

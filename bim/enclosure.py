@@ -9,6 +9,7 @@ building's outer face; the other parts are rooms.  This is the dissertation's al
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import manifold3d
 import numpy as np
@@ -21,46 +22,85 @@ from bim.planes import area_vectors
 from bim.rays import ray_mesh
 from bim.shell import enclosed_volume
 from bim.solids import solid_of, triangles_of, union
+from mitsuba_cfs.processes import Told
 
 GAP = 0.02  # gaps between elements up to this are closed [m]
 FINEST = 1e-3  # smaller details of a found room are smoothed out [m]
 SMALLEST_ROOM = 2.0  # smaller voids are cavities and shafts [m3]
 LOWEST_ROOM = 1.5  # lower ones are no rooms either [m]
 MOST_TRIANGLES = 120  # elements with more are united as they are: widening takes a second each
+MOST_WIDENED = 20_000  # triangles of all that are not convex, biggest first: a minute on one core
+LARGEST_VOID = 5_000  # triangles; a void with more is not widened back, so that its room is smaller
+LIMIT_S = 180.0  # the search for rooms is stopped then
+
+
+@dataclass(frozen=True, slots=True)
+class Enclosed:
+    """Rooms found between elements, and what was too much work to be done in full."""
+
+    rooms: tuple[NDArray[np.float64], ...]  # triangles [N, 3, 3] of each, biggest first
+    not_widened: int = 0  # elements united as they are: gaps beside them stay open
+    kept_small: int = 0  # rooms that end half a gap before their walls
 
 
 def rooms_enclosed_by(
-    elements: Sequence[NDArray[np.float64]], gap: float = GAP
-) -> list[manifold3d.Manifold]:
-    """Solids of the rooms between building elements, each of triangles [N, 3, 3], biggest first.
+    elements: Sequence[NDArray[np.float64]], gap: float = GAP, tell: Told | None = None
+) -> Enclosed:
+    """Rooms between building elements, each of triangles [N, 3, 3].
 
     Every element is widened by half the gap; the voids that are left are widened back, less the
     elements as they are, so that the rooms end at the elements' own faces.
+
+    Args: tell: is told "number of the element in work, number of all", the last one for the union.
     """
-    solids = [solid.manifold for solid in map(solid_of, elements) if solid is not None]
-    if not solids:
-        return []
-    turn = main_wall_direction(np.concatenate(elements))
+    tell = tell or (lambda text: None)
+    turn = main_wall_direction(np.concatenate(elements)) if len(elements) else np.eye(3)
     back = np.linalg.inv(turn)
-    turned = [_turned(solid, turn) for solid in solids]
     cube = manifold3d.Manifold.cube((gap, gap, gap), True)
-    wide = union([_widened(solid, cube) for solid in turned])
-    original = union(turned)
-    rooms = []
-    for part in interior_parts(triangles_of(wide)[0]):
+    turned, wide, spent, not_widened = {}, {}, 0, 0
+    areas = [np.linalg.norm(area_vectors(element), axis=1).sum() for element in elements]
+    for index in np.argsort(-np.nan_to_num(areas), kind="stable"):
+        tell(f"{index} {len(elements)}")
+        solid = solid_of(elements[index])
+        if solid is None:
+            continue
+        own = turned[index] = _turned(solid.manifold, turn)
+        spent += _work_to_widen(own)
+        wide[index] = _widened(own, cube) if spent <= MOST_WIDENED else own
+        not_widened += spent > MOST_WIDENED
+    tell(f"{len(elements)} {len(elements)}")
+    if not turned:
+        return Enclosed(())
+    original = union([turned[index] for index in sorted(turned)])
+    united = union([wide[index] for index in sorted(wide)])
+    rooms, kept_small = [], 0
+    for part in interior_parts(triangles_of(united)[0]):
         void = solid_of(part[:, ::-1])
         if void is None:
             continue
-        # one widening gives back what the elements' own widening took
-        room = (void.manifold.minkowski_sum(cube) - original).simplify(FINEST)
+        room = void.manifold
+        if room.num_tri() <= LARGEST_VOID:
+            # one widening gives back what the elements' own widening took
+            room = room.minkowski_sum(cube)
+        else:
+            kept_small += 1
+        room = (room - original).simplify(FINEST)
         rooms += [piece for piece in room.decompose() if _is_room(piece)]
     rooms.sort(key=lambda room: -room.volume())
-    return [_turned(room, back) for room in rooms]
+    found = (triangles_of(_turned(room, back).as_original())[0] for room in rooms)
+    return Enclosed(tuple(found), not_widened, kept_small)
 
 
 def _is_room(solid: manifold3d.Manifold) -> bool:
     box = solid.bounding_box()
     return solid.volume() > SMALLEST_ROOM and box[5] - box[2] > LOWEST_ROOM
+
+
+def _work_to_widen(solid: manifold3d.Manifold) -> int:
+    """Triangles whose widening takes time: none of a convex solid, nor of one left as it is."""
+    if solid.num_tri() > MOST_TRIANGLES or solid.hull().volume() < 1.0001 * solid.volume():
+        return 0
+    return solid.num_tri()
 
 
 def _widened(solid: manifold3d.Manifold, cube: manifold3d.Manifold) -> manifold3d.Manifold:

@@ -10,19 +10,70 @@ from numpy.typing import NDArray
 
 from bim.planes import newell_normal, plane_through, triangulated
 
+FARTHEST = 1e5  # no building is wider: a body of such size is a fault of the file [m]
 LONGEST_HOLE = 500  # edges of a hole; a longer one is a sheet, not a solid with a hole
 
 
 def welded_mesh(
     triangles: NDArray[np.float64], distance: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices [V, 3] and faces [N, 3]: corners on one grid point merged, collapsed faces out."""
+    """Vertices [V, 3] and faces [N, 3]: corners on one grid point merged, collapsed faces out.
+
+    None at all of a body with a coordinate that is no number, or beyond any building.
+    """
     corners = triangles.reshape(-1, 3)
+    if not _is_of_a_building(corners):
+        return corners[:0], np.empty((0, 3), dtype=np.int64)
     keys = np.round(corners / distance).astype(np.int64)
     _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     faces = inverse.reshape(-1, 3)
     whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     return corners[first], faces[whole]
+
+
+def _is_of_a_building(points: NDArray[np.float64]) -> bool:
+    if not np.isfinite(points).all():
+        return False
+    flat = points.reshape(-1, 3)
+    return not len(flat) or bool(np.ptp(flat, axis=0).max() < FARTHEST)
+
+
+def closed_faces(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> NDArray[np.int64] | None:
+    """Faces that may be handed to a library of solids; None where they cannot bound one.
+
+    It gets finite vertices of a building's extent, faces whose corners exist and differ, none
+    twice, and every edge as often as its reverse: what is less has ended whole processes.
+    """
+    if len(faces) < 4 or faces.min() < 0 or faces.max() >= len(vertices):
+        return None
+    used = vertices[faces]
+    if not _is_of_a_building(used):
+        return None
+    if (faces == np.roll(faces, 1, axis=1)).any():
+        return None
+    faces = _once(faces)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    key, back = edges @ (len(vertices), 1), edges @ (1, len(vertices))
+    balanced = len(faces) >= 4 and np.array_equal(np.sort(key), np.sort(back))
+    return faces if balanced else None
+
+
+def _once(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces without those drawn again: two of one sense are one, two back to back are none."""
+    corners, inverse = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    if len(corners) == len(faces):
+        return faces
+    inverse = inverse.ravel()
+    first = faces.argmin(axis=1)
+    row = np.arange(len(faces))
+    rising = faces[row, (first + 1) % 3] < faces[row, (first + 2) % 3]
+    net = np.bincount(inverse, np.where(rising, 1, -1), len(corners))
+    wanted = np.sign(net)[inverse] == np.where(rising, 1, -1)
+    _, keep = np.unique(np.where(wanted, inverse, -1), return_index=True)
+    keep = np.sort(keep[wanted[keep]])
+    return faces[keep]
 
 
 def wound_alike(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.account import Account
 from bim.names import found_by_name, label_of
 from mitsuba_cfs.errors import DataError
 
@@ -31,6 +32,8 @@ class Problem:
     what: str
     consequence: str  # for the simulation, with the repair if there was one
     lost: str = ""  # "room" or "window" where one is left out for it
+    glass: float = 0.0  # area of the glass that it concerns [m2]
+    kind: str = ""  # problems of one kind are counted together; "" where the texts tell
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +215,7 @@ class Building:
     longitude_deg: float | None = None  # east positive
     elevation: float = 0.0  # above the sea [m]
     file: Path | None = None  # that it was read from
+    account: Account | None = None  # what of the file came through; None where there is no file
 
     @property
     def windows(self) -> tuple[Window, ...]:

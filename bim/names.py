@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from typing import Protocol, TypeVar
 
@@ -37,6 +38,14 @@ def label_of(name: str, long_name: str, guid: str) -> str:
     """Number and name of a room as people use them, each once; its GUID where it has neither."""
     parts = [name] if long_name in ("", name) else [name, long_name]
     return " ".join(part for part in parts if part) or guid
+
+
+def plain_text(text: str) -> str:
+    """Small letters without the accents of Latin ones, to look for words in: béton is beton."""
+    whole = unicodedata.normalize("NFKC", text).replace("ł", "l").replace("Ł", "L")
+    plain = (unicodedata.normalize("NFD", c) for c in whole)
+    kept = (c[0] if c[0].isascii() else unicodedata.normalize("NFC", c) for c in plain)
+    return "".join(kept).casefold()
 
 
 def nearest(wanted: str, names: Iterable[str]) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.mesh_repair import capped, welded_mesh, wound_alike
+from bim.mesh_repair import capped, closed_faces, welded_mesh, wound_alike
 from bim.planes import Plane, polygons_of, rings_of, triangulated
 
 WELD_STEPS = (1e-6, 1e-4, 1e-3)  # vertices this near are one, tried in turn [m]
@@ -59,6 +59,10 @@ def solid_of(triangles: NDArray[np.float64]) -> Solid | None:
 def _manifold(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> manifold3d.Manifold | None:
+    sound = closed_faces(vertices, faces)
+    if sound is None:
+        return None
+    faces = sound
     mesh = manifold3d.Mesh64(
         np.ascontiguousarray(vertices, dtype=np.float64),
         np.ascontiguousarray(faces, dtype=np.uint64),

@@ -223,7 +223,12 @@ def _open_or_ground(
         normal[2] < -0.7 and point[2] < around.ground_level + DEEPEST_WALL
     ):
         return "ground"
+    return "outside" if is_open(point, normal, around.elements) else "unknown"
+
+
+def is_open(point: NDArray[np.float64], normal: NDArray[np.float64], building: RayMesh) -> bool:
+    """Whether a point is in the open air: enough rays on the side of the normal [3] escape."""
     directions = hemisphere(normal, 32)
     # rays that go down end on the ground, which is open air too: all escapes count
-    _, hit = around.elements.first_hits(np.tile(point, (32, 1)), directions, FAR)
-    return "outside" if np.mean(hit < 0) > OPEN_SKY else "unknown"
+    _, hit = building.first_hits(np.tile(point, (32, 1)), directions, FAR)
+    return bool(np.mean(hit < 0) > OPEN_SKY)

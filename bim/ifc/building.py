@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
@@ -11,28 +12,30 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.apertures import aperture_of
 from bim.boundaries import ElementRecord, faces_and_windows, floor_area
+from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
-from bim.ifc.fillings import read_fillings
 from bim.ifc.found_rooms import found_rooms
+from bim.ifc.glass_of_rooms import glass_of_rooms
 from bim.ifc.joining import joined_rooms
+from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
-from bim.ifc.spaces import SpaceRecord, enclosed_spaces, names_of_overlapping, read_spaces
+from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
 from bim.model import Building, Element, Problem, Space
 from bim.outdoors import lifted_sites, unblinded
 from bim.planes import SMALLEST_AREA
 from bim.rays import RayMesh, ray_mesh
-from bim.rooms import Attachment, attachments_of, room_pieces
+from bim.rooms import Attachment, room_pieces
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import triangles_of
 from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.wall_middles import area_to_wall_middles
 
 STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
+SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
 AGREES = 0.02  # drawn and stated quantities may differ by this share before it is reported
 
 
@@ -58,18 +61,19 @@ def read_ifc(
     source = read_source(path, corrections, tell)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
-    records, problems = _rooms(source, mesh)
+    rooms, problems = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
+    records = rooms.records
     problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
-    attachments, more = _attachments(source.model, source.shapes, records)
+    glass = glass_of_rooms(source, records, mesh)
     elements, reflectances, faults = bounding_elements(
         source.model, source.walls, source.placed.rotation
     )
-    problems += more + faults
+    problems += [*glass.problems, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
     spaces = []
     for index, record in enumerate(records):
-        tell("rooms", index / len(records))
-        own = [a for a in attachments if a.room == record.solid.guid]
+        tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
+        own = [a for a in glass.attachments if a.room == record.solid.guid]
         try:
             space, more = _space(
                 index, own, records, around, elements=elements, reflectances=reflectances
@@ -83,24 +87,39 @@ def read_ifc(
     tell("surroundings", 0.0)
     outside, more = _outdoors(source, spaces)
     tell("surroundings", 1.0)
+    problems += more
     return Building(
-        source.name, tuple(spaces), outside, tuple(dict.fromkeys([*problems, *more])),
+        source.name, tuple(spaces), outside, tuple(dict.fromkeys(problems)),
         source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
+        account_of(
+            source, rooms.read, spaces, glass, problems, repeated=[r.guid for r in rooms.repeated]
+        ),
     )  # fmt: skip
 
 
-def _rooms(source: Source, mesh: RayMesh) -> tuple[list[SpaceRecord], list[Problem]]:
-    """The spaces of the file that are rooms; found from geometry where there are none."""
+@dataclass(frozen=True, slots=True)
+class _Rooms:
+    read: list[SpaceRecord]  # the spaces that are rooms, before any are joined
+    records: list[SpaceRecord]  # the rooms
+    repeated: list[SpaceRecord]  # spaces that draw a room again
+
+
+def _rooms(
+    source: Source, mesh: RayMesh, tell: Callable[[float], None]
+) -> tuple[_Rooms, list[Problem]]:
+    """The spaces that are rooms; found from geometry where the file has none."""
     records, problems = read_spaces(source.model, source.shapes, source.quantity_scales())
-    problems += names_of_overlapping(records)
-    records, more = enclosed_spaces(records, mesh)
+    records, repeated, more = one_of_each(source.model, records)
     problems += more
-    records, more = joined_rooms(source, records)
+    read, more = enclosed_spaces(records, mesh)
+    problems += more
+    records, more = joined_rooms(source, read)
     problems += more
     if not records:
-        records, more = found_rooms(source)
+        read, more = found_rooms(source, tell)
+        records = read
         problems += more
-    return records, problems
+    return _Rooms(read, records, repeated), problems
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Problem]]:
@@ -119,37 +138,6 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
     return outdoors.elements, [*problems, *more, *outdoors.problems]
-
-
-def _attachments(
-    model, shapes, records: Sequence[SpaceRecord]
-) -> tuple[list[Attachment], list[Problem]]:
-    """Which part of which window or door each room has."""
-    fillings, problems = read_fillings(model, shapes)
-    solids = [record.solid for record in records]
-    names = {solid.guid: solid.name for solid in solids}
-    attachments: list[Attachment] = []
-    for filling in fillings:
-        aperture, more = aperture_of(filling)
-        problems += more
-        if aperture is None:
-            continue
-        found = attachments_of(aperture, solids)
-        attachments += found
-        if not solids or aperture.glass.is_empty:
-            continue
-        if not found:
-            what = f"{filling.ifc_class} {filling.name}: no room behind it"
-            problems.append(Problem(filling.guid, what, "gives no daylight to any room", "window"))
-        inner = sorted({names[a.room] for a in found if a.neighbour is not None})
-        if inner:
-            what = f"{filling.ifc_class} {filling.name}: glass between {' and '.join(inner)}"
-            problems.append(Problem(filling.guid, what, "taken as opaque", "window"))
-        rooms = sorted({names[a.room] for a in found if a.neighbour is None})
-        if len(rooms) > 1:
-            what = f"{filling.name}: lies before the rooms {', '.join(rooms)}"
-            problems.append(Problem(filling.guid, what, "each gets its part"))
-    return attachments, problems
 
 
 def _surroundings(

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import time
 import uuid
+from collections.abc import Callable
 
 import ifcopenshell
 import ifcopenshell.guid
 import ifcopenshell.util.placement
 import ifcopenshell.util.unit
+import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.enclosure import GAP, rooms_enclosed_by
-from bim.ifc.shapes import read_shapes
+from bim.enclosure import GAP, LIMIT_S, Enclosed, rooms_enclosed_by
+from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.model import Problem
 from bim.rooms import room_solid
+from bim.solids import solid_of
+from mitsuba_cfs.processes import ProcessEnded, answer_apart
 
 BOUNDING = (
     "IfcWall",
@@ -34,38 +39,95 @@ BOUNDING = (
 )
 WIDER = 0.1  # gaps closed in a second attempt [m]
 CAP = 0.2  # thickness of a floor or roof that is put in where the file has none [m]
+MOST_LEFT_OUT = 5  # elements that end the search, one after the other, before it is given up
 Body = NDArray[np.float64]
+Tell = Callable[[float], None]
 
 
-def found_rooms(source: Source) -> tuple[list[SpaceRecord], list[Problem]]:
-    """Rooms between the building elements, and what had to be closed to find them."""
+def found_rooms(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Problem]]:
+    """Rooms between the building elements, and what had to be closed to find them.
+
+    Args: tell: is told the fraction done.
+    """
     bodies = _uncut_bodies(source)
     where, lacks = source.path.name, _lack_of_spaces(source)
     if not bodies:
         return [], [Problem(where, f"{lacks} and no walls", "no room is found", "room")]
-    upright = [body for name, body in bodies if name.startswith(("IfcWall", "IfcCurtain"))]
-    meshes = [body for _, body in bodies]
-    low, high = _box([body for _, body in bodies])
+    search = _Search([(shape.guid, label, body) for shape, label, body in bodies], tell)
+    upright = [b for shape, _, b in bodies if shape.ifc_class.startswith(("IfcWall", "IfcCurtain"))]
+    meshes = [body for *_, body in bodies]
+    low, high = _box(meshes)
     wall_low, wall_high = _box(upright or meshes)
     floor = _slab(low, high, wall_low[2] - CAP)
     roof = _slab(low, high, wall_high[2])
     attempts = (
-        (meshes, GAP, ""),
-        (meshes, WIDER, f"gaps up to {WIDER * 1000:.0f} mm closed"),
-        ([*meshes, floor], GAP, "a floor put under the walls"),
-        ([*meshes, floor, roof], GAP, "a floor and a flat roof put to the walls"),
+        ([], GAP, ""),
+        ([], WIDER, f"gaps up to {WIDER * 1000:.0f} mm closed"),
+        ([floor], GAP, "a floor put under the walls"),
+        ([floor, roof], GAP, "a floor and a flat roof put to the walls"),
     )
-    found = ((rooms_enclosed_by(parts, gap), repair) for parts, gap, repair in attempts)
+    found = ((search.rooms(more, gap), repair) for more, gap, repair in attempts)
     rooms, repair = next(((rooms, repair) for rooms, repair in found if rooms), ([], ""))
     if not rooms:
         what = f"{lacks}, and its walls enclose nothing"
         done = f"no room is found; gaps up to {WIDER} m were closed"
-        return [], [Problem(where, what, done, "room")]
+        return [], [*search.problems, Problem(where, what, done, "room")]
     levels = _storeys(source)
     records = [_record(source, number, room, levels) for number, room in enumerate(rooms, 1)]
     what = f"{lacks}: {len(rooms)} room(s) found between its walls and slabs"
     done = repair or "rooms joined by openings without doors are one"
-    return records, [Problem(where, what, done)]
+    return records, [*search.problems, Problem(where, what, done)]
+
+
+class _Search:
+    """Asks for the enclosed rooms in a process apart; what ends that process is left out."""
+
+    def __init__(self, bodies: list[tuple[str, str, Body]], tell: Tell) -> None:
+        self.problems: list[Problem] = []
+        self._bodies, self._tell = bodies, tell
+        self._until = time.monotonic() + LIMIT_S
+
+    def rooms(self, more: list[Body], gap: float) -> list[manifold3d.Manifold]:
+        """Solids of the rooms between the bodies and `more`; none where time is up."""
+        for _ in range(MOST_LEFT_OUT + 1):
+            left = self._until - time.monotonic()
+            if left <= 0:
+                return []
+            meshes = [*(body for *_, body in self._bodies), *more]
+            try:
+                found = answer_apart(rooms_enclosed_by, meshes, gap, limit_s=left, told=self._told)
+            except ProcessEnded as error:
+                if not self._leave_out(error):
+                    return []
+                continue
+            self._say_what_is_less(found)
+            solids = [solid_of(room) for room in found.rooms]
+            return [solid.manifold for solid in solids if solid is not None]
+        return []
+
+    def _told(self, line: str) -> None:
+        done, total = map(int, line.split())
+        self._tell(done / max(total, 1))
+
+    def _leave_out(self, error: ProcessEnded) -> bool:
+        """Name what was in work, and take it out; False where that was no single element."""
+        index = int(error.last.split()[0]) if error.last else len(self._bodies)
+        if index >= len(self._bodies) or time.monotonic() >= self._until:
+            what = f"the search for rooms between its walls: {error}"
+            self.problems.append(Problem("IfcSpace", what, "no room is found this way", "room"))
+            return False
+        guid, label, _ = self._bodies.pop(index)
+        done = "left out of the search for rooms"
+        self.problems.append(Problem(guid, f"{label}: {error}", done))
+        return True
+
+    def _say_what_is_less(self, found: Enclosed) -> None:
+        for count, what, done in (
+            (found.not_widened, "small elements: too many to be widened", "gaps there stay open"),
+            (found.kept_small, "room(s) of too many faces to be widened", "end before their walls"),
+        ):
+            if count and found.rooms:
+                self.problems.append(Problem("IfcSpace", f"{count} {what}", done))
 
 
 def _lack_of_spaces(source: Source) -> str:
@@ -73,8 +135,8 @@ def _lack_of_spaces(source: Source) -> str:
     return f"none of its {drawn} space(s) is a room" if drawn else "has no spaces"
 
 
-def _uncut_bodies(source: Source) -> list[tuple[str, Body]]:
-    """Class and triangles of the bounding elements, openings not cut, in the world."""
+def _uncut_bodies(source: Source) -> list[tuple[Shape, str, Body]]:
+    """The bounding elements, their labels and triangles in the world, openings not cut."""
     filling = {
         relation.RelatedBuildingElement.id()
         for relation in source.model.by_type("IfcRelFillsElement")
@@ -84,7 +146,9 @@ def _uncut_bodies(source: Source) -> list[tuple[str, Body]]:
     } - filling
     everything = {one.id() for one in source.model.by_type("IfcProduct")}
     shapes, _ = read_shapes(source.model, without=everything - wanted, cut_openings=False)
-    return [(s.ifc_class, source.placed.to_world(s.triangles)) for s in shapes.values()]
+    return [
+        (s, f"{s.ifc_class} {s.name}", source.placed.to_world(s.triangles)) for s in shapes.values()
+    ]
 
 
 def _box(bodies: list[Body]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,6 +11,7 @@ from mitsuba_cfs.errors import DataError
 SCHEMAS = ("IFC2X3", "IFC4", "IFC4X3")
 HEAD = 65_536  # bytes: a header that is longer is left to the parser
 ZIPPED = (".ifczip", ".zip")
+LARGEST = 2**30  # of a zipped model, unpacked [bytes]: reading takes ten times that in memory
 SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'")
 
 
@@ -37,6 +38,12 @@ def model_name(archive: zipfile.ZipFile, path: Path) -> str:
     names = [name for name in archive.namelist() if name.lower().endswith(".ifc")]
     if len(names) != 1:
         raise DataError(f"expected one .ifc inside, found {len(names)}", file=path)
+    size = archive.getinfo(names[0]).file_size  # zipfile unpacks no more than it says here
+    if size > LARGEST:
+        message = (
+            f"unpacks to {size / 1e9:.1f} GB, more than {LARGEST / 1e9:.1f} GB: unzip it first"
+        )
+        raise DataError(message, file=path)
     return names[0]
 
 

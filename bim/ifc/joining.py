@@ -88,7 +88,8 @@ def joined_rooms(
         if all(guid in named for guid in way.rooms):
             pair = sorted((named[guid] for guid in way.rooms), key=lambda room: room.label)
             what = f"rooms {' and '.join(room.label for room in pair)} are open to each other"
-            problems.append(Problem(way.opening, what, _how_to_join(pair, records, source)))
+            how = _how_to_join(pair, records, source)
+            problems.append(Problem(way.opening, what, how, kind="open to each other"))
     return records, problems
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from bim.defaults import MATERIALS, UNKNOWN_MATERIAL
 from bim.model import MaterialLayer, Problem
+from bim.names import plain_text
 
 PHYSICAL = {  # name -> lowest and highest value of any building material
     "conductivity": (0.005, 500.0),
@@ -134,7 +135,12 @@ class MaterialReader:
         """A layer of that material; missing or impossible values from the table by its name."""
         name = (material.Name or "unnamed") if material is not None else "unnamed"
         given = self._properties.get(material.id(), {}) if material is not None else {}
-        values = {k: v for k, v in given.items() if PHYSICAL[k][0] <= v <= PHYSICAL[k][1]}
+        values = {k: v for k, v in given.items() if _is_physical(k, v)}
+        slip = given.get("heat_capacity", 0.0) * 1000.0
+        if "heat_capacity" not in values and _is_physical("heat_capacity", slip):
+            values["heat_capacity"] = slip
+            what = f"material {name}: specific heat capacity of {slip / 1000:g} J/(kg K)"
+            self.problems.setdefault(f"{name} kJ", Problem(name, what, "taken as kJ/(kg K)"))
         wrong = sorted(set(given) - set(values))
         missing = sorted(set(NAMES) - set(values))
         if missing:
@@ -149,11 +155,16 @@ class MaterialReader:
         return MaterialLayer(name, thickness, **values), not missing
 
 
+def _is_physical(name: str, value: float) -> bool:
+    low, high = PHYSICAL[name]
+    return low <= value <= high
+
+
 def default_material(name: str) -> MaterialLayer:
     """The row of the table whose words occur in the name, in the order of the table."""
-    lower = name.lower()
+    text = plain_text(name)
     for words, material in MATERIALS:
-        if any(word in lower for word in words):
+        if any(plain_text(word) in text for word in words):
             return material
     return UNKNOWN_MATERIAL
 

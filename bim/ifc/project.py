@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import shutil
 import tempfile
 import zipfile
 from pathlib import Path
@@ -18,6 +19,9 @@ from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
 from bim.model import Problem
 from mitsuba_cfs.errors import DataError
 
+CUT_OFF = "cut off"  # kind of the problem of a file that has lost its end
+END = 4096  # bytes in which the end of a STEP file is looked for
+
 
 def open_ifc(path: str | Path) -> ifcopenshell.file:
     """The opened model (.ifc, or .ifczip with one model); `DataError` where it is none."""
@@ -30,7 +34,8 @@ def _open_zipped(path: Path) -> ifcopenshell.file:
     try:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
             inner = Path(folder) / "model.ifc"
-            inner.write_bytes(archive.read(model_name(archive, path)))
+            with archive.open(model_name(archive, path)) as packed, inner.open("wb") as unpacked:
+                shutil.copyfileobj(packed, unpacked)
             return _open_step(inner, path)
     except (zipfile.BadZipFile, NotImplementedError) as error:
         raise DataError(f"cannot be unzipped: {error}", file=path) from None
@@ -69,14 +74,23 @@ def _mend_stars(model: ifcopenshell.file) -> None:
 def ending_problems(path: str | Path) -> list[Problem]:
     """A problem where a STEP file has lost its end."""
     path = Path(path)
-    if path.suffix.lower() in ZIPPED:
+    if b"END-ISO-10303-21" in _end(path):
         return []
-    with path.open("rb") as stream:
-        stream.seek(max(path.stat().st_size - 4096, 0))
-        if b"END-ISO-10303-21" in stream.read():
-            return []
     what = "file ends without END-ISO-10303-21: cut off"
-    return [Problem(path.name, what, "what could be read is used")]
+    return [Problem(path.name, what, "what could be read is used", kind=CUT_OFF)]
+
+
+def _end(path: Path) -> bytes:
+    """The last bytes of a STEP file, or of the one in a zipped file."""
+    if path.suffix.lower() in ZIPPED:
+        end = b""
+        with zipfile.ZipFile(path) as archive, archive.open(model_name(archive, path)) as stream:
+            while block := stream.read(2**20):
+                end = (end + block)[-END:]
+        return end
+    with path.open("rb") as stream:
+        stream.seek(max(path.stat().st_size - END, 0))
+        return stream.read()
 
 
 def length_problems(model: ifcopenshell.file) -> list[Problem]:

@@ -23,6 +23,7 @@ from bim.ifc.project import (
 )
 from bim.ifc.quantities import QuantityScales
 from bim.ifc.shapes import Shape, read_shapes
+from bim.ifc.transparent import judged_transparent
 from bim.model import Problem
 
 Progress = Callable[[str, float], None]
@@ -89,7 +90,8 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     shapes, faults = read_shapes(
         model, lambda fraction: tell("geometry", fraction), without=removed
     )
-    problems += more + site + faults
+    shapes, phantoms = judged_transparent(model, shapes)
+    problems += more + site + faults + phantoms
     for step_id, (visible, solar) in corrections.painted(model).items():
         if step_id in shapes:
             shapes[step_id] = painted(shapes[step_id], visible, solar)

@@ -26,6 +26,7 @@ SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3
 UNCOVERED = 0.7  # share of the ceiling under the open sky from which a space has no roof
 WALLLESS = 0.5  # share of its sides without anything near from which it has no walls
 SIDE_REACH = 1.0  # how far from a side its wall may be [m]
+OVERLAPPING = "spaces overlap"  # kind of a problem
 INSIDE = 0.3  # rays start this far inside: rooms drawn into their walls and roof [m]
 
 
@@ -137,21 +138,6 @@ def closed_space(triangles: NDArray[np.float64]):
     plane = plane_through(np.array([*triangles[0, 0, :2], low]), np.array([0.0, 0.0, 1.0]))
     manifold = prism(shadow(triangles, plane), plane, 0.0, high - low)
     return manifold, "replaced by its outline extruded over its height"
-
-
-def names_of_overlapping(records: Sequence[SpaceRecord]) -> list[Problem]:
-    """A problem for each pair of spaces that share more than 2 % of the smaller one."""
-    problems = []
-    for i, a in enumerate(records):
-        for b in records[i + 1 :]:
-            apart = np.any(a.solid.low > b.solid.high) or np.any(b.solid.low > a.solid.high)
-            if apart:
-                continue
-            shared = (a.solid.manifold ^ b.solid.manifold).volume()
-            if shared > 0.02 * min(a.volume, b.volume):
-                what = f"spaces {a.solid.name} and {b.solid.name} overlap by {shared:.2f} m3"
-                problems.append(Problem(a.solid.guid, what, "both kept as drawn"))
-    return problems
 
 
 def enclosed_spaces(

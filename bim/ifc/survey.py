@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -43,14 +44,22 @@ class Surveyed:
     export_s: float = 0.0  # every room for Radiance, EnergyPlus and glTF
     cpu_s: float = 0.0  # of both, all threads: the same on a busy machine
     memory_mb: float = 0.0  # peak of the process
+    spaces: int = 0  # IfcSpace in the file, each room once; 0 where rooms are found from geometry
+    glass_used: float = 0.0  # of the glass that looks out: before a room [m2]
+    glass_out: float = 0.0  # all glass that looks out, with or without a room [m2]
+    verdict: str = ""  # of the account
     refused: str = ""  # why, where the file cannot be read
 
 
 def survey(paths: Iterable[str | Path]) -> Iterator[Surveyed]:
     """Figures of each file in turn; every file has its own process, so that memory is its own."""
-    for path in paths:
+    for path in map(Path, paths):
         with process_pool(1) as pool:
-            yield pool.submit(_surveyed, Path(path)).result()
+            try:
+                yield pool.submit(_surveyed, path).result()
+            except BrokenProcessPool:  # ended by a signal: a native library, or too little memory
+                why = "its process was ended: too little memory, or a fault of a library"
+                yield Surveyed(path.name, path.stat().st_size / 1e6, refused=f"{path}: {why}")
 
 
 def _surveyed(path: Path) -> Surveyed:
@@ -90,6 +99,10 @@ def _surveyed(path: Path) -> Surveyed:
         export_s,
         cpu_s,
         peak,
+        building.account.spaces if not building.account.found else 0,
+        building.account.glass_used,
+        building.account.glass_out,
+        building.account.verdict,
     )
 
 
@@ -114,34 +127,41 @@ def _has_work_plane(space: Space) -> bool:
 def markdown(rows: Sequence[Surveyed]) -> str:
     """The table of the files, and a line of sums below it."""
     head = (
-        "| file | MB | schema | rooms | with windows | windows | glass m2 | open | area | volume "
-        "| problems | check s | export s | CPU s | memory MB |"
+        "| file | MB | schema | rooms | of spaces | with windows | windows | glass m2 | of all "
+        "| verdict | open | area | volume | problems | check s | export s | CPU s | memory MB |"
     )
     lines = [head, "|---" * head.count(" | ") + "|---|"]
     for row in rows:
         name = f"{row.file} | {row.megabytes:.1f}"
         if row.refused:
-            lines.append(f"| {name} | refused: {row.refused.split(': ', 1)[-1]} |" + " |" * 12)
+            lines.append(f"| {name} | refused: {row.refused.split(': ', 1)[-1]} |" + " |" * 15)
             continue
         area = f"{row.areas_between_walls}" + (
             f" + {row.areas_to_middles} to middles" if row.areas_to_middles else ""
         )
         lines.append(
-            f"| {name} | {row.schema} | {row.rooms} | {row.rooms_with_windows} | {row.windows} "
-            f"| {row.glass:.1f} | {row.open_rooms} | {_of(area, row.areas)} "
-            f"| {_of(str(row.volumes_agreeing), row.volumes)} | {row.problems} "
-            f"| {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} | {row.memory_mb:.0f} |"
+            f"| {name} | {row.schema} | {row.rooms} | {row.spaces or 'found'} "
+            f"| {row.rooms_with_windows} | {row.windows} | {row.glass:.1f} "
+            f"| {_share(row.glass_used, row.glass_out)} | {row.verdict} | {row.open_rooms} "
+            f"| {_of(area, row.areas)} | {_of(str(row.volumes_agreeing), row.volumes)} "
+            f"| {row.problems} | {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} "
+            f"| {row.memory_mb:.0f} |"
         )
     total = {f.name: sum(getattr(r, f.name) for r in rows) for f in fields(Surveyed)
              if f.type in ("int", "float")}  # fmt: skip
     lines.append(
         f"\n{len(rows)} files, {sum(bool(r.refused) for r in rows)} refused; {total['rooms']} rooms"
-        f" ({total['open_rooms']} with an open edge), {total['windows']} windows. Within "
+        f" ({total['open_rooms']} with an open edge), {total['windows']} windows with "
+        f"{total['glass_used']:.1f} m2 of the {total['glass_out']:.1f} m2 that look out. Within "
         f"{100 * AGREES:.0f} % of the file's own: floor area {total['areas_between_walls']} of "
         f"{total['areas']} rooms between the walls and {total['areas_to_middles']} to the middle of"
         f" the walls, volume {total['volumes_agreeing']} of {total['volumes']}."
     )
     return "\n".join(lines)
+
+
+def _share(part: float, whole: float) -> str:
+    return f"{100 * part / whole:.0f} %" if whole > 0 else "-"
 
 
 def _of(agreeing: str, stating: int) -> str:

@@ -54,6 +54,8 @@ def check(building: Path, join: tuple[str, ...], problems: Path | None) -> None:
         read = read_ifc(building, join=join, progress=progress)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
+    for line in read.account.lines if read.account is not None else ():
+        console.print(line, markup=False, highlight=False)
     console.print(_rooms(read))
     console.print(_problems(read))
     console.print(
@@ -288,11 +290,16 @@ def _number(value: float | None) -> str:
 
 
 def _problems(building: Building) -> Table:
+    """The problems by their weight, alike ones counted once."""
     from rich.table import Table
 
+    from bim.ranking import ranked
+
     table = Table(title="Problems", title_justify="left")
+    table.add_column("glass m2", justify="right")
     for head in ("where", "what", "consequence or repair"):
         table.add_column(head, overflow="fold")
-    for problem in building.problems:
-        table.add_row(problem.where, problem.what, problem.consequence)
+    for one in ranked(building.problems):
+        glass = f"{one.glass:.2f}" if one.glass else ""
+        table.add_row(glass, one.first.where, one.what, one.first.consequence)
     return table

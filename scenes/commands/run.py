@@ -113,7 +113,9 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if options.quick:
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress, compiled_beside():
-        result = run_job(options, progress, files, on_room=_print_summary)
+        result = run_job(
+            options, progress, files, on_room=_print_summary, on_building=_print_account
+        )
         progress("results", 0.0)
         write_results(result, folder, write_report)
         progress("results", 1.0)
@@ -123,6 +125,11 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+
+
+def _print_account(building) -> None:
+    for line in building.account.lines if building.account is not None else ():
+        click.echo(line)
 
 
 def _print_summary(room) -> None:

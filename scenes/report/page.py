@@ -96,7 +96,8 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     others = len(building.spaces) - len(result.spaces)
     rooms = f"{len(result.spaces)} computed"
     rows.append(("Rooms", rooms + (f", {others} more in the file" if others > 0 else "")))
-    return tuple(rows)
+    account = building.account
+    return (*rows, *(account.facts if account is not None else ()))
 
 
 def comparison(result: RunResult, rooms) -> tables.Table | None:

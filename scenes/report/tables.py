@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from bim.ranking import ranked
 from scenes.report.names import Quantity, quantity
 from scenes.report.numbers import cell
 from scenes.results import LuminancePicture, RoomYear, RunResult
@@ -140,10 +141,14 @@ def sensors_table(room: RoomYear) -> Table:
 
 def problems_table(result: RunResult) -> Table:
     """What is wrong with the building's file and what was done about it."""
-    columns = tuple(
-        Column(label, numeric=False) for label in ("Where", "What", "Consequence and repair")
+    columns = (
+        Column("Glass", "m²"),
+        *(Column(label, numeric=False) for label in ("Where", "What", "Consequence and repair")),
     )
-    rows = tuple((p.where, p.what, p.consequence) for p in result.problems)
+    rows = tuple(
+        (cell(one.glass, 2) if one.glass else "–", one.first.where, one.what, one.first.consequence)
+        for one in ranked(result.problems)
+    )
     return Table("By element", columns, rows)
 
 

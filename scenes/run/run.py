@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from bim.account import NOT_USABLE
 from bim.model import Building, Problem, Space
 from bim.templates import template_rooms
 from mitsuba_cfs import variants
@@ -36,6 +37,7 @@ FAR_SITE_DEG = 2.0  # a weather station further than this from the building's si
 
 
 OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
+OnBuilding = Callable[[Building], None]  # called with the building as soon as it is read
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,17 +57,21 @@ def run_job(
     files: JobFiles | None = None,
     *,
     on_room: OnRoom | None = None,
+    on_building: OnBuilding | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
 
     Args:
         files: what `read_files` has read of the options; read now without.
         on_room: called with each room as soon as it is computed, in the rooms' order.
+        on_building: called with the building before anything is traced.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     start = time.monotonic()
     inputs = read_inputs(options, progress, files)
+    if on_building is not None:
+        on_building(inputs.building)
     return run_inputs(inputs, options, progress, on_room=on_room, start=start)
 
 
@@ -101,6 +107,7 @@ def run_inputs(
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
         *([NOTE] if options.quick else []),
+        *_account_notes(building),
         *source_notes(used_sources(inputs)),
         *(note for system in used for note in system.notes),
         *thermal_notes,
@@ -281,6 +288,12 @@ def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
         f"{held_by} holds several shading states; without --operation the first of "
         f"each window ({names}) holds all year.",
     )
+
+
+def _account_notes(building: Building) -> tuple[str, ...]:
+    """Why the model will not do, where that is so."""
+    account = building.account
+    return account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
 
 
 def _site_notes(building: Building, weather: Weather) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import ifcopenshell.api.aggregate
 import ifcopenshell.api.context
 import ifcopenshell.api.feature
 import ifcopenshell.api.geometry
+import ifcopenshell.api.material
 import ifcopenshell.api.owner
 import ifcopenshell.api.root
 import ifcopenshell.api.spatial
@@ -98,6 +99,16 @@ class SmallIfc:
         )
         return style
 
+    def opening(self, wall, place, name: str = "opening", *, size=None, axes: bool = False):
+        """An opening through the south wall; with `axes` a box: low corner `place`, and `size`."""
+        low = place
+        if not axes:
+            x, sill, width, height = place
+            low, size = (x, -WALL - 0.1, sill), (width, WALL + 0.2, height)
+        opening = self.box("IfcOpeningElement", name, low, size)
+        ifcopenshell.api.feature.add_feature(self.model, feature=opening, element=wall)
+        return opening
+
     def window(
         self,
         wall,
@@ -110,11 +121,7 @@ class SmallIfc:
     ):
         """A window of the south wall, its body moved by `shift` along the wall."""
         x, sill, width, height = place
-        opening = None
-        if hosted:
-            low, size = (x, -WALL - 0.1, sill), (width, WALL + 0.2, height)
-            opening = self.box("IfcOpeningElement", "opening", low, size)
-            ifcopenshell.api.feature.add_feature(self.model, feature=opening, element=wall)
+        opening = self.opening(wall, place) if hosted else None
         window = ifcopenshell.api.root.create_entity(self.model, ifc_class="IfcWindow", name=name)
         frame = self.style("frame", 0.7)
         pane = self.style("glass", 0.9, 0.8) if glazed else frame
@@ -195,14 +202,41 @@ def box_room(
     slab_as_wall: bool = False,
     window: bool = True,
     places: Sequence[tuple[float, ...]] = (OPENING,),
+    post: bool = False,
 ) -> ifcopenshell.file:
-    """A room of 4 x 6 x 3 m with one window to the south; each argument plants a defect.
+    """The file of `box_model`: a room of 4 x 6 x 3 m with one window to the south."""
+    return box_model(**locals())[0].model
+
+
+def box_model(
+    schema: str = "IFC4",
+    *,
+    unit: str = "METRE",
+    true_north: tuple[float, float] | None = (0.0, 1.0),
+    space: bool = True,
+    space_inset: float = 0.0,
+    space_height: float = HEIGHT,
+    gap: float = 0.0,
+    shift: float = 0.0,
+    hosted: bool = True,
+    glazed: bool = True,
+    doubled_wall: bool = False,
+    slab_as_wall: bool = False,
+    window: bool = True,
+    places: Sequence[tuple[float, ...]] = (OPENING,),
+    post: bool = False,
+    roof: bool = True,
+    upper: bool = False,
+) -> tuple[SmallIfc, dict]:
+    """The model and its walls by name; each argument plants a defect.
 
     Args:
         space_inset: how far the space stops short of the walls [m].
         gap: width of a slit from floor to roof between the south and the east wall [m].
         places: of the windows W1, W2, ... in the south wall.
         shift: how far the window's body lies beside its opening [m].
+        post: whether a thin post stands beside the house.
+        upper: whether a storey of the same walls stands on it, with a window and without a space.
     """
     small = empty_project(schema, unit=unit, true_north=true_north)
     grey = small.style("wall", 0.5)
@@ -211,12 +245,15 @@ def box_room(
         if name == "east":
             low, size = (low[0], low[1] + gap, low[2]), (size[0], size[1] - gap, size[2])
         walls[name] = small.box("IfcWall", name, low, size, grey)
+    if post:
+        small.box("IfcColumn", "post", (-2.0, 1.0, 0.0), (0.1, 0.1, HEIGHT))
     if doubled_wall:
         small.box("IfcWall", "south again", *WALLS["south"], grey)
     slab = "IfcWall" if slab_as_wall else "IfcSlab"
     outline = (WIDTH + 2 * WALL, DEPTH + 2 * WALL, 0.2)
     small.box(slab, "floor", (-WALL, -WALL, -0.2), outline, small.style("floor", 0.3))
-    small.box("IfcSlab", "roof", (-WALL, -WALL, HEIGHT), outline, small.style("ceiling", 0.8))
+    if roof:
+        small.box("IfcSlab", "roof", (-WALL, -WALL, HEIGHT), outline, small.style("ceiling", 0.8))
     if window:
         for number, place in enumerate(places, 1):
             small.window(
@@ -225,6 +262,35 @@ def box_room(
             )  # fmt: skip
     if space:
         low = (space_inset, space_inset, 0.0)
-        size = (WIDTH - 2 * space_inset, DEPTH - 2 * space_inset, HEIGHT)
+        size = (WIDTH - 2 * space_inset, DEPTH - 2 * space_inset, space_height)
         small.box("IfcSpace", "R1", low, size, LongName="Room")
-    return small.model
+    if upper:
+        _upper_storey(small, grey, outline)
+    return small, walls
+
+
+def _upper_storey(small: SmallIfc, grey, outline) -> None:
+    """Walls, a window and a roof on top of the room, on a storey of their own."""
+    above = HEIGHT + 0.2
+    storey = ifcopenshell.api.root.create_entity(
+        small.model, ifc_class="IfcBuildingStorey", name="attic"
+    )
+    building = small.model.by_type("IfcBuilding")[0]
+    ifcopenshell.api.aggregate.assign_object(
+        small.model, products=[storey], relating_object=building
+    )
+    ifcopenshell.api.geometry.edit_object_placement(small.model, product=storey)
+    storey.Elevation = above
+    small.storey = storey
+    for name, (low, size) in WALLS.items():
+        wall = small.box("IfcWall", f"upper {name}", (*low[:2], above), size, grey)
+        if name == "south":
+            x, sill, width, height = OPENING
+            small.window(wall, name="W above", place=(x, sill + above, width, height))
+    small.box("IfcSlab", "upper roof", (-WALL, -WALL, above + HEIGHT), outline, grey)
+
+
+def add_material(model: ifcopenshell.file, product, name: str) -> None:
+    """Give the product one material."""
+    material = ifcopenshell.api.material.add_material(model, name=name)
+    ifcopenshell.api.material.assign_material(model, products=[product], material=material)

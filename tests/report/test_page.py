@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bim.account import Account, StoreyAccount
+from bim.model import Problem
 from scenes.report import write_report
 from scenes.report.page import report_html
 from scenes.results import GlareResults
@@ -89,6 +91,20 @@ def test_hashes_versions_seed_problems_and_notes_are_shown(result, page) -> None
         assert text in page
     for problem in result.problems:
         assert problem.consequence in page
+
+
+def test_account_stands_in_the_head_and_alike_problems_once(result) -> None:
+    storey = StoreyAccount("E0", 3, 4, 20.0, 9.0)
+    account = Account((storey,), 9, 4, 0.0, 11.0, 0.0, 0.0, 0.0, low=("A gym",))
+    building = replace(result.building, account=account)
+    dull = [Problem(str(i), f"wall {i}: is {i} mm off", "kept") for i in range(19)]
+    lost = Problem("W1", "window W1: no room behind it", "no daylight", "window", 11.0)
+    page = report_html(replace(result, building=building, problems=(*dull, lost)))
+    head, _, rest = page.partition("</header>")
+    assert "not usable: only 45 % of the glass that looks out is used" in head
+    assert "3 of 4 spaces" in head and "A gym" in head
+    assert "19 times: wall 0: is 0 mm off" in rest and "wall 7: is" not in rest
+    assert rest.index("no room behind it") < rest.index("19 times")
 
 
 def test_file_is_small_with_full_pictures(tmp_path) -> None:

@@ -1,0 +1,91 @@
+"""The account of an IFC file: rooms by storey, glass used of what looks out, what fits badly."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from bim.account import Account, StoreyAccount
+from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms
+from bim.ifc.project import CUT_OFF, storey_of
+from bim.ifc.source import Source
+from bim.ifc.spaces import OVERLAPPING, SpaceRecord
+from bim.ifc.transparent import PHANTOM
+from bim.model import Problem, Space
+from bim.names import label_of
+from bim.shell import open_edges
+
+
+def account_of(
+    source: Source,
+    read: Sequence[SpaceRecord],
+    built: Sequence[Space],
+    glass: GlassOfRooms,
+    problems: Sequence[Problem],
+    *,
+    repeated: Sequence[str] = (),
+) -> Account:
+    """What of a file came through.
+
+    Args:
+        read: the spaces that are rooms, before any were joined; found ones where there are none.
+        built: the finished rooms.
+        repeated: GUIDs of spaces that draw a room again: not counted.
+    """
+    drawn = [s for s in source.model.by_type("IfcSpace") if s.GlobalId not in repeated]
+    failed = {p.where for p in problems if p.lost == "room"}
+    kept = [record for record in read if record.guid not in failed]
+    guids = {record.guid.split("-")[0] for record in kept}
+    found = not any(space.GlobalId in guids for space in drawn) and bool(kept)
+    missing = [s for s in drawn if s.GlobalId not in guids] if not found else []
+    used: Counter[str] = Counter()
+    for window in (window for space in built for window in space.windows):
+        used[window.guid] += window.area
+    panes = [one for one in glass.glass if one.out > 0]
+    lost = {one.guid: one.out - one.used for one in panes if one.out - one.used > 0.01}
+    low = {one.guid for one in panes if one.low}
+    return Account(
+        _storeys(source, kept, panes, used, Counter(map(storey_of, drawn)) if not found else None),
+        len(panes),
+        sum(used[one.guid] > 0 for one in panes),
+        sum(min(used[one.guid], one.out) for one in panes if one.assumed),
+        sum(area for guid, area in lost.items() if guid in low),
+        sum(area for guid, area in lost.items() if guid not in low),
+        sum(p.glass for p in problems if p.kind.startswith(PHANTOM)),
+        glass.closed,
+        tuple(p.what for p in problems if p.kind == OVERLAPPING),
+        tuple(sorted({one.low for one in panes if one.low})),
+        tuple(label_of(s.Name or "", s.LongName or "", s.GlobalId) for s in missing),
+        tuple(space.label for space in built if open_edges(space.shell)),
+        found,
+        any(p.kind == CUT_OFF for p in problems),
+    )
+
+
+def _storeys(
+    source: Source,
+    rooms: Sequence[SpaceRecord],
+    panes: Sequence[GlassAccount],
+    used: Mapping[str, float],
+    drawn: Counter[str] | None,
+) -> tuple[StoreyAccount, ...]:
+    """Storeys that hold rooms, spaces or glass, in the file's order.
+
+    Args:
+        used: glass before a room [m2] by GUID.
+        drawn: spaces of the file by storey; None where the rooms were found from geometry.
+    """
+    count = Counter(record.storey for record in rooms)
+    spaces = count if drawn is None else drawn
+    out: Counter[str] = Counter()
+    lit: Counter[str] = Counter()
+    for one in panes:
+        out[one.storey] += one.out
+        lit[one.storey] += min(used[one.guid], one.out)
+    names = [storey.Name or "" for storey in source.model.by_type("IfcBuildingStorey")]
+    held = [*dict.fromkeys([*names, *spaces, *out])]
+    return tuple(
+        StoreyAccount(name, count[name], spaces[name], float(out[name]), float(lit[name]))
+        for name in held
+        if spaces[name] or out[name] > 0.01
+    )

@@ -1,0 +1,312 @@
+"""Which glass of an IFC file belongs to which room, and what becomes of the glass that does not.
+
+Openings that nothing fills, with a room on one side and the open air on the other, are closed by
+one of two rules.  One that its name calls a door, or that reaches down to the room's floor and is
+no wider than 1.3 m, is taken as a door, opaque; any other is taken as a window whose file lost its
+glass, with the default frame.  A room with a hole in its wall has no temperature of its own, so
+none stays open.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.apertures import Aperture, Filling, aperture_of, main_direction, shadow
+from bim.ifc.fillings import read_fillings
+from bim.ifc.project import storey_of
+from bim.ifc.source import Source
+from bim.ifc.spaces import SpaceRecord
+from bim.ifc.transparent import PHANTOM, is_phantom
+from bim.model import Problem
+from bim.names import plain_text
+from bim.planes import plane_through, polygons_of, triangulated
+from bim.rays import RayMesh
+from bim.rooms import Attachment, attachments_of
+from bim.surroundings import is_open
+
+SMALLEST_OPENING = 0.1  # smaller ones are for ducts [m2]
+DOOR_SILL, DOOR_WIDTH = 0.3, 1.3  # an opening to the floor up to this width is a door [m]
+ASIDE = 0.5  # points asked on both sides of glass lie this far from it [m]
+CLEAR_WAY = 1.0  # an opening goes through where nothing stands in it this far to both sides [m]
+TALLEST_GAP = 30.0  # between the top of a room and glass above it [m]
+DOOR_NAME = re.compile(r"\b(tur|tuer|door|porte?|deur|puerta|porta|ajto|drzwi|dvere|ovi)", re.I)
+NOT_FILLED = "IfcOpeningElement"
+
+
+@dataclass(frozen=True, slots=True)
+class GlassAccount:
+    """The glass of one window, glazed door or panel, and what became of it."""
+
+    guid: str
+    storey: str
+    out: float  # area that looks out [m2]
+    used: float  # of it: before a room [m2]
+    assumed: bool  # its outline is not drawn in the file
+    low: str = ""  # label of the room that ends below it
+
+
+@dataclass(frozen=True, slots=True)
+class GlassOfRooms:
+    """What the rooms get, what looks out, and the openings that were closed."""
+
+    attachments: tuple[Attachment, ...]
+    glass: tuple[GlassAccount, ...]
+    closed: float  # openings to the outdoors closed without glass [m2]
+    problems: tuple[Problem, ...]
+
+
+def glass_of_rooms(
+    source: Source, records: Sequence[SpaceRecord], building: RayMesh
+) -> GlassOfRooms:
+    """Which part of which window, door or glazed opening each room has, and the rest's account.
+
+    Args: building: everything but the terrain, openings cut.
+    """
+    fillings, problems = read_fillings(source.model, source.shapes)
+    attachments: list[Attachment] = []
+    glass = []
+    for filling in fillings:
+        aperture, more = aperture_of(filling)
+        problems += more
+        if aperture is None:
+            continue
+        found = _real(attachments_of(aperture, [r.solid for r in records]), problems)
+        attachments += found
+        if not records or aperture.glass.is_empty:
+            continue
+        one = _account(aperture, found, source, records, building)
+        glass.append(one)
+        problems += _said(aperture, found, one, records)
+    unfilled = _unfilled(source, records, building, attachments)
+    return GlassOfRooms(
+        (*attachments, *unfilled.attachments), (*glass, *unfilled.glass), unfilled.closed,
+        (*problems, *unfilled.problems),
+    )  # fmt: skip
+
+
+def _real(found: list[Attachment], problems: list[Problem]) -> list[Attachment]:
+    """Attachments without the glass of floors: walls and slabs that face down."""
+    real = []
+    for one in found:
+        filling = one.aperture.filling
+        if not is_phantom(filling.ifc_class, one.aperture.plane.normal):
+            real.append(one)
+        elif one.neighbour is None:
+            what = f"{filling.ifc_class} {filling.name}: is transparent and faces down"
+            done = "no glass: taken as opaque"
+            problems.append(
+                Problem(filling.guid, what, done, glass=one.glass.area, kind=f"{PHANTOM} down")
+            )
+    return real
+
+
+def _account(
+    aperture: Aperture,
+    found: Sequence[Attachment],
+    source: Source,
+    records: Sequence[SpaceRecord],
+    building: RayMesh,
+) -> GlassAccount:
+    """How much of a filling's glass looks out, and how much of that a room has."""
+    filling = aperture.filling
+    storey = storey_of(source.model.by_guid(filling.guid))
+    used = sum(a.glass.area for a in found if a.neighbour is None)
+    inner = sum(a.glass.area for a in found if a.neighbour is not None) / 2  # one of each side
+    rest = max(aperture.glass.area - used - inner, 0.0)
+    out, low = used, ""
+    if rest > 0.01 * aperture.glass.area:
+        inside = _inner_point(aperture, found, building)
+        if inside is not None:
+            out += rest
+            low = _room_below(inside, records, building)
+    assumed = not filling.transparent.any()
+    return GlassAccount(filling.guid, storey, out, used, assumed, low)
+
+
+def _inner_point(
+    aperture: Aperture, found: Sequence[Attachment], building: RayMesh
+) -> NDArray[np.float64] | None:
+    """A point [3] indoors behind the glass without a room; None where it does not look out."""
+    left = aperture.glass
+    for one in found:
+        turned = one.aperture.plane.normal @ aperture.plane.normal < 0
+        region = shapely.transform(one.region, lambda p: p * [-1.0, 1.0]) if turned else one.region
+        left = left.difference(region)
+    left = shapely.union_all(polygons_of(left))
+    if left.is_empty:
+        return None
+    middle = shapely.get_coordinates(shapely.point_on_surface(left))
+    point, normal = aperture.plane.to_world(middle)[0], aperture.plane.normal
+    open_sides = [is_open(point + s * ASIDE * normal, s * normal, building) for s in (1.0, -1.0)]
+    if open_sides[0] == open_sides[1]:  # within the building, or free-standing outdoors
+        return None
+    return point + (-ASIDE if open_sides[0] else ASIDE) * normal
+
+
+def _room_below(
+    point: NDArray[np.float64], records: Sequence[SpaceRecord], building: RayMesh
+) -> str:
+    """Label of the room whose top lies below a point with no slab between; "" if none."""
+    below = [
+        r for r in records
+        if np.all(r.solid.low[:2] < point[:2]) and np.all(r.solid.high[:2] > point[:2])
+        and 0 < point[2] - r.solid.high[2] < TALLEST_GAP
+    ]  # fmt: skip
+    if not below:
+        return ""
+    room = max(below, key=lambda r: r.solid.high[2])
+    down = np.array([[0.0, 0.0, -1.0]])
+    _, hit = building.first_hits(point[None], down, point[2] - room.solid.high[2])
+    return room.label if hit[0] < 0 else ""
+
+
+def _said(
+    aperture: Aperture,
+    found: Sequence[Attachment],
+    one: GlassAccount,
+    records: Sequence[SpaceRecord],
+) -> list[Problem]:
+    """What there is to say of a filling's glass and the rooms beside it."""
+    filling = aperture.filling
+    label = f"{filling.ifc_class} {filling.name}"
+    names = {record.solid.guid: record.solid.name for record in records}
+    problems = []
+    lost = one.out - one.used
+    if one.low and lost > 0:
+        what = f"{label}: {lost:.2f} m2 lie above the top of room {one.low}, which is too low"
+        done = "gives no daylight to any room"
+        kept = "window" if one.used == 0 else ""
+        problems.append(Problem(filling.guid, what, done, kept, lost, f"above room {one.low}"))
+    elif not found:
+        what = f"{label}: no room behind it"
+        done = "gives no daylight to any room"
+        problems.append(Problem(filling.guid, what, done, "window", lost, f"no room {lost > 0}"))
+    elif lost > 0:
+        what = f"{label}: no room behind {lost:.2f} m2 of it"
+        problems.append(Problem(filling.guid, what, "that part gives no daylight", glass=lost))
+    inner = sorted({names[a.room] for a in found if a.neighbour is not None})
+    if inner:
+        what = f"{label}: glass between {' and '.join(inner)}"
+        kind = "glass between rooms"
+        problems.append(Problem(filling.guid, what, "taken as opaque", "window", kind=kind))
+    rooms = sorted({names[a.room] for a in found if a.neighbour is None})
+    if len(rooms) > 1:
+        what = f"{filling.name}: lies before the rooms {', '.join(rooms)}"
+        kind = "lies before several rooms"
+        problems.append(Problem(filling.guid, what, "each gets its part", kind=kind))
+    return problems
+
+
+def _unfilled(
+    source: Source,
+    records: Sequence[SpaceRecord],
+    building: RayMesh,
+    filled: Sequence[Attachment],
+) -> GlassOfRooms:
+    """Openings to the outdoors that nothing fills: glazed, or closed as doors."""
+    attachments, glass, problems, closed = [], [], [], 0.0
+    solids = [record.solid for record in records]
+    lows = {record.solid.guid: float(record.solid.low[2]) for record in records}
+    panes = [a.aperture.plane.to_world(shapely.get_coordinates(a.region)) for a in filled]
+    middles = np.array([pane.mean(axis=0) for pane in panes]).reshape(-1, 3)
+    for opening, host in _openings(source) if records else ():
+        filling = _pane_of(source, opening, host)
+        if filling is None or _holds_one(filling, middles):
+            continue
+        aperture, _ = aperture_of(filling)
+        if aperture is None or aperture.opening.area < SMALLEST_OPENING:
+            continue
+        if not _goes_through(aperture, building):
+            continue
+        found = [
+            a for a in attachments_of(aperture, solids)
+            if a.neighbour is None and not is_phantom("IfcWall", a.aperture.plane.normal)
+            and _looks_out(a, building)
+        ]  # fmt: skip
+        if not found:
+            continue
+        area = sum(a.glass.area for a in found)
+        label = f"opening {opening.Name or ''} in {host.is_a()} {host.Name or ''}"
+        named = DOOR_NAME.search(plain_text(opening.Name or "")) is not None
+        if named or _is_door(found[0], lows[found[0].room]):
+            closed += area
+            why = "its name calls it a door" if named else "it reaches the floor like a door"
+            what = f"{label}: nothing fills it, and {why}"
+            done, kind = "closed, without glass", "opening closed"
+        else:
+            attachments += found
+            glass.append(GlassAccount(filling.guid, storey_of(host), area, area, True))
+            what = f"{label}: nothing fills it, and it leads outdoors"
+            done, kind = "taken as a window with the default frame", "opening glazed"
+        problems.append(Problem(filling.guid, what, done, glass=area, kind=kind))
+    return GlassOfRooms(tuple(attachments), tuple(glass), closed, tuple(problems))
+
+
+def _openings(source: Source):
+    """Openings that no relation fills, with the element that each is cut out of."""
+    for opening in source.model.by_type("IfcOpeningElement"):
+        if getattr(opening, "HasFillings", None):
+            continue
+        for voids in getattr(opening, "VoidsElements", None) or ():
+            yield opening, voids.RelatingBuildingElement
+
+
+def _pane_of(source: Source, opening, host) -> Filling | None:
+    """The opening as a pane without glass drawn, in the middle of its host."""
+    body, wall = source.shapes.get(opening.id()), source.shapes.get(host.id())
+    direction = None if wall is None else main_direction(wall.triangles)
+    if body is None or direction is None:
+        return None
+    # an opening may be deeper than it is wide: its plane is that of the wall
+    heights = wall.triangles @ direction
+    own = body.triangles @ direction
+    low, high = max(heights.min(), own.min()), min(heights.max(), own.max())
+    if high <= low:
+        return None
+    plane = plane_through(0.5 * (low + high) * direction, direction)
+    outline = shadow(body.triangles, plane)
+    if outline.is_empty:
+        return None
+    pane = plane.to_world(np.concatenate([triangulated(p) for p in polygons_of(outline)]))
+    return Filling(
+        body.guid, opening.Name or body.guid, NOT_FILLED, pane, np.zeros(len(pane), dtype=bool),
+        opening=pane, host=host.GlobalId,
+    )  # fmt: skip
+
+
+def _holds_one(filling: Filling, middles: NDArray[np.float64]) -> bool:
+    """Whether a window or door that no relation ties to the opening stands in it."""
+    corners = filling.triangles.reshape(-1, 3)
+    low, high = corners.min(axis=0) - ASIDE, corners.max(axis=0) + ASIDE
+    return bool(np.any(np.all((middles > low) & (middles < high), axis=1)))
+
+
+def _goes_through(aperture: Aperture, building: RayMesh) -> bool:
+    """Whether nothing stands in the opening or before it."""
+    middle = shapely.get_coordinates(shapely.point_on_surface(aperture.opening))
+    point, normal = aperture.plane.to_world(middle), aperture.plane.normal
+    _, hit = building.first_hits(
+        np.repeat(point, 2, axis=0), np.stack([normal, -normal]), CLEAR_WAY
+    )
+    return bool(np.all(hit < 0))
+
+
+def _looks_out(one: Attachment, building: RayMesh) -> bool:
+    middle = shapely.get_coordinates(shapely.point_on_surface(one.region))
+    plane = one.aperture.plane
+    return is_open(plane.to_world(middle)[0] + CLEAR_WAY * plane.normal, plane.normal, building)
+
+
+def _is_door(one: Attachment, floor: float) -> bool:
+    corners = one.aperture.plane.to_world(shapely.get_coordinates(one.region))
+    across = np.cross(one.aperture.plane.normal, [0.0, 0.0, 1.0])
+    if np.linalg.norm(across) < 0.3:  # in a roof
+        return False
+    width = float(np.ptp(corners @ (across / np.linalg.norm(across))))
+    return bool(corners[:, 2].min() < floor + DOOR_SILL and width <= DOOR_WIDTH)

@@ -1,0 +1,155 @@
+"""Bodies and files that end or hold up a process: checked first, named, left out, the rest read."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+import zipfile
+
+import numpy as np
+import pytest
+
+import bim.enclosure
+import bim.ifc.found_rooms
+import bim.ifc.head
+import bim.ifc.survey
+from bim.enclosure import rooms_enclosed_by
+from bim.ifc.building import read_ifc
+from bim.ifc.found_rooms import rooms_enclosed_by as search
+from bim.ifc.survey import _surveyed as survey_one
+from bim.mesh_repair import closed_faces
+from bim.solids import solid_of
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.processes import ProcessEnded, answer_apart
+from tests.bim.small_ifc import box_room
+from tests.bim.test_enclosure import box, room
+
+CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+def ends_by_a_signal(tell) -> None:
+    tell("7 of 9")
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def works_for_ever(tell) -> None:
+    tell("started")
+    time.sleep(60)
+
+
+def adds(a, b, tell) -> int:
+    if b is None:
+        raise ValueError("no second number")
+    return a + b
+
+
+def dies_of_a_post(elements, gap, tell):
+    """Stands for a library that ends its process on one body: the one that is tall and thin."""
+    for index, element in enumerate(elements):
+        tell(f"{index} {len(elements)}")
+        if np.ptp(element.reshape(-1, 3), axis=0)[:2].max() < 0.2:
+            os.kill(os.getpid(), signal.SIGSEGV)
+    return search(elements, gap, tell)
+
+
+def dies_of_its_name(path):
+    if path.name == "bad.ifc":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return survey_one(path)
+
+
+def test_process_apart_answers_raises_dies_and_is_stopped():
+    assert answer_apart(adds, 1, 2, limit_s=60) == 3
+    with pytest.raises(ValueError, match="no second number"):
+        answer_apart(adds, 1, None, limit_s=60)
+    with pytest.raises(ProcessEnded, match="SIGSEGV") as died:
+        answer_apart(ends_by_a_signal, limit_s=60)
+    assert died.value.last == "7 of 9"
+    with pytest.raises(ProcessEnded, match="not finished after 4 s"):
+        answer_apart(works_for_ever, limit_s=4)
+
+
+def without_number(corners):
+    corners[3, 2] = np.nan
+
+
+def a_thousand_kilometres_long(corners):
+    corners[3, 2] = 1e6
+
+
+@pytest.mark.parametrize("fault", [without_number, a_thousand_kilometres_long])
+def test_vertices_of_no_building_are_handed_to_no_library(fault):
+    corners = CORNERS.copy()
+    fault(corners)
+    assert closed_faces(corners, FACES) is None
+    assert solid_of(corners[FACES]) is None
+
+
+@pytest.mark.parametrize(
+    "faces",
+    [FACES[:3], [*FACES[:3], [0, 3, 9]], [*FACES, [0, 1, 1]], [*FACES[:3], [0, 2, 3]], FACES[:0]],
+    ids=["open", "no such corner", "collapsed", "turned", "none"],
+)
+def test_faces_that_bound_no_solid_are_handed_to_no_library(faces):
+    assert closed_faces(CORNERS, np.reshape(faces, (-1, 3))) is None
+
+
+@pytest.mark.parametrize("more", [FACES[:2], np.concatenate([FACES[:1], FACES[:1, ::-1]])])
+def test_faces_drawn_again_count_once(more):
+    faces = closed_faces(CORNERS, np.concatenate([FACES, more]))
+    assert sorted(map(tuple, faces)) == sorted(map(tuple, FACES))
+    again = np.concatenate([CORNERS[FACES], CORNERS[more]])
+    assert solid_of(again).volume == pytest.approx(1 / 6)
+
+
+def test_element_that_ends_the_search_is_named_and_the_rest_gives_the_room(tmp_path, monkeypatch):
+    monkeypatch.setattr(bim.ifc.found_rooms, "rooms_enclosed_by", dies_of_a_post)
+    path = tmp_path / "model.ifc"
+    box_room(space=False, post=True).write(str(path))
+    building = read_ifc(path)
+    (space,) = building.spaces
+    assert len(space.windows) == 1
+    (named,) = [p for p in building.problems if "SIGSEGV" in p.what]
+    assert "post" in named.what and named.consequence == "left out of the search for rooms"
+
+
+def test_search_that_takes_too_long_is_stopped_and_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(bim.ifc.found_rooms, "LIMIT_S", 0.1)
+    path = tmp_path / "model.ifc"
+    box_room(space=False).write(str(path))
+    building = read_ifc(path)
+    assert building.spaces == ()
+    assert any("not finished after" in p.what and p.lost == "room" for p in building.problems)
+
+
+def test_more_work_than_the_budget_is_left_undone_and_counted(monkeypatch):
+    bent = [*room(), np.concatenate([box((5, 0, 0), (1, 0.1, 1)), box((5, 1, 0), (1, 0.1, 1))])]
+    assert rooms_enclosed_by(bent).not_widened == 0
+    monkeypatch.setattr(bim.enclosure, "MOST_WIDENED", 20)
+    found = rooms_enclosed_by(bent)
+    assert (found.not_widened, len(found.rooms)) == (1, 1)
+    monkeypatch.setattr(bim.enclosure, "LARGEST_VOID", 11)
+    assert rooms_enclosed_by(bent).kept_small == 1
+
+
+def test_survey_goes_on_after_a_worker_that_died(tmp_path, monkeypatch):
+    monkeypatch.setattr(bim.ifc.survey, "_surveyed", dies_of_its_name)
+    for name in ("bad.ifc", "good.ifc"):
+        box_room(window=False).write(str(tmp_path / name))
+    bad, good = bim.ifc.survey.survey([tmp_path / "bad.ifc", tmp_path / "good.ifc"])
+    assert "its process was ended" in bad.refused and bad.rooms == 0
+    assert (good.refused, good.rooms) == ("", 1)
+
+
+def test_zipped_model_that_would_unpack_to_gigabytes_is_refused_before(tmp_path, monkeypatch):
+    inner, path = tmp_path / "model.ifc", tmp_path / "model.ifczip"
+    box_room().write(str(inner))
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.write(inner, "model.ifc")
+    assert len(read_ifc(path).spaces) == 1
+    monkeypatch.setattr(bim.ifc.head, "LARGEST", inner.stat().st_size - 1)
+    monkeypatch.setattr(zipfile.ZipFile, "open", None)
+    with pytest.raises(DataError, match=r"model\.ifczip: unpacks to .* GB, more than"):
+        read_ifc(path)
