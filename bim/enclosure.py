@@ -91,6 +91,19 @@ def rooms_enclosed_by(
     return Enclosed(tuple(found), not_widened, kept_small)
 
 
+def first_rooms_enclosed(
+    elements: Sequence[NDArray[np.float64]],
+    attempts: Sequence[tuple[Sequence[NDArray[np.float64]], float]],
+    tell: Told,
+) -> tuple[int, Enclosed]:
+    """Number of the first attempt (elements besides, gap [m]) that finds rooms, and these; -1."""
+    for number, (more, gap) in enumerate(attempts):
+        found = rooms_enclosed_by([*elements, *more], gap, tell)
+        if found.rooms:
+            return number, found
+    return -1, Enclosed(())
+
+
 def _is_room(solid: manifold3d.Manifold) -> bool:
     box = solid.bounding_box()
     return solid.volume() > SMALLEST_ROOM and box[5] - box[2] > LOWEST_ROOM

@@ -14,7 +14,7 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.enclosure import GAP, LIMIT_S, Enclosed, rooms_enclosed_by
+from bim.enclosure import GAP, LIMIT_S, Enclosed, first_rooms_enclosed
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
@@ -66,8 +66,8 @@ def found_rooms(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Pro
         ([floor], GAP, "a floor put under the walls"),
         ([floor, roof], GAP, "a floor and a flat roof put to the walls"),
     )
-    found = ((search.rooms(more, gap), repair) for more, gap, repair in attempts)
-    rooms, repair = next(((rooms, repair) for rooms, repair in found if rooms), ([], ""))
+    number, rooms = search.rooms([(more, gap) for more, gap, _ in attempts])
+    repair = attempts[number][2]
     if not rooms:
         what = f"{lacks}, and its walls enclose nothing"
         done = f"no room is found; gaps up to {WIDER} m were closed"
@@ -87,23 +87,27 @@ class _Search:
         self._bodies, self._tell = bodies, tell
         self._until = time.monotonic() + LIMIT_S
 
-    def rooms(self, more: list[Body], gap: float) -> list[manifold3d.Manifold]:
-        """Solids of the rooms between the bodies and `more`; none where time is up."""
+    def rooms(
+        self, attempts: list[tuple[list[Body], float]]
+    ) -> tuple[int, list[manifold3d.Manifold]]:
+        """Number of the first attempt (bodies besides, gap) that finds rooms, and their solids."""
         for _ in range(MOST_LEFT_OUT + 1):
             left = self._until - time.monotonic()
             if left <= 0:
-                return []
-            meshes = [*(body for *_, body in self._bodies), *more]
+                break
+            meshes = [body for *_, body in self._bodies]
             try:
-                found = answer_apart(rooms_enclosed_by, meshes, gap, limit_s=left, told=self._told)
+                number, found = answer_apart(
+                    first_rooms_enclosed, meshes, attempts, limit_s=left, told=self._told
+                )
             except ProcessEnded as error:
                 if not self._leave_out(error):
-                    return []
+                    break
                 continue
             self._say_what_is_less(found)
             solids = [solid_of(room) for room in found.rooms]
-            return [solid.manifold for solid in solids if solid is not None]
-        return []
+            return number, [solid.manifold for solid in solids if solid is not None]
+        return -1, []
 
     def _told(self, line: str) -> None:
         done, total = map(int, line.split())

@@ -16,7 +16,7 @@ import bim.ifc.head
 import bim.ifc.survey
 from bim.enclosure import rooms_enclosed_by
 from bim.ifc.building import read_ifc
-from bim.ifc.found_rooms import rooms_enclosed_by as search
+from bim.ifc.found_rooms import first_rooms_enclosed as search
 from bim.ifc.survey import _surveyed as survey_one
 from bim.mesh_repair import closed_faces
 from bim.solids import solid_of
@@ -45,13 +45,13 @@ def adds(a, b, tell) -> int:
     return a + b
 
 
-def dies_of_a_post(elements, gap, tell):
+def dies_of_a_post(elements, attempts, tell):
     """Stands for a library that ends its process on one body: the one that is tall and thin."""
     for index, element in enumerate(elements):
         tell(f"{index} {len(elements)}")
         if np.ptp(element.reshape(-1, 3), axis=0)[:2].max() < 0.2:
             os.kill(os.getpid(), signal.SIGSEGV)
-    return search(elements, gap, tell)
+    return search(elements, attempts, tell)
 
 
 def dies_of_its_name(path):
@@ -105,7 +105,7 @@ def test_faces_drawn_again_count_once(more):
 
 
 def test_element_that_ends_the_search_is_named_and_the_rest_gives_the_room(tmp_path, monkeypatch):
-    monkeypatch.setattr(bim.ifc.found_rooms, "rooms_enclosed_by", dies_of_a_post)
+    monkeypatch.setattr(bim.ifc.found_rooms, "first_rooms_enclosed", dies_of_a_post)
     path = tmp_path / "model.ifc"
     box_room(space=False, post=True).write(str(path))
     building = read_ifc(path)
