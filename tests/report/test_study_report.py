@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bim.model import Problem
@@ -50,6 +51,7 @@ class AnyWeather:
     """Eight thousand hours, as far as the figures of glare ask."""
 
     times, step_h = range(8760), 1.0
+    midpoints = pd.date_range("2023-01-01 00:30", periods=8760, freq="h")
 
 
 def study(systems: int = 2, failed: bool = True) -> StudyResult:

@@ -158,7 +158,7 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, files, *, on_room):
+    def half(options, progress, files, *, on_room, on_building):
         on_room("the first room")
         raise DataError("the second failed")
 
