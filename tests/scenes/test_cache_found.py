@@ -57,7 +57,11 @@ COMMANDS = {
 }
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+# quick: the light of a run and the heat of a study; pv and study find by the same cache
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow if n in {"pv", "study"} else ()) for n in COMMANDS],
+)
 def test_the_second_time_everything_is_found(tmp_path, name):
     """In another folder of results, with other hash seeds; a kept file that is written anew would
     be another file (inode), for it is replaced as a whole."""

@@ -23,7 +23,7 @@ from scenes import cli
 from scenes.result_folder import MARK
 from tests.conftest import REPOSITORY, default_signals
 from tests.scenes.quick_work import STOP
-from tests.scenes.writing_jobs import JOBS, Job, Place, refused
+from tests.scenes.writing_jobs import JOBS, Job, Place, heavy_ones_slow, refused
 
 pytestmark = pytest.mark.early
 
@@ -56,7 +56,7 @@ def fill(disk: Path) -> None:
                 pass
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", heavy_ones_slow(JOBS))
 def test_a_full_disk_is_one_line_and_keeps_the_earlier_result(name, place, small_disk, capsys):
     here = place(name, small_disk)
     assert cli.run(here.words) == 0
@@ -71,7 +71,7 @@ def test_a_full_disk_is_one_line_and_keeps_the_earlier_result(name, place, small
     assert here.content().keys() == before.keys()
 
 
-@pytest.mark.parametrize("name", [name for name in JOBS if name != "ifc survey"])  # other process
+@pytest.mark.parametrize("name", heavy_ones_slow(n for n in JOBS if n != "ifc survey"))
 def test_a_file_over_the_limit_is_one_line(name, place, capsys):
     """As a full disk, without root: no file of this process may be larger than 16 bytes."""
     here = place(name)
@@ -92,7 +92,7 @@ def test_a_file_over_the_limit_is_one_line(name, place, capsys):
     assert {Path(one).name for one in here.content()} <= kept
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", heavy_ones_slow(JOBS))
 def test_a_read_only_disk_is_found_before_the_work(name, place, small_disk, capsys, monkeypatch):
     here = place(name, small_disk)
     assert cli.run(here.words) == 0

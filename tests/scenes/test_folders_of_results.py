@@ -18,6 +18,7 @@ from tests.scenes.writing_jobs import (
     OWN,
     PV_STUDY,
     Place,
+    heavy_ones_slow,
     refused,
     to_folder,
 )
@@ -25,7 +26,7 @@ from tests.scenes.writing_jobs import (
 pytestmark = pytest.mark.usefixtures("own_cache")
 
 
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize("name", heavy_ones_slow(OWN))
 def test_a_folder_is_ours_by_its_mark_alone(name, place, capsys):
     """A `run.json` of somebody else's, and a mark that another program wrote."""
     here = place(name)
@@ -41,7 +42,7 @@ def test_a_folder_is_ours_by_its_mark_alone(name, place, capsys):
     assert (here.out / "thesis.docx").read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.parametrize("name", heavy_ones_slow(FOLDERS))
 def test_files_of_others_in_a_folder_of_ours_stay(name, place, capsys):
     here = place(name)
     assert cli.run(here.words) == 0
@@ -63,7 +64,7 @@ def test_files_of_others_in_a_folder_of_ours_stay(name, place, capsys):
     assert (here.out / "results-1" / taken).is_file()
 
 
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize("name", heavy_ones_slow(OWN))
 def test_the_current_folder_and_that_of_an_input_are_refused(name, place, capsys, monkeypatch):
     here = place(name)
     monkeypatch.chdir(here.out.parent)
@@ -86,7 +87,7 @@ def test_the_folder_of_an_input_is_refused(place, capsys, tmp_path):
     assert building.read_bytes() == OFFICE.read_bytes()
 
 
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize("name", heavy_ones_slow(OWN))
 def test_another_commands_results_are_refused(name, place, capsys):
     here = place(name)
     here.out.mkdir()
@@ -95,7 +96,7 @@ def test_another_commands_results_are_refused(name, place, capsys):
     refused(here, capsys, "holds results of `cfs other`")
 
 
-@pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.parametrize("name", heavy_ones_slow(FOLDERS))
 def test_a_link_to_a_folder_is_followed(name, place, tmp_path):
     here = place(name)
     (tmp_path / "elsewhere").mkdir()
@@ -105,7 +106,7 @@ def test_a_link_to_a_folder_is_followed(name, place, tmp_path):
     assert here.out.is_symlink() and (tmp_path / "elsewhere" / MARK).is_file()
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", heavy_ones_slow(FILES))
 def test_a_link_to_a_file_is_followed(name, place, tmp_path):
     here = place(name)
     real = tmp_path / f"real{here.out.suffix}"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
+from _pytest.mark.structures import ParameterSet
 
 from mitsuba_cfs.files import TEMPORARY
 from mitsuba_cfs.images.hdr import write_hdr
@@ -113,6 +115,15 @@ JOBS = {
     "calibrate": Job(lambda _, out: ["calibrate", "--out", out], "out.json"),
     "bench": Job(lambda _, out: ["bench", "--json", out], "out.json"),
 }  # fmt: skip
+# they take ten seconds and more; the same code writes for the others, which stay quick
+HEAVY = ("study", "study --write-ifc", "demo", "pv", "ifc survey")
+
+
+def heavy_ones_slow(names: Iterable[str]) -> list[ParameterSet]:
+    """The names as parameters, the heavy jobs among them only in the slow set."""
+    return [pytest.param(name, marks=pytest.mark.slow if name in HEAVY else ()) for name in names]
+
+
 FOLDERS = [name for name, job in JOBS.items() if job.folder]
 OWN = [name for name in FOLDERS if not JOBS[name].adds]
 FILES = [name for name, job in JOBS.items() if not job.folder]
