@@ -63,10 +63,27 @@ def command(rays: int) -> str:
 
 def theirs(outdoors: str, rays: int, folder: Path) -> NDArray[np.float64]:
     """Radiance's daylight matrix [1, K, P] with so many rays of each Klems patch."""
-    radiance.write_surfaces(OUTDOORS[outdoors](), folder / "outdoors.rad")
+    radiance.write_surfaces(_with_black_panes(OUTDOORS[outdoors]()), folder / "outdoors.rad")
     radiance.write_group(room.window_groups()[0], folder / "window.rad")
     radiance.write_sky(folder / "sky.rad", SUBDIVISION)
     return radiance.read_float_matrix(radiance.run(command(rays), folder))[None]
+
+
+def _with_black_panes(outside: Surfaces) -> Surfaces:
+    """The outdoors and the windows, 2 mm behind the plane where rays start: black, as in ours.
+
+    Without them what comes back to a window would pass through the room.
+    """
+    if not len(outside.triangles):
+        return outside
+    windows = [window for group in room.window_groups() for window in group.windows]
+    panes = np.concatenate([w.triangles - 2e-3 * w.normal for w in windows])
+    black, number = np.zeros(len(panes)), outside.surface.max() + 1
+    return Surfaces(
+        np.concatenate([outside.triangles, panes]),
+        np.concatenate([outside.reflectance, black]),
+        np.concatenate([outside.surface, np.full(len(panes), number)]),
+    )
 
 
 def compare(name: str, progress: Progress, *, outdoors: str, rays: int) -> Comparison:
