@@ -96,11 +96,11 @@ def surfaces(office: Path) -> cfs.Surfaces:
     return cfs.Surfaces(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
-def window(name: str, corners: NDArray[np.float64]) -> cfs.Window:
+def window(name: str, corners: NDArray[np.float64]) -> cfs.WindowSurface:
     """A window whose normal points outdoors, to -y."""
     found = triangles(corners)
     outwards = np.cross(*np.diff(found[0], axis=0))[1] < 0
-    return cfs.Window(name, found if outwards else found[:, ::-1])
+    return cfs.WindowSurface(name, found if outwards else found[:, ::-1])
 
 
 def window_groups(folder: Path, case: str) -> tuple[list[cfs.WindowGroup], list[list]]:
