@@ -84,7 +84,8 @@ def daylight_matrix(
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
-    something = len(surfaces.triangles) > 0  # light comes back to the windows
+    # light comes back to the windows; one before another (a screen behind panes) lets it pass
+    something = len(surfaces.triangles) > 0 and not _in_series(groups)
     tracer = TracedScene(surfaces, groups, windows_block=something)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     n = int(samples)
@@ -108,6 +109,22 @@ def daylight_matrix(
             seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
+
+
+def _in_series(groups: Sequence[WindowGroup]) -> bool:
+    """Whether a window stands outdoors of another, less than a metre before it."""
+    windows = [window for group in groups for window in group.windows]
+    for inner in windows:
+        n, corners = np.asarray(inner.normal), inner.triangles.reshape(-1, 3)
+        low, high = corners.min(axis=0) - 1e-3, corners.max(axis=0) + 1e-3
+        for outer in windows:
+            points = outer.triangles.reshape(-1, 3)
+            before = float(n @ (points.mean(axis=0) - corners.mean(axis=0)))
+            moved = points - before * n
+            apart = np.any(moved.max(axis=0) < low) or np.any(moved.min(axis=0) > high)
+            if 1e-3 < before < 1.0 and n @ outer.normal > 0.99 and not apart:
+                return True
+    return False
 
 
 def sky_irradiance_matrix(

@@ -245,3 +245,19 @@ def test_windows_of_one_group_must_share_their_orientation():
     _, groups, _ = rooms.l_shaped_room()
     with pytest.raises(ValueError, match="turned"):
         WindowGroup("both", (groups[0].windows[0], groups[1].windows[0]))
+
+
+def test_panes_before_a_screen_do_not_take_its_light():
+    """A screen and the panes before it are windows in series: D of the screen keeps its light."""
+    from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+
+    _, groups = rooms.test_room()
+    (screen, *_) = groups[0].windows
+    pane = WindowSurface("pane", screen.triangles + 0.15 * np.asarray(screen.normal))
+    outside, alone = rooms.obstruction(), WindowGroup("screen", (screen,))
+    both = [alone, WindowGroup("panes", (pane,))]
+    found = daylight_matrix(outside, both, subdivision=1, samples=256).values[0]
+    expected = daylight_matrix(outside, [alone], subdivision=1, samples=256).values[0]
+    # 3 % more: what comes back from outdoors passes windows that stand in series
+    assert 0.98 * expected.sum() < found.sum() < 1.05 * expected.sum()
