@@ -26,6 +26,7 @@ import pandas as pd
 
 from scenes.evidence.benchmarks.thermal_year import EPW, energyplus_room
 from scenes.evidence.validation.energyplus_cases import EPW_FILES, WALLS
+from scenes.evidence.validation.energyplus_ideal_loads import ideal_loads
 from scenes.evidence.validation.energyplus_loads import SET_POINTS
 from scenes.evidence.validation.energyplus_model import (
     OUTPUTS,
@@ -79,7 +80,6 @@ def _with_ideal_loads(model: Model) -> Model:
         fields = ["Through: 12/31", "For: AllDays", "Until: 24:00", value]
         return {"data": [{"field": field} for field in fields]}
 
-    kind = "ZoneHVAC:IdealLoadsAirSystem"
     schedules = {
         "HEATED": always(float(SET_POINTS.heating_c)),
         "COOLED": always(float(SET_POINTS.cooling_c)),
@@ -87,48 +87,7 @@ def _with_ideal_loads(model: Model) -> Model:
     }
     return model | {
         "Schedule:Compact": model["Schedule:Compact"] | schedules,
-        "ZoneControl:Thermostat": {
-            "THERMOSTAT": {
-                "zone_or_zonelist_name": "ROOM",
-                "control_type_schedule_name": "DUAL",
-                "control_1_object_type": "ThermostatSetpoint:DualSetpoint",
-                "control_1_name": "SET POINTS",
-            }
-        },
-        "ThermostatSetpoint:DualSetpoint": {
-            "SET POINTS": {
-                "heating_setpoint_temperature_schedule_name": "HEATED",
-                "cooling_setpoint_temperature_schedule_name": "COOLED",
-            }
-        },
-        kind: {
-            "IDEAL": {
-                "zone_supply_air_node_name": "SUPPLY",
-                "dehumidification_control_type": "None",
-                "humidification_control_type": "None",
-            }
-        },
-        "ZoneHVAC:EquipmentList": {
-            "EQUIPMENT": {
-                "equipment": [
-                    {
-                        "zone_equipment_object_type": kind,
-                        "zone_equipment_name": "IDEAL",
-                        "zone_equipment_cooling_sequence": 1,
-                        "zone_equipment_heating_or_no_load_sequence": 1,
-                    }
-                ]
-            }
-        },
-        "ZoneHVAC:EquipmentConnections": {
-            "CONNECTIONS": {
-                "zone_name": "ROOM",
-                "zone_conditioning_equipment_list_name": "EQUIPMENT",
-                "zone_air_inlet_node_or_nodelist_name": "SUPPLY",
-                "zone_air_node_name": "ROOM AIR",
-                "zone_return_air_node_or_nodelist_name": "RETURN",
-            }
-        },
+        **ideal_loads("HEATED", "COOLED", "DUAL"),
     }
 
 

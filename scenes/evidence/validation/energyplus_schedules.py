@@ -21,6 +21,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.evidence.benchmarks.thermal_year import EPW, energyplus_room, glazing
 from scenes.evidence.validation import reference_room
 from scenes.evidence.validation.energyplus_cases import STEPS
+from scenes.evidence.validation.energyplus_ideal_loads import ideal_loads
 from scenes.evidence.validation.energyplus_model import Model, hourly_outputs, run_energyplus
 from scenes.evidence.validation.facade_sun import facade_sun, sun_steps
 from scenes.room.operation_hours import OperationHours
@@ -128,59 +129,11 @@ def energyplus_model(orientation: str) -> Model:
     model["People"]["PERSON"] |= {
         "number_of_people_schedule_name": "PEOPLE", "number_of_people": 2.0,
     }  # fmt: skip
-    return model | _ideal_loads()
+    return model | ideal_loads("HEATING", "COOLING", "DUAL")
 
 
 def _compact(*values: str | float) -> dict[str, Any]:
     return {"data": [{"field": value} for value in values]}
-
-
-def _ideal_loads() -> Model:
-    return {
-        "ZoneControl:Thermostat": {
-            "THERMOSTAT": {
-                "zone_or_zonelist_name": "ROOM",
-                "control_type_schedule_name": "DUAL",
-                "control_1_object_type": "ThermostatSetpoint:DualSetpoint",
-                "control_1_name": "SET POINTS",
-            }
-        },
-        "ThermostatSetpoint:DualSetpoint": {
-            "SET POINTS": {
-                "heating_setpoint_temperature_schedule_name": "HEATING",
-                "cooling_setpoint_temperature_schedule_name": "COOLING",
-            }
-        },
-        "ZoneHVAC:EquipmentConnections": {
-            "CONNECTIONS": {
-                "zone_name": "ROOM",
-                "zone_conditioning_equipment_list_name": "EQUIPMENT",
-                "zone_air_inlet_node_or_nodelist_name": "SUPPLY",
-                "zone_air_node_name": "AIR NODE",
-                "zone_return_air_node_or_nodelist_name": "RETURN",
-            }
-        },
-        "ZoneHVAC:EquipmentList": {
-            "EQUIPMENT": {
-                "load_distribution_scheme": "SequentialLoad",
-                "equipment": [
-                    {
-                        "zone_equipment_object_type": "ZoneHVAC:IdealLoadsAirSystem",
-                        "zone_equipment_name": "IDEAL",
-                        "zone_equipment_cooling_sequence": 1,
-                        "zone_equipment_heating_or_no_load_sequence": 1,
-                    }
-                ],
-            }
-        },
-        "ZoneHVAC:IdealLoadsAirSystem": {
-            "IDEAL": {
-                "zone_supply_air_node_name": "SUPPLY",
-                "dehumidification_control_type": "None",
-                "humidification_control_type": "None",
-            }
-        },
-    }
 
 
 def compare(orientation: str) -> pd.DataFrame:
