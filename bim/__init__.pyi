@@ -17,6 +17,17 @@ from .model import (
     Space as Space,
     Window as Window,
 )
+from .radiance.daylight import (
+    glass_transmittance as glass_transmittance,
+    opaque_surfaces as opaque_surfaces,
+    scene_windows as scene_windows,
+)
+from .radiance.materials import RadianceMaterial as RadianceMaterial
+from .radiance.scene import (
+    RadianceObject as RadianceObject,
+    RadianceScene as RadianceScene,
+    read_radiance as read_radiance,
+)
 from .sensors import sensor_grid as sensor_grid, view_point as view_point
 from .shell import open_edges as open_edges
 from .shoebox import WindowRectangle as WindowRectangle, shoebox as shoebox

@@ -20,6 +20,7 @@ FILES = {  # the names that the pages use
     "blind.xml": VENETIAN_BLIND, "blind.toml": VENETIAN_BLIND.with_suffix(".toml"),
     "shade.xml": VENETIAN_BLIND, "CITY.epw": WEATHER, "city.epw": WEATHER, "Lyon.epw": WEATHER,
     "house.ifc": OFFICE, "office.ifc": OFFICE,
+    "office.rad": REPOSITORY / "docs" / "tutorials" / "office.rad",
 }  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+import bim
 import mitsuba_cfs as cfs
 from scenes.evidence.validation import geneva_scene as geneva
 
@@ -32,7 +33,7 @@ def rated(
 ) -> dict:
     """Hours, DGP by either sum and Ev of each view of a case, beside the reference."""
     groups, systems = geneva.window_groups(folder, case)
-    solid = geneva.surfaces(folder / "RAD/office.rad")
+    solid = bim.opaque_surfaces(geneva.scene(folder, case))
     hours = geneva.reference(folder, case, numbers[0]).hour[::every]
     sky, traced, found = geneva.sky(folder, hours), None, {"hours": hours.tolist(), "views": {}}
     for number in numbers:

@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import bim
 import mitsuba_cfs as cfs
-from mitsuba_cfs.bsdf.glazing import uncoated_values
 
-CASES = ("01_glz", "03_shd")
+CASES = {"01_glz": "clear", "03_shd": "fabric"}  # and the file of its options
 VIEWS = (1, 2, 3)
-INDEX, TRANSMISSIVITY = 1.52, 0.763  # of the glass
-COATING = 1.05  # refractive index of the fabric's outer layer, which passes all but what it mirrors
+PANES = ("wgTopMat", "wgMiddleMat", "wgBottomMat")
+# the fabric's outer layer, which passes all but what it mirrors
+COATING = bim.RadianceMaterial("fabric_outerlayer", "glass", transmissivity=1.0, index=1.05)
 ROOS = (0.03, 4.0, 2.9, 75.0)  # of the fabric: normal transmittance, p, q, cut-off [degrees]
 DIFFUSE = 0.02  # transmittance of the fabric that scatters
 ANGLES = 512  # even steps of the cosine of incidence
@@ -34,109 +35,30 @@ class Reference:
     dgp: NDArray[np.float64]  # [L]
 
 
-def polygons(path: Path) -> list[tuple[str, NDArray[np.float64]]]:
-    """Material and corners [n, 3] of each polygon of a Radiance file."""
-    words = "\n".join(line.split("#")[0] for line in path.read_text().splitlines()).split()
-    found, i = [], 0
-    while i < len(words):
-        material, kind, at = words[i], words[i + 1], i + 3
-        arguments: list[str] = []
-        for _ in range(3):  # strings, integers, numbers
-            count = int(words[at])
-            arguments = words[at + 1 : at + 1 + count]
-            at += 1 + count
-        if kind == "polygon":
-            found.append((material, np.array(arguments, dtype=float).reshape(-1, 3)))
-        i = at
-    return found
-
-
-def reflectances(path: Path) -> dict[str, float]:
-    """Diffuse reflectance of each `plastic` and `metal` of a Radiance file without gloss."""
-    words, found = path.read_text().split(), {}
-    for i, kind in enumerate(words[:-2]):
-        if kind in ("plastic", "metal") and words[i - 1] == "void":
-            found[words[i + 1]] = float(words[i + 5])
-    return found
-
-
-def triangles(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A convex or seamed polygon [n, 3] as triangles [n - 2, 3, 3], by cutting ears."""
-    normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-    left, found = list(range(len(corners))), []
-    while len(left) > 3:
-        for k in range(len(left)):
-            a, b, c = (corners[left[(k + j) % len(left)]] for j in range(3))
-            if np.cross(b - a, c - b) @ normal <= 1e-12 * (normal @ normal) ** 0.5:
-                continue
-            others = [
-                corners[i] for i in left if not any(np.allclose(corners[i], v) for v in (a, b, c))
-            ]
-            if not any(_within(p, a, b, c, normal) for p in others):
-                found.append((a, b, c))
-                del left[(k + 1) % len(left)]
-                break
-        else:
-            raise ValueError(f"a polygon of {len(corners)} corners cannot be cut into triangles")
-    return np.array([*found, [corners[i] for i in left]])
-
-
-def _within(p, a, b, c, normal) -> bool:
-    sides = ((a, b), (b, c), (c, a))
-    return all(np.cross(end - start, p - start) @ normal > 1e-12 for start, end in sides)
-
-
-def surfaces(office: Path) -> cfs.Surfaces:
-    """All opaque polygons of the office."""
-    rho, parts = reflectances(office), []
-    for number, (material, corners) in enumerate(polygons(office)):
-        if material in rho:
-            found = triangles(corners)
-            parts.append((found, np.full(len(found), rho[material]), np.full(len(found), number)))
-    return cfs.Surfaces(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-
-
-def window(name: str, corners: NDArray[np.float64]) -> cfs.WindowSurface:
-    """A window whose normal points outdoors, to -y."""
-    found = triangles(corners)
-    outwards = np.cross(*np.diff(found[0], axis=0))[1] < 0
-    return cfs.WindowSurface(name, found if outwards else found[:, ::-1])
+def scene(folder: Path, case: str) -> bim.RadianceScene:
+    """The files of a case."""
+    return bim.read_radiance(folder / f"options/{CASES[case]}.rad", folder / "RAD/office.rad")
 
 
 def window_groups(folder: Path, case: str) -> tuple[list[cfs.WindowGroup], list[list]]:
     """The groups of a case and their systems: panes alone, or the fabric and the panes round it."""
-    panes = [
-        window(f"{material} {i}", corners)
-        for i, (material, corners) in enumerate(polygons(folder / "RAD/office.rad"))
-        if material.startswith("wg")
-    ]
+    office = scene(folder, case)
+    panes = bim.scene_windows(office, PANES)
+    pane = office.of_modifiers(PANES)[0].material
+    glass = cfs.AngularOptics(bim.glass_transmittance(pane))
     if case == "01_glz":
-        return [cfs.WindowGroup("panes", tuple(panes))], [[glass()]]
-    cloth = [c for m, c in polygons(folder / "options/fabric.rad") if m == "shading"]
+        return [cfs.WindowGroup("panes", tuple(panes))], [[glass]]
     groups = [
-        cfs.WindowGroup("fabric", (window("fabric", cloth[0]),)),
+        cfs.WindowGroup("fabric", tuple(bim.scene_windows(office, ["shading"]))),
         cfs.WindowGroup("below", tuple(p for p in panes if p.triangles[..., 2].max() < 0.95)),
         cfs.WindowGroup("beside", tuple(p for p in panes if p.triangles[..., 2].max() > 0.95)),
     ]
-    return groups, [[fabric()], [glass()], [glass()]]
+    return groups, [[fabric(pane)], [glass], [glass]]
 
 
-def glass_transmittance(cosine: NDArray[np.float64], index: float, inner: float):
-    """Radiance's `glass` [..] of a refractive index and an inner transmittance at normal."""
-    r = ((index - 1) / (index + 1)) ** 2
-    normal = (1 - r) ** 2 * inner / (1 - (r * inner) ** 2)
-    return uncoated_values(normal, r + r * normal * inner, np.arccos(cosine))[0]
-
-
-def glass() -> cfs.AngularOptics:
-    """The panes."""
-    return cfs.AngularOptics(glass_transmittance(_cosines(), INDEX, TRANSMISSIVITY))
-
-
-def fabric() -> cfs.AngularOptics:
+def fabric(pane: bim.RadianceMaterial) -> cfs.AngularOptics:
     """The fabric behind a pane, without reflection between the two."""
-    before = glass_transmittance(_cosines(), INDEX, TRANSMISSIVITY)
-    before = before * glass_transmittance(_cosines(), COATING, 1.0)
+    before = bim.glass_transmittance(pane) * bim.glass_transmittance(COATING)
     return cfs.AngularOptics(before * roos(_cosines()), before * DIFFUSE)
 
 

@@ -1,0 +1,1 @@
+"""Scenes of Radiance: primitives, their shapes and materials."""

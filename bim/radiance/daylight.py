@@ -1,0 +1,93 @@
+"""A Radiance scene as the tracer reads it: opaque triangles, apertures and their glass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.radiance.materials import RadianceMaterial
+from bim.radiance.scene import RadianceObject, RadianceScene
+from bim.rays import RayMesh, hemisphere, ray_mesh
+from mitsuba_cfs.bsdf.glazing import uncoated_values
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.surfaces import Surfaces, WindowSurface
+
+ANGLES = 512  # even steps of the cosine of incidence
+RAYS = 256  # from each triangle of an aperture to either side
+BEFORE = 1e-3  # distance from an aperture at which its rays start [m]
+LAYERS = 0.5  # panes this near are layers of one window [m]
+CLEARLY = 1.5  # times the sky of the other side
+
+
+def opaque_surfaces(scene: RadianceScene) -> Surfaces:
+    """Everything opaque with its diffuse reflectance; surface i is the i-th such object."""
+    parts = [thing for thing in scene.objects if thing.material.is_opaque]
+    if not parts:
+        return Surfaces.none()
+    counts = [len(part.triangles) for part in parts]
+    return Surfaces(
+        np.concatenate([part.triangles for part in parts]),
+        np.repeat([part.material.diffuse for part in parts], counts),
+        np.repeat(np.arange(len(parts)), counts),
+        tuple(part.name for part in parts),
+    )
+
+
+def scene_windows(scene: RadianceScene, modifiers: Iterable[str]) -> list[WindowSurface]:
+    """The surfaces of these materials or modifiers as windows, in the scene's order.
+
+    Outdoors is the side from which more of the sky is seen; other panes hide it, but those within
+    half a metre, which are layers of the same window.
+
+    Raises: `DataError` for a modifier that no surface has, and for a surface that sees about as
+        much sky on either side.
+    """
+    solid = ray_mesh(opaque_surfaces(scene).triangles)
+    clear = [o.triangles for o in scene.objects if not o.material.is_opaque]
+    panes = ray_mesh(np.concatenate([np.empty((0, 3, 3)), *clear]))
+    return [_window(thing, solid, panes) for thing in scene.of_modifiers(modifiers)]
+
+
+def _window(thing: RadianceObject, solid: RayMesh, panes: RayMesh) -> WindowSurface:
+    normal = np.cross(*np.diff(thing.triangles[0], axis=0))
+    normal /= np.linalg.norm(normal)
+    front, back = (_sky_seen(thing.triangles, side * normal, solid, panes) for side in (1, -1))
+    if max(front, back) <= CLEARLY * min(front, back):
+        raise DataError(
+            f"sees the sky on either side ({front:.0%}, {back:.0%}): which one is outdoors?",
+            file=f"{thing.primitive.file}:{thing.primitive.line}",
+            element=thing.name,
+        )
+    outwards = thing.triangles if front > back else thing.triangles[:, ::-1]
+    return WindowSurface(thing.name, outwards)
+
+
+def _sky_seen(
+    triangles: NDArray[np.float64], normal: NDArray[np.float64], solid: RayMesh, panes: RayMesh
+) -> float:
+    """Share of a hemisphere's rays before triangles [T, 3, 3] that meet nothing and lead up."""
+    rays = np.tile(hemisphere(normal, RAYS), (len(triangles), 1))
+    starts = np.repeat(triangles.mean(axis=1) + BEFORE * normal, RAYS, axis=0)
+    is_free = solid.first_hits(starts, rays)[1] < 0
+    is_free &= panes.first_hits(starts + LAYERS * rays, rays)[1] < 0
+    return float(np.mean(is_free & (rays[:, 2] > 0)))
+
+
+def glass_transmittance(material: RadianceMaterial) -> NDArray[np.float64]:
+    """Transmittance [512] of a `glass` at even steps of the cosine of incidence, 0 to 1.
+
+    What `mitsuba_cfs.AngularOptics` takes.
+
+    Raises: `DataError` for another material.
+
+    Source: "The RADIANCE 5.1 Synthetic Imaging System", 3.2: the inner transmittance straight on,
+    Fresnel's equations with all reflections between the two faces.
+    """
+    if material.kind != "glass":
+        raise DataError(f"is {material.kind}, not glass: give a system", element=material.name)
+    inner, r = material.transmissivity, ((material.index - 1) / (material.index + 1)) ** 2
+    normal = (1 - r) ** 2 * inner / (1 - (r * inner) ** 2)
+    angles = np.arccos(np.linspace(0.0, 1.0, ANGLES))
+    return uncoated_values(normal, r + r * normal * inner, angles)[0]

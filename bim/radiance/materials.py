@@ -1,0 +1,99 @@
+"""Radiance's materials as numbers: what they reflect and pass, and how much is left out.
+
+Source: "The RADIANCE 5.1 Synthetic Imaging System", 3.2; luminance from red, green and blue by its
+weights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bim.radiance.primitives import Primitive
+
+LUMINANCE = (0.265, 0.670, 0.065)  # of red, green, blue [1]
+OPAQUE = ("plastic", "metal", "plastic2", "metal2", "trans", "trans2")
+CLEAR = ("glass", "dielectric", "interface")
+SYSTEMS = ("BSDF", "aBSDF")
+BLACK = ("light", "glow", "illum", "spotlight", "mist")
+MATERIALS = (*OPAQUE, *CLEAR, *SYSTEMS, *BLACK, "mirror", "BRTDfunc")
+PATTERNS = (
+    "colorfunc", "brightfunc", "colordata", "brightdata", "colorpict", "colortext", "brighttext",
+    "texfunc", "texdata",
+)  # fmt: skip
+GLASS_INDEX = 1.52  # where a glass states none
+NUMBERS = {"plastic": 5, "metal": 5, "trans": 7, "mirror": 3, "glass": 3, "dielectric": 5,
+           "plastic2": 6, "metal2": 6, "trans2": 8}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class RadianceMaterial:
+    """A material of a scene file."""
+
+    name: str
+    kind: str
+    diffuse: float = 0.0  # diffuse reflectance [1]
+    specular: float = 0.0  # share that is mirrored, straight or rough [1]
+    roughness: float = 0.0  # slope of the facets, rms; of `plastic2` the mean of its two
+    transmitted: float = 0.0  # of `trans`: passed diffusely [1]
+    straight: float = 0.0  # of `trans`: passed without scattering [1]
+    transmissivity: float = 1.0  # of glass: of one way through it, straight on [1]
+    index: float = GLASS_INDEX  # of glass: refractive index [1]
+    bsdf: str = ""  # file of a BSDF
+
+    @property
+    def is_opaque(self) -> bool:
+        """Whether it stands in the way of light, as the tracer sees it."""
+        return self.kind in OPAQUE or self.kind in BLACK or self.kind == "mirror"
+
+
+def material_of(primitive: Primitive) -> RadianceMaterial:
+    """The material that a primitive defines.
+
+    Raises: `DataError` naming file and line for wrong arguments.
+    """
+    kind, numbers = primitive.kind, primitive.numbers
+    if len(numbers) < NUMBERS.get(kind, 0):
+        raise primitive.fault(f"expected {NUMBERS[kind]} numbers, got {len(numbers)}")
+    if kind in (*OPAQUE, "mirror", "glass") and min(numbers) < 0:
+        raise primitive.fault("a number is negative")
+    name = primitive.name
+    if kind in SYSTEMS:
+        place = 1 if kind == "BSDF" else 0  # behind the thickness
+        if len(primitive.strings) <= place:
+            raise primitive.fault("names no BSDF file")
+        return RadianceMaterial(name, kind, bsdf=primitive.strings[place])
+    if kind in ("glass", "dielectric"):
+        own = numbers[3] if kind == "glass" and len(numbers) > 3 else GLASS_INDEX
+        index = numbers[3] if kind == "dielectric" else own
+        return RadianceMaterial(name, kind, transmissivity=luminance(numbers), index=index)
+    if kind == "mirror":
+        return RadianceMaterial(name, kind, specular=luminance(numbers))
+    if kind in OPAQUE:
+        return _opaque(primitive)
+    return RadianceMaterial(name, kind)
+
+
+def _opaque(primitive: Primitive) -> RadianceMaterial:
+    kind, numbers = primitive.kind.removesuffix("2"), primitive.numbers
+    colour, share = luminance(numbers), numbers[3]
+    roughness = float(np.mean(numbers[4:6])) if primitive.kind.endswith("2") else numbers[4]
+    passed, straight = numbers[-2:] if kind == "trans" else (0.0, 0.0)
+    if not (colour <= 1 and share <= 1 and passed <= 1 and straight <= 1):
+        raise primitive.fault("reflects or passes more than it gets")
+    kept = colour * (1 - share)
+    return RadianceMaterial(
+        primitive.name,
+        primitive.kind,
+        diffuse=kept * (1 - passed),
+        specular=share * (colour if kind == "metal" else 1.0),
+        roughness=roughness,
+        transmitted=kept * passed * (1 - straight),
+        straight=kept * passed * straight,
+    )
+
+
+def luminance(numbers: tuple[float, ...]) -> float:
+    """Luminance of red, green and blue [1]."""
+    return float(np.dot(numbers[:3], LUMINANCE))

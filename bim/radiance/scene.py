@@ -1,0 +1,251 @@
+"""Scene files of Radiance as triangles by material: `read_radiance`."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Problem
+from bim.radiance import shapes
+from bim.radiance.generators import GENERATORS, Polygon
+from bim.radiance.materials import MATERIALS, PATTERNS, RadianceMaterial, material_of
+from bim.radiance.primitives import VOID, Command, Primitive, read_statements
+from bim.radiance.xform import Xform, read_xform
+from mitsuba_cfs.errors import DataError
+
+DEEPEST = 32  # files that call each other
+MOST_OBJECTS = 5_000_000
+PLAIN = RadianceMaterial("void", VOID)
+
+
+@dataclass(frozen=True, slots=True)
+class RadianceObject:
+    """One surface with its material."""
+
+    name: str
+    material: RadianceMaterial
+    modifiers: tuple[str, ...]  # names from the surface to its material
+    triangles: NDArray[np.float64]  # [T, 3, 3] [m], counter-clockwise seen from the front
+    primitive: Primitive
+
+
+@dataclass(frozen=True, slots=True)
+class RadianceScene:
+    """What scene files hold: surfaces, and what of the files is not used."""
+
+    objects: tuple[RadianceObject, ...]
+    files: tuple[Path, ...]  # all that were read
+    problems: tuple[Problem, ...]
+
+    def of_modifiers(self, names: Iterable[str]) -> list[RadianceObject]:
+        """The surfaces that one of these materials or modifiers colours.
+
+        Raises: `DataError` for a name that no surface has.
+        """
+        wanted = list(dict.fromkeys(names))
+        known = {modifier for thing in self.objects for modifier in thing.modifiers}
+        for name in wanted:
+            if name not in known:
+                there = ", ".join(sorted(known)[:12])
+                raise DataError(
+                    f"no surface has it; there are {there}", file=self.files[0], element=name
+                )
+        return [thing for thing in self.objects if set(thing.modifiers) & set(wanted)]
+
+
+def read_radiance(
+    *files: str | PathLike[str], scale: float = 1.0, root: str | PathLike[str] | None = None
+) -> RadianceScene:
+    """The surfaces of Radiance scene files, read one after the other as `oconv` does.
+
+    Read are polygon, sphere, bubble, cylinder, tube, cone, cup, ring, alias, all materials, and
+    the commands `xform`, `genbox` and `genprism`; the scene's `problems` name what else there is.
+    Paths in commands hold from the working directory of the files: their own folder, or `root`.
+
+    Args:
+        scale: metres in a unit of length of the files.
+        root: folder that no file may lie outside of, and that paths start from.
+
+    Raises: `DataError` with file and line for what is no scene, for files that call each other in
+        a circle or lie outside the folder, and for other commands.
+    """
+    if not files:
+        raise DataError("no scene file is given", field="files")
+    paths = [Path(file) for file in files]
+    reader = _Reader(Path(root) if root is not None else None, scale)
+    whole = Xform((np.diag([scale, scale, scale, 1.0]),), ())
+    for path in paths:
+        reader.read(path, (whole,), ())
+    return RadianceScene(tuple(reader.objects), tuple(reader.files), tuple(reader.problems()))
+
+
+class _Reader:
+    """State of one reading: the definitions so far, as later files use those of earlier ones."""
+
+    def __init__(self, root: Path | None, scale: float) -> None:
+        if not 0 < scale < np.inf:
+            raise DataError(f"must be positive, got {scale}", field="scale")
+        self.root = root
+        self.defined: dict[str, Primitive] = {}
+        self.objects: list[RadianceObject] = []
+        self.files: list[Path] = []
+        self.left_out: Counter[str] = Counter()
+        self.first: dict[str, Primitive] = {}
+
+    def read(self, path: Path, outer: tuple[Xform, ...], above: tuple[Path, ...]) -> None:
+        """Add what a file holds, in the places that the `xform`s around it give."""
+        if path.resolve() in above:
+            raise DataError(f"{path.name} calls itself", file=above[-1])
+        if len(above) >= DEEPEST:
+            raise DataError(f"more than {DEEPEST} files call each other", file=path)
+        if path not in self.files:
+            self.files.append(path)
+        for statement in read_statements(path):
+            if isinstance(statement, Command):
+                self._run(statement, outer, (*above, path.resolve()))
+            else:
+                self._take(statement, outer)
+
+    def _run(self, command: Command, outer: tuple[Xform, ...], above: tuple[Path, ...]) -> None:
+        first, *rest = command.programs
+        made: list[Primitive] = []
+        try:
+            moves = [read_xform(program) for program in reversed(rest) if _is_xform(program)]
+            if len(moves) < len(rest):
+                other = next(program for program in rest if not _is_xform(program))
+                raise ValueError(f"{other[0]} is not run; give its output")
+            if first[0] in GENERATORS:
+                made = _primitives(command, *GENERATORS[first[0]](first))
+            elif _is_xform(first):
+                moves.append(read_xform(first))
+            else:
+                raise ValueError("is not run; give its output in its place")
+        except ValueError as error:
+            raise command.fault(str(error)) from None
+        for primitive in made:
+            self._take(primitive, (*outer, *moves))
+        if _is_xform(first):
+            if not moves[-1].files:
+                raise command.fault("names no file")
+            for name in moves[-1].files:
+                self.read(self._inside(name, command), (*outer, *moves), above)
+
+    def _inside(self, name: str, command: Command) -> Path:
+        root = command.file.parent if self.root is None else self.root
+        if os.path.isabs(name):
+            raise command.fault(f"{name}: an absolute path; files are read from the scene's folder")
+        path = root / name
+        if not path.resolve().is_relative_to(root.resolve()):
+            raise command.fault(f"{name}: lies outside the scene's folder")
+        return path
+
+    def _take(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
+        kind = primitive.kind
+        if kind in shapes.KINDS:
+            self._add(primitive, outer)
+        elif kind == "alias" or kind in MATERIALS or kind in PATTERNS:
+            self.defined[primitive.name] = primitive
+        else:
+            if kind not in ("source", "instance", "mesh"):
+                self.defined[primitive.name] = primitive  # a mixture, a prism ...
+            self._leave_out(kind, primitive)
+
+    def _add(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
+        given = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
+        found = self._material(given, primitive)
+        if found is None:
+            return
+        material, modifiers = found
+        triangles = shapes.triangles_of(primitive)
+        if not len(triangles):
+            self._leave_out("surfaces without area", primitive)
+            return
+        for place in _places(outer):
+            moved = triangles @ place[:3, :3].T + place[:3, 3]
+            if np.linalg.det(place[:3, :3]) < 0:
+                moved = moved[:, ::-1]
+            if sum(x.is_inverted for x in outer) % 2:
+                moved = moved[:, ::-1]
+            if len(self.objects) >= MOST_OBJECTS:
+                raise primitive.fault(f"more than {MOST_OBJECTS} surfaces")
+            self.objects.append(
+                RadianceObject(_name(primitive, outer), material, modifiers, moved, primitive)
+            )
+
+    def _material(
+        self, modifier: str, surface: Primitive
+    ) -> tuple[RadianceMaterial, tuple[str, ...]] | None:
+        """The material at the end of a surface's modifiers; None where none is read."""
+        names: list[str] = []
+        while modifier != VOID:
+            definition = self.defined.get(modifier)
+            if definition is None:
+                raise surface.fault(f"its modifier {modifier} is not defined before it")
+            if modifier in names:
+                raise surface.fault(f"its modifier {modifier} modifies itself")
+            names.append(modifier)
+            if definition.kind == "alias":
+                modifier = definition.strings[0]
+            elif definition.kind in MATERIALS:
+                if definition.modifier != VOID:
+                    self._leave_out("patterns and textures of materials", definition)
+                return replace(material_of(definition), name=definition.name), tuple(names)
+            elif definition.kind in PATTERNS:
+                self._leave_out(definition.kind, definition)
+                modifier = definition.modifier
+            else:
+                self._leave_out(f"surfaces of {definition.kind}", surface)
+                return None
+        self._leave_out("surfaces without a material", surface)
+        return None
+
+    def _leave_out(self, what: str, primitive: Primitive) -> None:
+        self.left_out[what] += 1
+        self.first.setdefault(what, primitive)
+
+    def problems(self) -> Iterator[Problem]:
+        """What was met and not used, each kind once."""
+        for what, count in self.left_out.items():
+            first = self.first[what]
+            consequence = "plain colours stand for them" if what in PATTERNS else "left out"
+            yield Problem(
+                f"{first.file}:{first.line}", f"{what} ({count}, first {first.name})", consequence
+            )
+
+
+def _is_xform(program: Sequence[str]) -> bool:
+    return program[0] == "xform"
+
+
+def _places(outer: tuple[Xform, ...]) -> list[NDArray[np.float64]]:
+    """Every place of an object inside the given `xform`s, the outermost first."""
+    places = [np.eye(4)]
+    for xform in outer:
+        places = [place @ copy for place in places for copy in xform.copies]
+    return places
+
+
+def _name(primitive: Primitive, outer: tuple[Xform, ...]) -> str:
+    return ".".join([*(x.prefix for x in outer if x.prefix), primitive.name])
+
+
+def _primitives(command: Command, material: str, polygons: list[Polygon]) -> list[Primitive]:
+    return [
+        Primitive(
+            material,
+            "polygon",
+            name,
+            (),
+            tuple(corners.ravel().tolist()),
+            command.file,
+            command.line,
+        )
+        for name, corners in polygons
+    ]

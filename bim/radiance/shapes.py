@@ -1,0 +1,116 @@
+"""Shapes of Radiance's objects as triangles.
+
+Circles become polygons of the same area.  Source of the arguments: "The RADIANCE 5.1 Synthetic
+Imaging System", 3.1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from bim.planes import newell_normal, plane_through
+from bim.radiance.primitives import Primitive
+
+SIDES = 32  # of a circle
+SUBDIVISIONS = 2  # of an icosahedron: 320 triangles
+FLATNESS = 1e-3  # of a polygon's corners from its plane, as a share of its size
+
+INWARD = {"bubble": "sphere", "tube": "cylinder", "cup": "cone"}
+ARGUMENTS = {"sphere": 4, "cylinder": 7, "cone": 8, "ring": 8}
+KINDS = ("polygon", *ARGUMENTS, *INWARD)
+
+
+def triangles_of(primitive: Primitive) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of an object, counter-clockwise seen from its front; [0, 3, 3] if flat.
+
+    Raises: `DataError` naming file and line for wrong arguments.
+    """
+    kind = INWARD.get(primitive.kind, primitive.kind)
+    numbers = np.asarray(primitive.numbers)
+    if kind == "polygon":
+        if len(numbers) < 9 or len(numbers) % 3:
+            raise primitive.fault(
+                f"expected three numbers of each corner, got {len(numbers)} numbers"
+            )
+        return polygon_triangles(numbers.reshape(-1, 3))
+    if len(numbers) != ARGUMENTS[kind]:
+        raise primitive.fault(f"expected {ARGUMENTS[kind]} numbers, got {len(numbers)}")
+    if (numbers[6:] < 0).any() or (kind == "sphere" and numbers[3] <= 0):
+        raise primitive.fault("a radius is negative")
+    found = sphere(numbers[:3], numbers[3]) if kind == "sphere" else strip(kind, numbers)
+    return found[:, ::-1] if primitive.kind in INWARD else found
+
+
+def polygon_triangles(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A plane polygon [n, 3] as triangles, concave or with holes on seams, by cutting ears."""
+    area = newell_normal(corners)
+    size = float(np.linalg.norm(area))
+    if not size > 0:
+        return np.empty((0, 3, 3))
+    plane = plane_through(corners[0], area)
+    flat = plane.to_plane(corners)[:, :2]
+    return corners[np.array(_ears(flat), dtype=np.int64).reshape(-1, 3)]
+
+
+def _ears(flat: NDArray[np.float64]) -> list[tuple[int, int, int]]:
+    """Corners of the triangles of a counter-clockwise ring [n, 2] that may touch itself."""
+    left, found = list(range(len(flat))), []
+    smallest = 1e-12 * float(np.ptp(flat, axis=0).max()) ** 2
+    while len(left) > 2:
+        ring = flat[left]
+        before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
+        turn = _cross(ring - before, after - ring)
+        order = np.argsort(np.abs(turn) > smallest, kind="stable")  # corners on a line go first
+        for k in order:
+            a, b, c = before[k], ring[k], after[k]
+            if abs(turn[k]) <= smallest:
+                del left[k]
+                break
+            if turn[k] > 0 and not _any_within(ring, (a, b, c)):
+                found.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
+                del left[k]
+                break
+        else:
+            return found  # crosses itself; what is left has no inside
+    return found
+
+
+def _any_within(points: NDArray[np.float64], corners: tuple[NDArray[np.float64], ...]) -> bool:
+    inside = np.ones(len(points), dtype=bool)
+    for start, end in zip(corners, (*corners[1:], corners[0]), strict=True):
+        inside &= _cross(end - start, points - start) > 1e-12
+    return bool(inside.any())
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def sphere(centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """A sphere's triangles, of its area."""
+    mesh = trimesh.creation.icosphere(subdivisions=SUBDIVISIONS)
+    return mesh.triangles * (radius * np.sqrt(4 * np.pi / mesh.area)) + centre
+
+
+def strip(kind: str, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The strip between two circles; the front is outside, of a ring where its normal points."""
+    if kind == "ring":
+        start = end = numbers[:3]
+        axis, radii = numbers[3:6], numbers[6:8][::-1]
+    else:
+        start, end = numbers[:3], numbers[3:6]
+        axis, radii = end - start, (numbers[6], numbers[7] if kind == "cone" else numbers[6])
+    if not np.linalg.norm(axis) > 0:
+        return np.empty((0, 3, 3))
+    u, v, _ = plane_through(start, axis).axes
+    angles = np.linspace(0.0, 2 * np.pi, SIDES + 1)
+    size = np.sqrt((2 * np.pi / SIDES) / np.sin(2 * np.pi / SIDES))
+    round_ = size * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v)
+    low, high = start + radii[0] * round_, end + radii[1] * round_
+    first = np.stack([low[:-1], low[1:], high[1:]], axis=1)
+    second = np.stack([low[:-1], high[1:], high[:-1]], axis=1)
+    both = np.concatenate([first, second])
+    areas = np.linalg.norm(np.cross(both[:, 1] - both[:, 0], both[:, 2] - both[:, 0]), axis=1)
+    return both[areas > 0]
