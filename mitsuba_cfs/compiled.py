@@ -7,23 +7,29 @@ from collections.abc import Callable
 from numba import njit
 from numba.core.caching import IndexDataCacheFile
 
+from mitsuba_cfs.source_code import OWN, code_version
+
 
 class _OwnedCode(IndexDataCacheFile):
-    """Numba's kept code of a function, each file with the signature that it is the code of.
+    """Numba's kept code of a function, each file with the source and signature it is the code of.
 
-    Numba numbers the files in an index.  Two processes that compile a function for different
-    arguments at once give both codes one number; who called it for one then got the other's code,
-    and without an error numbers that mean nothing.
+    Numba numbers the files in an index.  Two processes that compile a function at once for
+    different arguments, or from different sources, give both codes one number; who called it for
+    one then got the other's code, and without an error numbers that mean nothing.
     """
 
     def save(self, key: object, data: object) -> None:
-        super().save(key, (key, data))
+        super().save(key, ((self._source_stamp, key), data))
 
     def load(self, key: object) -> object:
         match super().load(key):
-            case (owner, data) if owner == key:
+            case (owner, data) if owner == (self._source_stamp, key):
                 return data
         return None  # another's, or of an older form: compiled again
+
+    def kept(self) -> bool:
+        """Whether code of this source is there, for any arguments."""
+        return any(self.load(key) is not None for key in self._load_index())
 
 
 def compiled(compiler: Callable = njit, /, *arguments, **options) -> Callable[[Callable], Callable]:
@@ -31,6 +37,8 @@ def compiled(compiler: Callable = njit, /, *arguments, **options) -> Callable[[C
 
     That is `__pycache__` beside the module, else (a read-only install) the user's cache folder, or
     the one that NUMBA_CACHE_DIR names; where none can be written, each process compiles anew.
+    Code is found again while its module and all that this imports, whose functions may be inlined
+    into it, are as they were.
     """
 
     def decorator(function: Callable) -> Callable:
@@ -39,7 +47,18 @@ def compiled(compiler: Callable = njit, /, *arguments, **options) -> Callable[[C
         except RuntimeError:  # numba: no locator available
             return compiler(*arguments, **options)(function)
         if compiler is njit:  # the others are given their one signature
-            kept._cache._cache_file.__class__ = _OwnedCode
+            file, module = kept._cache._cache_file, function.__module__
+            file.__class__ = _OwnedCode
+            if module.partition(".")[0] in OWN:  # numba goes by the age of the function's own file
+                file._source_stamp = code_version(module)
         return kept
 
     return decorator
+
+
+def must_compile(function: Callable) -> bool:
+    """Whether the first call of a compiled function will compile it."""
+    if function.signatures:
+        return False
+    file = getattr(function._cache, "_cache_file", None)  # none where nothing can be kept
+    return file is None or not file.kept()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -56,41 +56,48 @@ def import_closure(modules: tuple[str, ...], root: Path = ROOT) -> frozenset[str
         found.add(name)
         file = _file(name, root)
         if file is not None:
-            waiting += _imported(_tree(file), root)
+            waiting += _imported(file.read_bytes(), root)
     return frozenset(found)
 
 
-def _tree(file: Path) -> ast.Module:
-    return ast.parse(file.read_bytes(), str(file))
+def _imported(source: bytes, root: Path) -> Iterator[str]:
+    """What a source imports: own modules whole, of other packages the first name."""
+    for module, name in _import_statements(source):
+        whole = f"{module}.{name}"
+        own = bool(name) and module.partition(".")[0] in OWN
+        yield from _modules(whole if own and _file(whole, root) is not None else module, root)
 
 
-def _imported(tree: ast.AST, root: Path) -> Iterator[str]:
-    """What a module imports: own modules whole, of other packages the first name."""
-    for node in _computing(tree):
+@cache
+def _import_statements(source: bytes) -> tuple[tuple[str, str], ...]:
+    """What a source imports, as (module, name in it); no name for `import module`."""
+    found: list[tuple[str, str]] = []
+    for node in _computing(ast.parse(source), b"import_module" in source):
         if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield from _modules(alias.name, root)
+            found += ((alias.name, "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            for alias in node.names:
-                whole = f"{node.module}.{alias.name}"
-                own = node.module.partition(".")[0] in OWN
-                is_module = own and _file(whole, root) is not None
-                yield from _modules(whole if is_module else node.module, root)
+            found += ((node.module, alias.name) for alias in node.names)
         elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
             if ast.unparse(node.func).rpartition(".")[2] == "import_module":
-                yield from _modules(str(node.args[0].value), root)
+                found.append((str(node.args[0].value), ""))
+    return tuple(dict.fromkeys(found))
 
 
-def _computing(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a module without what stands under `if TYPE_CHECKING`."""
-    yield node
-    children: Iterable[ast.AST]
-    if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-        children = node.orelse
-    else:
-        children = ast.iter_child_nodes(node)
-    for child in children:
-        yield from _computing(child)
+def _computing(tree: ast.Module, expressions: bool) -> Iterator[ast.AST]:
+    """The statements of a module without what stands under `if TYPE_CHECKING`.
+
+    Args: expressions: with these too; they are nine tenths of a module.
+    """
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            waiting += node.orelse
+        elif expressions:
+            waiting += ast.iter_child_nodes(node)
+        else:
+            waiting += (n for n in ast.iter_child_nodes(node) if not isinstance(n, ast.expr))
 
 
 def _modules(name: str, root: Path) -> Iterator[str]:

@@ -15,6 +15,7 @@ llvm.select_library()
 REPOSITORY = Path(__file__).parent.parent
 REAL_DATA = REPOSITORY.parent / "shared" / "data"
 REFERENCE_DATA = REPOSITORY.parent / "shared" / "reference"
+WINDOW_GLAZING = REPOSITORY / "tests" / "reference" / "window_glazing"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.compiled import compiled
 from thermal.network import GROUND, OUTDOOR, PARTITION, PARTNER, TWIN, WINDOW, Network
 from thermal.records import (
     AIR_HEAT,
+    ENTRY,
     TERMS,
     Drive,
     Means,
@@ -15,7 +17,6 @@ from thermal.records import (
     OutdoorConditions,
     State,
     Workspace,
-    compiled,
     inlined,
 )
 from thermal.step import step
@@ -92,7 +93,7 @@ def _move_nodes(net: Network, i: int, state: State, work: Workspace) -> float:
     return stored
 
 
-@compiled
+@compiled(**ENTRY)
 def advance(
     net: Network,
     state: State,

@@ -5,10 +5,6 @@ N inside faces, M inner nodes of walls, Z zones, W windows, H hours, T time step
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -25,41 +21,9 @@ TERMS += ("facade", "windows", "partitions", "storage")  # [W] into the zone; st
 # that is nine tenths of a run.  So nothing that is compiled allocates, and all but the entry point
 # in `kernel` is inlined: by LLVM, which takes half as long as numba's `inline="always"`, where a
 # function is typed anew wherever it is called; and without what Python would call it by.
-_OPTIONS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-INLINED = _OPTIONS | {"forceinline": True, "no_cpython_wrapper": True}
+ENTRY = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+INLINED = ENTRY | {"forceinline": True, "no_cpython_wrapper": True}
 inlined = njit(**INLINED)
-
-
-def compiled(entry: Callable) -> Callable:
-    """The compiled entry point, kept on disk where a folder for it can be written.
-
-    That is `__pycache__` beside the module, else (a read-only install) the user's cache folder, or
-    the one that NUMBA_CACHE_DIR names.
-    """
-    try:
-        kept = njit(**_OPTIONS, cache=True)(entry)
-    except RuntimeError:  # numba: no locator available
-        return njit(**_OPTIONS)(entry)
-    _drop_stale_cache(Path(inspect.getfile(entry)), Path(kept.stats.cache_path))
-    return kept
-
-
-def must_compile(entry: Callable) -> bool:
-    """Whether the first call of a compiled entry point will compile it."""
-    if entry.signatures:
-        return False
-    folder = entry.stats.cache_path
-    name = f"{Path(inspect.getfile(entry.py_func)).stem}.{entry.py_func.__name__}-*.nbc"
-    return folder is None or not any(Path(folder).glob(name))
-
-
-def _drop_stale_cache(entry: Path, folder: Path) -> None:
-    """Remove cached code of a module that is older than one of the modules inlined into it."""
-    with suppress(OSError):
-        newest = max(source.stat().st_mtime for source in entry.parent.glob("*.py"))
-        for file in folder.glob(f"{entry.stem}.*.nb[ic]"):
-            if file.stat().st_mtime < newest:
-                file.unlink(missing_ok=True)
 
 
 class OutdoorConditions(NamedTuple):

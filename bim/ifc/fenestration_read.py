@@ -31,7 +31,7 @@ from bim.ifc.fenestration_write import (
     TREE,
     U_MODEL,
 )
-from bim.ifc.project import open_ifc
+from bim.ifc.project import definitions_of, open_ifc
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
@@ -85,14 +85,7 @@ def read_states(
 
 
 def _own_sets(source: Entity | None) -> Iterable[Entity]:
-    if source is None:
-        return
-    sets = list(getattr(source, "HasPropertySets", None) or ())
-    for relation in getattr(source, "IsDefinedBy", None) or ():
-        definition = getattr(relation, "RelatingPropertyDefinition", None)
-        if definition is not None:
-            sets.append(definition)
-    for one in sets:
+    for one in definitions_of(source):
         name = one.Name or ""
         if one.is_a("IfcPropertySet") and (name == SET_NAME or name.startswith(f"{SET_NAME}:")):
             yield one

@@ -10,7 +10,7 @@ import ifcopenshell.util.unit
 import numpy as np
 
 from bim.apertures import Filling
-from bim.ifc.project import psets_of
+from bim.ifc.project import definitions_of, psets_of
 from bim.ifc.shapes import Shape
 from bim.model import Problem
 from bim.planes import area_vectors
@@ -127,10 +127,7 @@ def _frame_width(element, element_type, scale: float) -> float | None:
     """Lining thickness and panel frame thickness together [m], where stated."""
     total = 0.0
     for source in (element_type, element):
-        sets = list(getattr(source, "HasPropertySets", None) or ())
-        for relation in getattr(source, "IsDefinedBy", None) or ():
-            definition = getattr(relation, "RelatingPropertyDefinition", None)
-            sets += [definition] if definition is not None else []
+        sets = definitions_of(source)
         for one in sets:
             if one.is_a("IfcWindowLiningProperties"):
                 total += (one.LiningThickness or 0.0) * scale

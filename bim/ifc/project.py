@@ -231,10 +231,39 @@ def parent_of(
     return None
 
 
+def definitions_of(
+    holder: ifcopenshell.entity_instance | None,
+) -> list[ifcopenshell.entity_instance]:
+    """Property and quantity sets of an element or of a type itself."""
+    found = list(getattr(holder, "HasPropertySets", None) or ())
+    for relation in getattr(holder, "IsDefinedBy", None) or ():
+        definition = getattr(relation, "RelatingPropertyDefinition", None)
+        if definition is not None and definition.is_a("IfcPropertySetDefinitionSet"):
+            found += definition.wrappedValue
+        elif definition is not None:
+            found.append(definition)
+    return found
+
+
 def psets_of(element: ifcopenshell.entity_instance) -> dict[str, dict]:
-    """Property and quantity sets of an element and its type; empty where they cannot be read."""
+    """Properties and quantities, by the name of their set, of an element and its type.
+
+    Empty where they cannot be read.  Complex properties are left out: through the numbers of a
+    BSDF it takes a second.
+    """
+    found: dict[str, dict] = {}
     try:
-        psets = ifcopenshell.util.element.get_psets(element)
-        return {name: values for name, values in psets.items() if name is not None}
+        for holder in (ifcopenshell.util.element.get_type(element), element):
+            for definition in definitions_of(holder):
+                if definition.Name is not None:
+                    found.setdefault(definition.Name, {}).update(_plain_values(definition))
     except Exception:  # damaged property sets must not stop the geometry
         return {}
+    return found
+
+
+def _plain_values(definition: ifcopenshell.entity_instance) -> dict[str, object]:
+    if definition.is_a("IfcPropertySet"):
+        plain = [p for p in definition.HasProperties or () if not p.is_a("IfcComplexProperty")]
+        return ifcopenshell.util.element.get_properties(plain)
+    return ifcopenshell.util.element.get_property_definition(definition)

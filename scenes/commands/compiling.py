@@ -17,8 +17,8 @@ def compiled_beside() -> Iterator[None]:
     It keeps what it compiles where this process looks for it; too late or failed, this one compiles
     for itself.
     """
+    from mitsuba_cfs.compiled import must_compile
     from thermal.kernel import advance
-    from thermal.records import must_compile
 
     if not must_compile(advance) or advance.stats.cache_path is None:
         yield

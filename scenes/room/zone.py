@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bim.model import Space
 from bim.to_thermal import ThermalRoom, coupled_rooms, door_links
+from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
@@ -20,7 +21,6 @@ from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.gains import dimmed_share, split_gains
 from thermal.kernel import advance
-from thermal.records import must_compile
 from thermal.zone import Gains, Zone
 
 FloatArray = NDArray[np.float64]

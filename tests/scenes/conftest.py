@@ -9,6 +9,11 @@ from pathlib import Path
 import pytest
 
 from tests.scenes.quick_work import quick_work
+from tests.scenes.small_box import blind as blind  # fixtures
+from tests.scenes.small_box import glass as glass
+from tests.scenes.small_box import milk as milk
+from tests.scenes.small_box import skies as skies
+from tests.scenes.small_box import weather as weather
 from tests.scenes.writing_jobs import JOBS, Place
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import ifcopenshell
@@ -37,8 +38,26 @@ def grey(share: float) -> KlemsBsdf:
     return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, passed, passed, back, back)
 
 
+_MADE: dict[tuple, bytes] = {}
+
+
+def once(path: Path, key: tuple, make: Callable[[], object]) -> Path:
+    """The file that `make` writes; copied from the second time on, as a BSDF takes it seconds."""
+    if key in _MADE:
+        path.write_bytes(_MADE[key])
+    else:
+        make()
+        _MADE[key] = path.read_bytes()
+    return path
+
+
 def room(path: Path, stated: dict | None = None, *, schema: str = "IFC4", typed=False) -> Path:
     """A room with one window whose property sets, or its type's, hold the stated values."""
+    key = ("room", repr(stated), schema, typed)
+    return once(path, key, lambda: _write_room(path, stated, schema, typed))
+
+
+def _write_room(path: Path, stated: dict | None, schema: str, typed: bool) -> None:
     model = box_room(schema)
     (window,) = model.by_type("IfcWindow")
     holder = window
@@ -50,12 +69,12 @@ def room(path: Path, stated: dict | None = None, *, schema: str = "IFC4", typed=
         pset = ifcopenshell.api.pset.add_pset(model, product=holder, name=name)
         ifcopenshell.api.pset.edit_pset(model, pset=pset, properties=dict(values))
     model.write(str(path))
-    return path
 
 
 def with_attached(path: Path, share: float, *, name: str = "", by_type=False, **heat) -> Path:
     """The model with a grey diffuser attached to its window, or to the window's type."""
     bands = {"Visible": grey(share), "Solar": grey(share)}
     targets = Targets(types=["fixed pane"]) if by_type else Targets(every_window=True)
-    attach(path, path, ShadingState(name, bands, **heat), targets)
-    return path
+    state = ShadingState(name, bands, **heat)
+    key = (path.read_bytes(), share, name, by_type, repr(heat))
+    return once(path, key, lambda: attach(path, path, state, targets))

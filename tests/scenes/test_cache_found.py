@@ -31,7 +31,7 @@ cells = 60
 
 def run_arguments(folder: Path) -> list[str]:
     files = [str(OFFICE), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND)]
-    return ["run", *files, "--space", "A", "--quick"]
+    return ["run", *files, "--space", "A", "--quick", "--size", "64", "--spacing", "2"]
 
 
 def thermal_arguments(folder: Path) -> list[str]:
@@ -49,18 +49,21 @@ def study_arguments(folder: Path) -> list[str]:
     return ["study", str(study_file(folder))]
 
 
+OF_A_RUN = {
+    "absorption-matrix", "cell-daylight", "daylight-matrix", "direct-sun", "escape",
+    "sky-irradiance", "straight-view", "view-matrix", "view-pictures", "window-exchange",
+}  # fmt: skip
 COMMANDS = {
-    "run": (run_arguments, {"view-matrix", "daylight-matrix", "escape"}),
+    "run": (run_arguments, OF_A_RUN),
     "thermal": (thermal_arguments, {"absorption-matrix", "daylight-matrix", "sky-irradiance"}),
     "pv": (pv_arguments, {"sky-irradiance"}),
     "study": (study_arguments, {"view-matrix", "daylight-matrix", "escape"}),
 }
 
 
-# quick: the light of a run and the heat of a study; pv and study find by the same cache
+# quick: a run keeps what the others do, and they find by the same cache
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.slow if n in {"pv", "study"} else ()) for n in COMMANDS],
+    "name", [pytest.param(n, marks=() if n == "run" else pytest.mark.slow) for n in COMMANDS]
 )
 def test_the_second_time_everything_is_found(tmp_path, name):
     """In another folder of results, with other hash seeds; a kept file that is written anew would

@@ -22,7 +22,15 @@ from scenes.fenestration.resolver import fill_windows
 from scenes.fenestration.systems import FenestrationSystem, Given, read_system
 from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
-from tests.scenes.fenestration_models import COMMON, GLAZING, STATED, grey, room, with_attached
+from tests.scenes.fenestration_models import (
+    COMMON,
+    GLAZING,
+    STATED,
+    grey,
+    once,
+    room,
+    with_attached,
+)
 
 TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2",
         "--method", "three-phase"]  # fmt: skip
@@ -49,8 +57,16 @@ def normal(system: FenestrationSystem) -> tuple[float, float]:
     )
 
 
-@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
-@pytest.mark.parametrize("typed", [False, True], ids=["window", "type"])
+# each schema and each holder once; all pairs with the slow tests
+@pytest.mark.parametrize(
+    ("schema", "typed"),
+    [
+        pytest.param("IFC2X3", False, id="IFC2X3-window"),
+        pytest.param("IFC4", True, id="IFC4-type"),
+        pytest.param("IFC2X3", True, id="IFC2X3-type", marks=pytest.mark.slow),
+        pytest.param("IFC4", False, id="IFC4-window", marks=pytest.mark.slow),
+    ],
+)
 def test_each_rung_goes_before_the_next(tmp_path, schema, typed) -> None:
     path = room(tmp_path / "room.ifc", STATED, schema=schema, typed=typed)
     stated = filled(path)
@@ -166,8 +182,15 @@ def test_a_command_without_a_system_says_what_to_give(tmp_path, capsys, command)
     assert ("a [[system]]" if command in ("thermal", "study") else "--cfs FILE") in said
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("rung", ["attached", "stated"])
+# `fill_windows` finds the rung for all: each command with the one, and one with the other
+@pytest.mark.parametrize(
+    ("rung", "command"),
+    [("attached", command) for command in COMMANDS]
+    + [
+        pytest.param("stated", command, marks=() if command == "thermal" else pytest.mark.slow)
+        for command in COMMANDS
+    ],
+)
 def test_a_command_takes_what_the_model_holds_and_says_so(tmp_path, capsys, command, rung) -> None:
     path = room(tmp_path / "room.ifc", STATED)
     if rung == "attached":
@@ -189,6 +212,7 @@ def test_a_command_takes_what_the_model_holds_and_says_so(tmp_path, capsys, comm
         assert list(record["fenestration"].values()) == ["held by the building's file"]
 
 
+@pytest.mark.slow  # quick: a room whose windows differ, below
 def test_run_and_study_on_the_same_attached_data_agree(tmp_path) -> None:
     path = with_attached(room(tmp_path / "room.ifc", STATED), 0.3, u_value=1.1, g_normal=0.4)
     assert run(words_of("run", path, tmp_path)) == 0
@@ -213,15 +237,18 @@ def test_a_demo_file_is_taken_only_without_a_building_and_is_said(tmp_path, caps
 @pytest.fixture
 def two_systems(tmp_path) -> Path:
     """A room with a bright diffuser in one window and a dark one in the other."""
-    path = tmp_path / "two.ifc"
-    box_room(places=[(0.4, 0.9, 1.4, 1.5), (2.2, 0.9, 1.4, 1.5)]).write(str(path))
-    for number, window in enumerate(read_ifc(path).windows):
-        share = (0.6, 0.05)[number]
-        file = tmp_path / f"{number}.xml"
-        write_bsdf_xml(BsdfFile({"Visible": grey(share), "Solar": grey(share)}, str(share)), file)
-        words = ["--window", window.guid, "--bsdf", file, "--u", "1.1", "-o", path]
-        assert run([str(word) for word in ("ifc", "attach", path, *words)]) == 0
-    return path
+    path, shares = tmp_path / "two.ifc", (0.6, 0.05)
+    for number, share in enumerate(shares):
+        bands = {"Visible": grey(share), "Solar": grey(share)}
+        write_bsdf_xml(BsdfFile(bands, str(share)), tmp_path / f"{number}.xml")
+
+    def make() -> None:
+        box_room(places=[(0.4, 0.9, 1.4, 1.5), (2.2, 0.9, 1.4, 1.5)]).write(str(path))
+        for number, window in enumerate(read_ifc(path).windows):
+            words = ["--window", window.guid, "--bsdf", tmp_path / f"{number}.xml", "--u", "1.1"]
+            assert run([str(word) for word in ("ifc", "attach", path, *words, "-o", path)]) == 0
+
+    return once(path, ("two systems",), make)
 
 
 def test_windows_of_one_room_may_have_different_systems(two_systems, tmp_path, capsys) -> None:
@@ -261,6 +288,8 @@ def test_a_study_takes_each_windows_own_system_as_a_run_does(two_systems, tmp_pa
     used = one[[8 <= hour < 18 for hour in pd.to_datetime(
         pd.read_csv(tmp_path / "run" / "temperatures.csv")["time"]).dt.hour]]  # fmt: skip
     assert other["operative_max_c"] == pytest.approx(used.max(), rel=1e-5)
+    da = pd.read_csv(tmp_path / "run" / "room_metrics.csv")["da300"].iloc[0]
+    assert other["da300"] == pytest.approx(da, rel=1e-5)
     assert "Window W1: W1" in other["fenestration"] and "Window W2: W2" in other["fenestration"]
 
 
@@ -321,8 +350,8 @@ def test_the_mitsuba_scene_is_lit_through_its_bsdf(tmp_path, variant) -> None:
         out = tmp_path / str(number)
         assert run(["ifc", "export", str(path), "--mitsuba", str(out)]) == 0
         (scene,) = out.rglob("scene.xml")
-        means.append(float(np.array(mi.render(mi.load_file(str(scene)), spp=4)).mean()))
-    # twice the transmittance, a little more for what the window throws back: 4 x 512^2 paths
+        means.append(float(np.array(mi.render(mi.load_file(str(scene)), spp=1)).mean()))
+    # twice the transmittance, a little more for what the window throws back: 512^2 paths
     assert means[1] == pytest.approx(2 * means[0], rel=0.05)
 
 

@@ -191,7 +191,7 @@ def test_the_balance_is_compiled_beside_only_where_it_must_be(
         return real([command[0], "-c", "pass"], **options)
 
     monkeypatch.setattr(compiling.subprocess, "Popen", begin)
-    monkeypatch.setattr("thermal.records.must_compile", lambda entry: not compiled_already)
+    monkeypatch.setattr("mitsuba_cfs.compiled.must_compile", lambda entry: not compiled_already)
     with compiling.compiled_beside():
         pass
     assert len(begun) == (not compiled_already)

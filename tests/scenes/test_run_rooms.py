@@ -1,66 +1,29 @@
-"""The main job on a small box: methods against each other, states, kept matrices, equal rooms."""
+"""The main job on a small box: methods against each other, states, kept matrices."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from bim.model import Building, Element
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.bsdf.evaluate import direct_hemispherical
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import silent
-from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.weather import Weather
-from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.room.annual import worst_hours
 from scenes.room.control import shading_states
-from scenes.room.equal_rooms import moved_result, same_light, same_systems
 from scenes.room.operation import check_states, read_operation
-from scenes.room.options import RoomOptions
-from scenes.room.room import compute_room, skies_for
+from scenes.room.room import compute_room
 from scenes.room.windows import in_all_windows, room_windows
-from scenes.run.options import JobOptions
+from tests.scenes.small_box import BOX, HOURS, ROOM, SMALL, clear
 
 pytestmark = pytest.mark.early
-
-HOURS = (2122, 4092, 4096, 8460)  # March 30 10 h, June 20 12 h and 16 h, December 19 12 h
-SMALL = RoomOptions.of(
-    sensor_spacing=1.0, sensor_samples=8192, patch_samples=4096, sun_points=512,
-    path_samples=16384, picture_size=96, picture_samples=8, sky_subdivision=1,
-)  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def weather() -> Weather:
-    return read_epw(WEATHER)
-
-
-@pytest.fixture(scope="module")
-def blind() -> FenestrationSystem:
-    return read_system(VENETIAN_BLIND)
-
-
-@pytest.fixture(scope="module")
-def glass() -> FenestrationSystem:
-    return clear("clear", 0.8)
-
-
-def clear(name: str, tau: float) -> FenestrationSystem:
-    """A pane that passes the share `tau` of all light straight on and reflects a tenth."""
-    omega = KLEMS_FULL.projected_solid_angles()
-    through, back = np.diag(tau / omega), np.diag(0.1 / omega)
-    klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, back, back)
-    return FenestrationSystem(name, klems, klems, u_value=2.0, g_value=min(tau + 0.05, 0.87))
 
 
 def shut(system: FenestrationSystem) -> FenestrationSystem:
@@ -74,31 +37,9 @@ def shut(system: FenestrationSystem) -> FenestrationSystem:
 
 
 @pytest.fixture(scope="module")
-def milk() -> FenestrationSystem:
-    """A pane that scatters the same to all sides."""
-    even = np.full((KLEMS_FULL.size, KLEMS_FULL.size), 0.5 / np.pi)
-    nothing = np.zeros_like(even)
-    klems = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, even, even, nothing, nothing)
-    return FenestrationSystem("milk", klems, klems, u_value=2.0)
-
-
-@pytest.fixture(scope="module")
-def skies(weather) -> AnnualSky:
-    """The skies of a few hours, as if the others were dark."""
-    return only(skies_for(weather, SMALL.method, SMALL.sampling), HOURS)
-
-
-def only(skies: AnnualSky, hours: tuple[int, ...]) -> AnnualSky:
-    chosen = np.searchsorted(skies.lit, hours)
-    assert np.array_equal(skies.lit[chosen], hours)
-    return skies.part(chosen)
-
-
-BOX = shoebox(
-    3.0, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5),),
-    reflectance={"wall": 0.3, "floor": 0.1, "ceiling": 0.4},
-)  # fmt: skip
-ROOM = BOX.spaces[0]
+def through_glass(variant, weather, skies, glass) -> np.ndarray:
+    """Illuminance [hours, S] by the five-phase method."""
+    return light("five-phase", glass, weather, skies)
 
 
 def light(method: str, system: FenestrationSystem, weather, skies, **more) -> np.ndarray:
@@ -112,29 +53,31 @@ def light(method: str, system: FenestrationSystem, weather, skies, **more) -> np
 
 
 @pytest.mark.parametrize("name", ["milk", "glass"])
-def test_five_phase_is_what_paths_find(variant, name, weather, skies, milk, glass) -> None:
+def test_five_phase_is_what_paths_find(name, weather, skies, milk, glass, through_glass) -> None:
     """Systems that are even over the Klems patches; paths have 1 to 2 % noise at a sensor."""
     system = {"milk": milk, "glass": glass}[name]
-    five, paths = (light(m, system, weather, skies) for m in ("five-phase", "point-in-time"))
+    five = through_glass if name == "glass" else light("five-phase", milk, weather, skies)
+    paths = light("point-in-time", system, weather, skies)
     np.testing.assert_allclose(five.mean(axis=1), paths.mean(axis=1), rtol=0.03)
 
 
-def test_three_phase_blurs_the_sun_through_glass(variant, weather, skies, glass) -> None:
+def test_three_phase_blurs_the_sun_through_glass(through_glass, weather, skies, glass) -> None:
     """Sun falls on some sensors and not on others; the three-phase method spreads it."""
-    five, three = (light(m, glass, weather, skies) for m in ("five-phase", "three-phase"))
+    five, three = through_glass, light("three-phase", glass, weather, skies)
     assert five[3].max() / five[3].min() > 3 * three[3].max() / three[3].min()  # low winter sun
     assert five.min() >= 0
 
 
-def test_kept_matrices_serve_other_systems(variant, tmp_path, weather, skies, blind, glass) -> None:
+def test_kept_matrices_serve_other_systems(
+    through_glass, tmp_path, weather, skies, blind, glass
+) -> None:
     cache = MatrixCache(tmp_path)
-    fresh = light("five-phase", glass, weather, skies)
     light("five-phase", blind, weather, skies, cache=cache)
     traced = {path.name for path in tmp_path.iterdir()}
     kept = light("five-phase", glass, weather, skies, cache=cache)
     added = {path.name.rsplit("-", 1)[0] for path in tmp_path.iterdir() if path.name not in traced}
     assert added <= {"direct-sun", "absorption-matrix"}, "V and D do not depend on the system"
-    np.testing.assert_array_equal(kept, fresh)
+    np.testing.assert_array_equal(kept, through_glass)
 
 
 def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, glass) -> None:
@@ -290,99 +233,6 @@ def test_rules_of_the_control(tmp_path, weather) -> None:
     by_dgp = states('[control]\nrule = "glare"\nlimit_dgp = 0.4', lambda: picture)
     assert np.flatnonzero(by_dgp).tolist() == [300] and by_dgp[300] == 1
     assert len(by_dgp) == len(hours)
-
-
-def moved(building: Building, offset: tuple[float, float, float], name: str):
-    """The building's room somewhere else, under another name."""
-    space = building.spaces[0]
-    faces = tuple(replace(f, triangles=f.triangles + offset) for f in space.faces)
-    windows = tuple(
-        replace(w, triangles=w.triangles + offset, guid=f"{w.guid}-{name}") for w in space.windows
-    )
-    return replace(space, faces=faces, windows=windows, guid=f"{name}-guid", name=name)
-
-
-def test_an_equal_room_has_the_results_of_its_template(
-    variant, weather, skies, glass, blind
-) -> None:
-    """Shifted, the room is computed anew to the same numbers; what shades one alone tells them."""
-    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
-    building = replace(BOX, spaces=(ROOM, twin))
-    systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
-    assert same_systems(ROOM, twin, systems)
-    assert not same_systems(ROOM, twin, in_all_windows(ROOM, glass) | in_all_windows(twin, blind))
-    assert same_light(building, ROOM, twin, SMALL.sampling, None)
-    wall = np.array([[[8, -2, 0], [14, -2, 0], [14, -2, 6]]], dtype=float)
-    shaded = replace(building, elements=(Element("w", "wall", "IfcWall", wall, 0.2, 0.2),))
-    assert not same_light(shaded, ROOM, twin, SMALL.sampling, None)
-
-    options = SMALL.changed(sensor_samples=2048)
-    one, other = (
-        compute_room(building, s, systems, weather, options, skies=skies, pictures=False)
-        for s in (ROOM, twin)
-    )
-    given = moved_result(one, twin)
-    assert given.template == "room" and given.space is twin
-    np.testing.assert_allclose(given.daylight.points, other.daylight.points, atol=1e-9)
-    np.testing.assert_allclose(given.glare.view.position, other.glare.view.position, atol=1e-9)
-    mean = given.daylight.illuminance.mean(axis=0)
-    # the same random numbers; single paths go another way by rounding of coordinates
-    np.testing.assert_allclose(mean, other.daylight.illuminance.mean(axis=0), rtol=0.03)
-
-
-def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeypatch) -> None:
-    from scenes.run import run
-
-    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
-    other = shoebox(2.5, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 1.5, 1.5),), name="other")
-    spaces = [ROOM, *other.spaces, twin]
-    building = replace(BOX, spaces=tuple(spaces))
-    systems = {w.guid: (glass,) for s in spaces for w in s.windows}
-    computed = []
-
-    def noted(building, space, *others, **options):
-        computed.append(space.name)
-        return compute_room(building, space, *others, **options, pictures=False)
-
-    monkeypatch.setattr(run, "compute_room", noted)
-    room = RoomOptions.of(
-        method="three-phase", sky_subdivision=1, sensor_spacing=2.0,
-        sensor_samples=1024, patch_samples=1024,
-    )  # fmt: skip
-    options = JobOptions(Path(), Path(), cache=False, room=room)
-    inputs = run.JobInputs(building, spaces, weather, systems, None)
-    results, problems, notes = run._rooms(inputs, skies, options, silent)
-    assert computed == ["room", "other"] and not problems
-    assert [r.space.name for r in results] == ["room", "other", "twin"]
-    assert [r.template for r in results] == ["", "", "room"]
-    assert len(notes) == 1 and "twin" in notes[0] and "room" in notes[0]
-
-
-def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
-    variant, tmp_path, weather, skies, glass, monkeypatch
-) -> None:
-    from scenes.run import run
-
-    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
-    building = replace(BOX, spaces=(ROOM, twin))
-    systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
-    computed = []
-
-    def noted(building, space, *others, **options):
-        computed.append(space.name)
-        return SimpleNamespace(template="", space=space)
-
-    monkeypatch.setattr(run, "compute_room", noted)
-    monkeypatch.setattr(run, "moved_result", lambda result, space: result)
-    options = JobOptions(Path(), Path(), cache=False, room=SMALL)
-    path = tmp_path / "operation.toml"
-    cooler = '[[rooms]]\nspaces = ["twin"]\n[rooms.loads]\nheating_c = 16\n'
-    for rooms, names in (("", ["room"]), (cooler, ["room", "twin"])):
-        path.write_text(f"[loads]\nheating_c = 20\n{rooms}")
-        inputs = run.JobInputs(building, [ROOM, twin], weather, systems, read_operation(path))
-        run._rooms(inputs, skies, options, silent)
-        assert computed == names
-        computed.clear()
 
 
 def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glass) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import logging
 
 import numpy as np
 import pytest
 
+from tests.conftest import WINDOW_GLAZING
 from thermal.blackbox import (
     Fenestration,
     LayerResistance,
@@ -89,10 +91,8 @@ def test_linear_u_is_fener_s_line():
     assert r.at(24.0, 3.0) == pytest.approx(1 / (1.2 * (1 + 0.0065 * 14)) - 0.17, abs=DIGITS)
 
 
-def test_conductance_surface_fits_the_reference_double_glazing(reference_data):
-    import json
-
-    states = json.loads((reference_data / "energyplus" / "blackbox_R.json").read_text())
+def test_conductance_surface_fits_the_reference_double_glazing():
+    states = json.loads((WINDOW_GLAZING / "blackbox_R.json").read_text())
     points = states["dgu"]
     mean = np.array([(p["Tso"] + p["Tsi"]) / 2 for p in points])
     d = np.array([p["Tsi"] - p["Tso"] for p in points])

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.conftest import WINDOW_GLAZING
 from thermal.errors import ThermalInputError
 from thermal.glazing import (
     Gap,
@@ -41,8 +42,8 @@ def test_en673_gives_the_u_values_of_catalogues(panes, gap, count, expected):
     assert en673_u_value(panes, [gap] * count) == pytest.approx(expected, abs=0.005)
 
 
-def test_en410_agrees_with_window_s_engine(reference_data):
-    data = json.loads((reference_data / "energyplus" / "blackbox_dgu.json").read_text())
+def test_en410_agrees_with_window_s_engine():
+    data = json.loads((WINDOW_GLAZING / "blackbox_dgu.json").read_text())
     normal = data["angular"][0]
     gap = 1 / Gap(0.016, ARGON, (0.84, 0.05)).conductance(15.0) + 0.006
     g = en410_g_value(normal["tau"], normal["alpha_layers"], [gap])
@@ -56,8 +57,8 @@ def test_roos_factor():
     np.testing.assert_allclose(roos_angular_factor([0.0, np.pi / 2]), [1.0, 0.0], atol=1e-12)
 
 
-def test_roos_factor_follows_the_reference_glazing(reference_data):
-    data = json.loads((reference_data / "energyplus" / "blackbox_dgu.json").read_text())
+def test_roos_factor_follows_the_reference_glazing():
+    data = json.loads((WINDOW_GLAZING / "blackbox_dgu.json").read_text())
     theta = np.radians([row["theta"] for row in data["angular"]])
     g = np.array([row["g"] for row in data["angular"]])
     model = g[0] * roos_angular_factor(theta, panes=2, category=3)

@@ -13,21 +13,6 @@ import pytest
 from tests.thermal.rooms import box, climate, sun
 from thermal.balance import simulate
 from thermal.blackbox import Fenestration
-from thermal.records import _drop_stale_cache
-
-
-def test_cached_code_older_than_an_inlined_module_is_dropped(tmp_path: Path):
-    cache = tmp_path / "__pycache__"
-    cache.mkdir()
-    entry, inlined, code = tmp_path / "kernel.py", tmp_path / "step.py", cache / "kernel.f-1.nbc"
-    for age, path in ((300, entry), (200, inlined), (100, code)):
-        path.touch()
-        os.utime(path, (time.time() - age,) * 2)
-    _drop_stale_cache(entry, cache)
-    assert code.exists()
-    inlined.touch()
-    _drop_stale_cache(entry, cache)
-    assert not code.exists()
 
 
 def test_a_year_at_ten_minutes_takes_a_fraction_of_a_second():
@@ -43,13 +28,14 @@ def test_a_year_at_ten_minutes_takes_a_fraction_of_a_second():
 
 COMPILE = """
 import time
+from mitsuba_cfs.compiled import must_compile
 from tests.thermal.rooms import box, climate, sun
-from thermal import kernel, records
+from thermal import kernel
 from thermal.balance import simulate
 zone = box()
-waits, start = records.must_compile(kernel.advance), time.process_time()
+waits, start = must_compile(kernel.advance), time.process_time()
 simulate(zone, climate(24), sun(24, zone))
-print(waits, time.process_time() - start, records.must_compile(kernel.advance))
+print(waits, time.process_time() - start, must_compile(kernel.advance))
 """
 
 

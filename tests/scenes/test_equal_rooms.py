@@ -1,0 +1,113 @@
+"""Rooms that are equal but for their place are computed once, and given the result each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from bim.model import Building, Element
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.progress import silent
+from scenes.room.equal_rooms import moved_result, same_light, same_systems
+from scenes.room.operation import read_operation
+from scenes.room.options import RoomOptions
+from scenes.room.room import compute_room
+from scenes.room.windows import in_all_windows
+from scenes.run.options import JobOptions
+from tests.scenes.small_box import BOX, ROOM, SMALL
+
+
+def moved(building: Building, offset: tuple[float, float, float], name: str):
+    """The building's room somewhere else, under another name."""
+    space = building.spaces[0]
+    faces = tuple(replace(f, triangles=f.triangles + offset) for f in space.faces)
+    windows = tuple(
+        replace(w, triangles=w.triangles + offset, guid=f"{w.guid}-{name}") for w in space.windows
+    )
+    return replace(space, faces=faces, windows=windows, guid=f"{name}-guid", name=name)
+
+
+def test_an_equal_room_has_the_results_of_its_template(
+    variant, weather, skies, glass, blind
+) -> None:
+    """Shifted, the room is computed anew to the same numbers; what shades one alone tells them."""
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    building = replace(BOX, spaces=(ROOM, twin))
+    systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
+    assert same_systems(ROOM, twin, systems)
+    assert not same_systems(ROOM, twin, in_all_windows(ROOM, glass) | in_all_windows(twin, blind))
+    assert same_light(building, ROOM, twin, SMALL.sampling, None)
+    wall = np.array([[[8, -2, 0], [14, -2, 0], [14, -2, 6]]], dtype=float)
+    shaded = replace(building, elements=(Element("w", "wall", "IfcWall", wall, 0.2, 0.2),))
+    assert not same_light(shaded, ROOM, twin, SMALL.sampling, None)
+
+    options = SMALL.changed(sensor_samples=2048)
+    one, other = (
+        compute_room(building, s, systems, weather, options, skies=skies, pictures=False)
+        for s in (ROOM, twin)
+    )
+    given = moved_result(one, twin)
+    assert given.template == "room" and given.space is twin
+    np.testing.assert_allclose(given.daylight.points, other.daylight.points, atol=1e-9)
+    np.testing.assert_allclose(given.glare.view.position, other.glare.view.position, atol=1e-9)
+    mean = given.daylight.illuminance.mean(axis=0)
+    # the same random numbers; single paths go another way by rounding of coordinates
+    np.testing.assert_allclose(mean, other.daylight.illuminance.mean(axis=0), rtol=0.03)
+
+
+def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeypatch) -> None:
+    from scenes.run import run
+
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    other = shoebox(2.5, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 1.5, 1.5),), name="other")
+    spaces = [ROOM, *other.spaces, twin]
+    building = replace(BOX, spaces=tuple(spaces))
+    systems = {w.guid: (glass,) for s in spaces for w in s.windows}
+    computed = []
+
+    def noted(building, space, *others, **options):
+        computed.append(space.name)
+        return compute_room(building, space, *others, **options, pictures=False)
+
+    monkeypatch.setattr(run, "compute_room", noted)
+    room = RoomOptions.of(
+        method="three-phase", sky_subdivision=1, sensor_spacing=2.0,
+        sensor_samples=1024, patch_samples=1024,
+    )  # fmt: skip
+    options = JobOptions(Path(), Path(), cache=False, room=room)
+    inputs = run.JobInputs(building, spaces, weather, systems, None)
+    results, problems, notes = run._rooms(inputs, skies, options, silent)
+    assert computed == ["room", "other"] and not problems
+    assert [r.space.name for r in results] == ["room", "other", "twin"]
+    assert [r.template for r in results] == ["", "", "room"]
+    assert len(notes) == 1 and "twin" in notes[0] and "room" in notes[0]
+
+
+def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
+    variant, tmp_path, weather, skies, glass, monkeypatch
+) -> None:
+    from scenes.run import run
+
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    building = replace(BOX, spaces=(ROOM, twin))
+    systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
+    computed = []
+
+    def noted(building, space, *others, **options):
+        computed.append(space.name)
+        return SimpleNamespace(template="", space=space)
+
+    monkeypatch.setattr(run, "compute_room", noted)
+    monkeypatch.setattr(run, "moved_result", lambda result, space: result)
+    options = JobOptions(Path(), Path(), cache=False, room=SMALL)
+    path = tmp_path / "operation.toml"
+    cooler = '[[rooms]]\nspaces = ["twin"]\n[rooms.loads]\nheating_c = 16\n'
+    for rooms, names in (("", ["room"]), (cooler, ["room", "twin"])):
+        path.write_text(f"[loads]\nheating_c = 20\n{rooms}")
+        inputs = run.JobInputs(building, [ROOM, twin], weather, systems, read_operation(path))
+        run._rooms(inputs, skies, options, silent)
+        assert computed == names
+        computed.clear()
