@@ -276,10 +276,13 @@ def _start(net: Network, zones: int, start_c: float) -> records.State:
 def _work(net: Network, zones: int) -> records.Workspace:
     n, m = net.faces.area.size, net.nodes.capacity.size
     return records.Workspace(
-        matrix=np.zeros((n + zones, n + zones)),
+        diagonal=np.zeros(n + zones),
+        below=np.zeros(net.system.rows.size),
         right=np.zeros(n + zones),
+        column=np.zeros(n + zones),
         unknown=np.zeros(n + zones),
-        column=np.zeros(n + zones, dtype=np.int64),
+        air=np.zeros((zones, 2)),
+        plant=np.zeros(zones, dtype=np.int64),
         still=np.zeros(m),
         film=np.zeros(n),
         outdoor=np.zeros((n, 5)),

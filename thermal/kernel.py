@@ -40,11 +40,14 @@ def _account(
     for z in range(work.old_air.size):
         terms[z, 3] += drive.convective[hour, z] + drive.radiant[hour, z]
         terms[z, 4] += heat * drive.airflow[hour, z] * (weather.outdoor[t] - state.air[z])
-        for y in range(work.old_air.size):
-            terms[z, 4] += heat * net.link[z, y] * (state.air[y] - state.air[z])
         terms[z, 5] += state.load[z]
         store = heat * net.air_capacity[z] / method.step_s
         terms[z, 9] += store * (state.air[z] - work.old_air[z])
+    for q in range(net.couplings.link.size):
+        z, y = net.couplings.zones[q]
+        flow = heat * net.couplings.link[q] * (state.air[y] - state.air[z])
+        terms[z, 4] += flow
+        terms[y, 4] -= flow
     for i in range(faces.area.size):
         z, kind, area = faces.zone[i], faces.kind[i], faces.area[i]
         t_o = state.outer[i]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from thermal.conduction import WallGrid, wall_grid
 from thermal.convection import DOE2_LEEWARD, DOE2_WINDWARD, local_wind_factor
+from thermal.elimination import Elimination, elimination
 from thermal.errors import require
 from thermal.longwave import exchange_from_view_factors, exchange_star, outside_factors
 from thermal.zone import ROUGHNESS, Layer, OpaqueSurface, WindowElement, Zone
@@ -61,15 +62,28 @@ class Glass(NamedTuple):
     extra: NDArray[np.float64]  # [W, J, 2] outer and inner extra conductance [W/(m2 K)]
 
 
+class Couplings(NamedTuple):
+    """Pairs of unknowns that exchange heat, and their entries in the system's columns."""
+
+    exchange: NDArray[np.float64]  # [P] longwave exchange area [m2]
+    faces: NDArray[np.int64]  # [P, 2] that exchange it
+    at_exchange: NDArray[np.int64]  # [P]
+    at_film: NDArray[np.int64]  # [N] face and its zone's air
+    at_partner: NDArray[np.int64]  # [N] face and the one at the wall's other side, -1 without
+    link: NDArray[np.float64]  # [Q] air exchanged between zones [m3/s]
+    zones: NDArray[np.int64]  # [Q, 2] that exchange it
+    at_link: NDArray[np.int64]  # [Q]
+
+
 class Network(NamedTuple):
     """All that the compiled loop needs of the building."""
 
     faces: Faces
     nodes: Nodes
     glass: Glass
-    exchange: NDArray[np.float64]  # [N, N] longwave exchange areas [m2]
+    couplings: Couplings
+    system: Elimination
     air_capacity: NDArray[np.float64]  # [Z] volume times capacity factor [m3]
-    link: NDArray[np.float64]  # [Z, Z] air exchanged between zones [m3/s]
 
 
 def frame_surface(window: WindowElement) -> OpaqueSurface:
@@ -99,12 +113,42 @@ def network(
     partners = _partners(zones, elements)
     ports, nodes = _walls([e for _, e in elements], partners, step_s, cell)
     faces = _faces(zones, elements, partners, ports, terrain)
-    exchange = np.zeros((len(elements), len(elements)))
+    found = [np.empty((3, 0))]
     for z, zone in enumerate(zones):
         mine = np.flatnonzero(faces.zone == z)
-        exchange[np.ix_(mine, mine)] = _zone_exchange(zone, [elements[i][1] for i in mine])
+        exchange = _zone_exchange(zone, [elements[i][1] for i in mine])
+        i, j = np.nonzero(np.tril(exchange, -1) > 0.0)
+        found.append(np.stack([mine[i], mine[j], exchange[i, j]]))
+    couplings, system = _couplings(faces, np.concatenate(found, axis=1), link)
     capacity = np.array([zone.volume * zone.air_capacity_factor for zone in zones])
-    return Network(faces, nodes, _glass(elements), exchange, capacity, link)
+    return Network(faces, nodes, _glass(elements), couplings, system, capacity)
+
+
+def _couplings(
+    faces: Faces, exchange: NDArray[np.float64], link: NDArray[np.float64]
+) -> tuple[Couplings, Elimination]:
+    """What is coupled, and the system's columns; exchange: [3, P] two faces, area [m2]."""
+    n = faces.area.size
+    seen = exchange[:2].T.astype(np.int64)
+    films = np.stack([np.arange(n), n + faces.zone], axis=1)
+    walls = np.flatnonzero(faces.partner >= 0)
+    sides = np.stack([walls, faces.partner[walls]], axis=1)
+    zones = np.argwhere(np.tril(link, -1) > 0.0)
+    pairs = np.concatenate([seen, films, sides, n + zones])
+    system = elimination(n + len(link), pairs.tolist())
+    at_partner = np.full(n, -1, dtype=np.int64)
+    at_partner[walls] = system.entries(sides)
+    couplings = Couplings(
+        exchange=np.ascontiguousarray(exchange[2]),
+        faces=np.ascontiguousarray(seen),
+        at_exchange=system.entries(seen),
+        at_film=system.entries(films),
+        at_partner=at_partner,
+        link=link[zones[:, 0], zones[:, 1]],
+        zones=zones,
+        at_link=system.entries(n + zones),
+    )
+    return couplings, system
 
 
 def _elements(zone: Zone) -> list[OpaqueSurface | WindowElement]:

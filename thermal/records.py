@@ -1,6 +1,7 @@
 """What the compiled time loop is given and fills: records of arrays, one entry per axis letter.
 
-N inside faces, M inner nodes of walls, Z zones, W windows, H hours, T time steps.
+N inside faces, M inner nodes of walls, Z zones, W windows, H hours, T time steps; U = N + Z
+unknowns of a step's linear system, E entries below its diagonal.
 """
 
 from __future__ import annotations
@@ -66,10 +67,13 @@ class State(NamedTuple):
 class Workspace(NamedTuple):
     """Scratch of a step."""
 
-    matrix: NDArray[np.float64]  # [N + Z, N + Z] lower triangle
-    right: NDArray[np.float64]  # [N + Z]
-    unknown: NDArray[np.float64]  # [N + Z]
-    column: NDArray[np.int64]  # [N + Z] rows of a column that are not zero
+    diagonal: NDArray[np.float64]  # [U] in the order of elimination, as the next three
+    below: NDArray[np.float64]  # [E] entries of the columns
+    right: NDArray[np.float64]  # [U]
+    column: NDArray[np.float64]  # [U] the column at hand
+    unknown: NDArray[np.float64]  # [U] inside faces, then air
+    air: NDArray[np.float64]  # [Z, 2] conductance to all around [W/K], what flows in from it [W]
+    plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... COOLS_FULLY
     still: NDArray[np.float64]  # [M] node temperatures that the step before alone would give
     film: NDArray[np.float64]  # [N] inside film plus extra conductance [W/(m2 K)]
     # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T

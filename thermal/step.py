@@ -2,7 +2,8 @@
 
 Backward Euler: the inside faces of all zones and their air are solved together, with the walls
 eliminated to two-ports and the outer window layers to conductances.  Film coefficients, longwave
-coefficients and layer resistances are those of the last iterate.  The equations that are solved are
+coefficients and layer resistances are those of the last iterate.  What the plants do is guessed and
+changed until temperatures and loads agree with it.  The equations that are solved are
 linear, so their energy balance closes to rounding whatever the number of iterations.
 """
 
@@ -19,6 +20,7 @@ from thermal.convection import (
     mowitt_outside,
     tarp_inside,
 )
+from thermal.elimination import eliminate
 from thermal.network import (
     ADIABATIC,
     GROUND,
@@ -31,7 +33,10 @@ from thermal.network import (
     Network,
     Nodes,
 )
+from thermal.plant import close_air, is_held, plants_agree, set_point
 from thermal.records import AIR_HEAT, Drive, Method, OutdoorConditions, State, Workspace, inlined
+
+MOST_CHANGES = 50  # of the plants in an iterate; each changes a few times at the most
 
 
 @inlined
@@ -184,111 +189,68 @@ def _assemble(
     t: int,
     method: Method,
 ) -> None:
-    faces, a, b = net.faces, work.matrix, work.right
-    n, zones = faces.area.size, net.air_capacity.size
+    """The linear system of a step, in the order of elimination."""
+    faces, pairs, place = net.faces, net.couplings, net.system.place
+    d, e, b = work.diagonal, work.below, work.right
+    n = faces.area.size
     hour, sun = t // method.steps, t // method.solar_every
-    for i in range(n + zones):
-        for j in range(i + 1):
-            a[i, j] = 0.0
-    heat = weather.density[t] * AIR_HEAT
-    for z in range(zones):
-        flow = heat * drive.airflow[hour, z]
-        store = heat * net.air_capacity[z] / method.step_s
-        a[n + z, n + z] = store + flow
-        b[n + z] = store * work.old_air[z] + flow * weather.outdoor[t] + drive.convective[hour, z]
-        for y in range(z):
-            a[n + z, n + y] -= heat * net.link[z, y]
-        for y in range(zones):
-            if y != z:
-                a[n + z, n + z] += heat * net.link[z, y]
+    e[:] = 0.0
+    _assemble_air(net, work, weather, drive, t, method)
     for i in range(n):
-        z, kind, area = faces.zone[i], faces.kind[i], faces.area[i]
+        z, kind, area, k = faces.zone[i], faces.kind[i], faces.area[i], place[i]
         film = _inside_film(faces, i, state.inner[i], state.air[z], method.inside)
         if kind == WINDOW:
             shading = drive.state[hour, faces.window[i]]
             film += net.glass.extra[faces.window[i], shading, 1]
-            d, r = _window_row(
+            own, r = _window_row(
                 net, i, state, work, weather, t, shading, drive.outer[sun, i], method
             )
         elif kind == PARTNER:
             p = faces.partner[i]
             c_o, _, g_o, _, u_o, v_o, _, _ = faces.port[p]
-            d = c_o + g_o * (1.0 - u_o)
+            own = c_o + g_o * (1.0 - u_o)
             r = c_o * work.old_inner[i] + g_o * work.still[faces.first_node[p]]
-            a[i, p] -= area * g_o * v_o
+            e[pairs.at_partner[i]] -= area * g_o * v_o
         else:
-            d, r = _wall_row(net, i, state, work, weather, t, drive.outer[sun, i], method)
+            own, r = _wall_row(net, i, state, work, weather, t, drive.outer[sun, i], method)
         work.film[i] = film
-        a[i, i] += area * (d + film)
-        b[i] = area * r + drive.inner[sun, i] + drive.radiant[hour, z] * faces.radiant_share[i]
-        a[n + z, i] = -area * film
-        a[n + z, n + z] += area * film
-        for j in range(i):
-            if net.exchange[i, j] > 0.0:
-                k = SIGMA * net.exchange[i, j] * _cube(state.inner[i], state.inner[j])
-                a[i, j] -= k
-                a[i, i] += k
-                a[j, j] += k
+        d[k] = area * (own + film)
+        b[k] = area * r + drive.inner[sun, i] + drive.radiant[hour, z] * faces.radiant_share[i]
+        work.air[z, 0] += area * film
+        if is_held(work.plant[z]):
+            b[k] += area * film * set_point(work.plant[z], drive, t, z)
+        else:
+            e[pairs.at_film[i]] = -area * film
+    for q in range(pairs.exchange.size):
+        i, j = pairs.faces[q]
+        h = SIGMA * pairs.exchange[q] * _cube(state.inner[i], state.inner[j])
+        e[pairs.at_exchange[q]] -= h
+        d[place[i]] += h
+        d[place[j]] += h
+    close_air(net, work, weather, drive, t)
 
 
 @inlined
-def _solve(net: Network, work: Workspace, state: State, drive: Drive, t: int) -> None:
-    """Eliminate the faces (symmetric, diagonally dominant: no pivoting), then the air.
-
-    A face touches its own room, the other sides of its room's walls and little else: only the rows
-    that are not zero in its column take part.
-    """
-    a, b, x, column = work.matrix, work.right, work.unknown, work.column
-    n, total = net.faces.area.size, work.right.size
-    for k in range(n):
-        inverse = 1.0 / a[k, k]
-        count = 0
-        for i in range(k + 1, total):
-            if a[i, k] != 0.0:
-                column[count] = i
-                count += 1
-        for p in range(count):
-            i = column[p]
-            f = a[i, k] * inverse
-            for q in range(p + 1):
-                j = column[q]
-                a[i, j] -= f * a[j, k]
-            b[i] -= f * b[k]
-    _solve_air(work, state, drive, t, n)
-    for k in range(n - 1, -1, -1):
-        s = b[k]
-        for j in range(k + 1, total):
-            s -= a[j, k] * x[j]
-        x[k] = s / a[k, k]
-
-
-@inlined
-def _solve_air(work: Workspace, state: State, drive: Drive, t: int, n: int) -> None:
-    """Air temperatures and ideal loads: Gauss-Seidel with the loads' limits as projections."""
-    a, b, x = work.matrix, work.right, work.unknown
-    zones = x.size - n
-    for z in range(zones):
-        x[n + z] = state.air[z]
-    for _ in range(1000):
-        change = 0.0
-        for z in range(zones):
-            s = b[n + z]
-            for y in range(zones):
-                if y != z:
-                    s -= (a[n + z, n + y] if y < z else a[n + y, n + z]) * x[n + y]
-            stiffness = a[n + z, n + z]
-            free = s / stiffness
-            load = 0.0
-            if free < drive.heating_c[t, z]:
-                load = min(stiffness * drive.heating_c[t, z] - s, drive.limit[z, 0])
-            elif free > drive.cooling_c[t, z]:
-                load = max(stiffness * drive.cooling_c[t, z] - s, -drive.limit[z, 1])
-            state.load[z] = load
-            fresh = (s + load) / stiffness
-            change = max(change, abs(fresh - x[n + z]))
-            x[n + z] = fresh
-        if change < 1e-12 or zones == 1:
-            break
+def _assemble_air(
+    net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, method: Method
+) -> None:
+    """Conductance of each zone's air and what flows into it, but for its faces; its neighbours."""
+    hour, pairs = t // method.steps, net.couplings
+    heat = weather.density[t] * AIR_HEAT
+    for z in range(work.plant.size):
+        flow = heat * drive.airflow[hour, z]
+        store = heat * net.air_capacity[z] / method.step_s
+        work.air[z, 0] = store + flow
+        work.air[z, 1] = (
+            store * work.old_air[z] + flow * weather.outdoor[t] + drive.convective[hour, z]
+        )
+    for q in range(pairs.link.size):
+        z, y = pairs.zones[q]
+        exchanged = heat * pairs.link[q]
+        work.air[z, 0] += exchanged
+        work.air[y, 0] += exchanged
+        if not (is_held(work.plant[z]) or is_held(work.plant[y])):
+            work.below[pairs.at_link[q]] = -exchanged
 
 
 @inlined
@@ -327,8 +289,13 @@ def step(
     copy_into(state.air, work.old_air, 0)
     _still_nodes(faces, nodes, state, work)
     for _ in range(method.iterations):
-        _assemble(net, state, work, weather, drive, t, method)
-        _solve(net, work, state, drive, t)
+        for _ in range(MOST_CHANGES):
+            _assemble(net, state, work, weather, drive, t, method)
+            eliminate(net.system, work.diagonal, work.below, work.right, work.column)
+            for u in range(work.unknown.size):
+                work.unknown[u] = work.right[net.system.place[u]]
+            if plants_agree(net, work, state, weather, drive, t):
+                break
         change = 0.0
         for i in range(n):
             change = max(change, abs(work.unknown[i] - state.inner[i]))

@@ -56,6 +56,36 @@ def test_floating_room_between_a_warm_room_and_outdoors():
     np.testing.assert_allclose(first.heat_flow["partitions"], -first.heating, rtol=1e-5)
 
 
+@pytest.mark.parametrize("limits", [(np.inf, np.inf), (300.0, 200.0), (0.0, 50.0)])
+def test_plants_give_no_more_than_their_zones_ask(limits):
+    """At a set point, or at the limit short of it, or off between the two, in every step."""
+    hours, rooms = 24 * 60, []
+    for i, (name, other) in enumerate((("a", "b"), ("b", "a"))):
+        room = box(window=Fenestration("glass", 2.5), gains=Gains(100.0 * i, 0.0))
+        walls = tuple(
+            replace(s, name="party", outside=other, partner="party")
+            if s.name == ("east", "west")[i]
+            else s
+            for s in room.surfaces
+        )
+        loads = IdealLoads(20.0 + i, 24.0 - i, *limits)
+        rooms.append(replace(room, name=name, surfaces=walls, loads=loads))
+    weather = climate(hours, outdoor=12 + 14 * np.sin(np.arange(hours) / 200.0))
+    light = [sun(hours, room, strength=0.4) for room in rooms]
+    results = simulate_zones(rooms, weather, light, air_links=[[0, 0.05], [0.05, 0]], step_s=3600.0)
+    for room, found in zip(rooms, results, strict=True):
+        air, heat, cold = found.air_c, found.heating, found.cooling
+        low, high = room.loads.heating_c, room.loads.cooling_c
+        assert ((heat == 0) | (cold == 0)).all()
+        assert (heat <= limits[0] + 1e-9).all() and (cold <= limits[1] + 1e-9).all()
+        assert np.allclose(air[(heat > 0) & (heat < limits[0])], low, atol=1e-9)
+        assert np.allclose(air[(cold > 0) & (cold < limits[1])], high, atol=1e-9)
+        assert (air[heat < limits[0]] > low - 1e-9).all()
+        assert (air[cold < limits[1]] < high + 1e-9).all()
+        assert (air[heat > 0] < low + 1e-9).all() and (air[cold > 0] > high - 1e-9).all()
+        assert (cold > 0).any() and (heat > 0).any() == (limits[0] > 0)
+
+
 def test_energy_of_coupled_rooms_closes_with_control_loads_gains_and_doors():
     hours = 8760
     states = (Fenestration("open", 2.5), Fenestration("closed", 0.9))

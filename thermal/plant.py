@@ -1,0 +1,102 @@
+"""Ideal plants in the linear system of a step: free, at a set point, or at their limit; compiled.
+
+What each plant does is guessed, and changed until temperatures and loads agree with it: the system
+is an M-matrix with bounds, for which that ends.  Source: Hintermueller, Ito and Kunisch 2002,
+doi:10.1137/S1052623401383558 (primal-dual active sets).
+"""
+
+from __future__ import annotations
+
+from thermal.network import Network
+from thermal.records import AIR_HEAT, Drive, OutdoorConditions, State, Workspace, inlined
+
+FREE, HEATS, HEATS_FULLY, COOLS, COOLS_FULLY = range(5)  # what the plant of a zone does
+ROUNDING = 1e-10  # of temperatures [K]
+
+
+@inlined
+def is_held(plant: int) -> bool:
+    """Whether the plant holds its zone's air at a set point."""
+    return plant == HEATS or plant == COOLS
+
+
+@inlined
+def set_point(plant: int, drive: Drive, t: int, z: int) -> float:
+    """The set point that a plant holds [degC]."""
+    return drive.heating_c[t, z] if plant == HEATS else drive.cooling_c[t, z]
+
+
+@inlined
+def close_air(
+    net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int
+) -> None:
+    """Rows of the air: the plant holds the set point, or gives a known load."""
+    n, place, pairs = net.faces.area.size, net.system.place, net.couplings
+    d, b = work.diagonal, work.right
+    for z in range(work.plant.size):
+        k, plant = place[n + z], work.plant[z]
+        if is_held(plant):
+            d[k], b[k] = 1.0, set_point(plant, drive, t, z)
+            continue
+        d[k], b[k] = work.air[z, 0], work.air[z, 1]
+        if plant == HEATS_FULLY:
+            b[k] += drive.limit[z, 0]
+        elif plant == COOLS_FULLY:
+            b[k] -= drive.limit[z, 1]
+    heat = weather.density[t] * AIR_HEAT
+    for q in range(pairs.link.size):
+        z, y = pairs.zones[q]
+        if is_held(work.plant[z]) and not is_held(work.plant[y]):
+            b[place[n + y]] += heat * pairs.link[q] * b[place[n + z]]
+        elif is_held(work.plant[y]) and not is_held(work.plant[z]):
+            b[place[n + z]] += heat * pairs.link[q] * b[place[n + y]]
+
+
+@inlined
+def plants_agree(
+    net: Network, work: Workspace, state: State, weather: OutdoorConditions, drive: Drive, t: int
+) -> bool:
+    """Set the loads; whether each plant does what its zone's temperature asks, else it changes."""
+    faces, pairs, x = net.faces, net.couplings, work.unknown
+    n, heat = faces.area.size, weather.density[t] * AIR_HEAT
+    for i in range(n):
+        work.air[faces.zone[i], 1] += faces.area[i] * work.film[i] * x[i]
+    for q in range(pairs.link.size):
+        z, y = pairs.zones[q]
+        work.air[z, 1] += heat * pairs.link[q] * x[n + y]
+        work.air[y, 1] += heat * pairs.link[q] * x[n + z]
+    agree = True
+    for z in range(work.plant.size):
+        air, stiffness, plant = x[n + z], work.air[z, 0], work.plant[z]
+        state.load[z] = 0.0
+        if is_held(plant):
+            state.load[z] = stiffness * air - work.air[z, 1]
+        elif plant == HEATS_FULLY:
+            state.load[z] = drive.limit[z, 0]
+        elif plant == COOLS_FULLY:
+            state.load[z] = -drive.limit[z, 1]
+        work.plant[z] = _plant(plant, air, state.load[z], stiffness * ROUNDING, drive, t, z)
+        agree &= work.plant[z] == plant
+    return agree
+
+
+@inlined
+def _plant(
+    plant: int, air: float, load: float, rounding: float, drive: Drive, t: int, z: int
+) -> int:
+    """What the plant must do where, doing `plant`, it gives this air temperature and load."""
+    if plant == HEATS:
+        if load > drive.limit[z, 0]:
+            return HEATS_FULLY
+        return HEATS if load >= -rounding else FREE
+    if plant == COOLS:
+        if -load > drive.limit[z, 1]:
+            return COOLS_FULLY
+        return COOLS if load <= rounding else FREE
+    if plant == HEATS_FULLY:
+        return HEATS if air > drive.heating_c[t, z] + ROUNDING else plant
+    if plant == COOLS_FULLY:
+        return COOLS if air < drive.cooling_c[t, z] - ROUNDING else plant
+    if air < drive.heating_c[t, z] - ROUNDING:
+        return HEATS
+    return COOLS if air > drive.cooling_c[t, z] + ROUNDING else FREE
