@@ -147,6 +147,12 @@ class TracedScene:
         point = mi.Point3f(origin + direction * hit.t + face * self.epsilon)
         return point, face, dr.gather(mi.Float, self.reflectance, hit.prim_index, active)
 
+    def leaves(self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f) -> mi.Bool:
+        """Which rays that hit something meet a window from the room's side."""
+        outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index)
+        window = dr.gather(mi.Int32, self.group, hit.prim_index) != OPAQUE
+        return window & (dr.dot(outwards, direction) > 0)
+
     def to_local(self, group: mi.Int32, v: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
         """World vector in the frame of a window group (z is the exterior normal)."""
         x, y, z = (dr.gather(mi.Vector3f, row, group, active) for row in self._frame_rows)
