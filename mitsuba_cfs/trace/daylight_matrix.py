@@ -50,8 +50,8 @@ def add_daylight_paths(
         dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
         if active:
-            passed = tracer.leaves(hit, direction)
-            position, face, reflectance = tracer.surface_at(hit, position, direction, mi.Bool(True))
+            passed = tracer.leaves(hit, direction, active)
+            position, face, reflectance = tracer.surface_at(hit, position, direction, active)
             position = mi.Point3f(position - dr.select(passed, 2 * tracer.epsilon, 0.0) * face)
             direction = dr.select(passed, direction, diffuse_direction(face, generator))
             depth += dr.select(passed, mi.UInt32(0), mi.UInt32(1))
