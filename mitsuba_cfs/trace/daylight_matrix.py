@@ -32,7 +32,11 @@ def add_daylight_paths(
     starts: PathStarts,  # on the window or the sensor, outdoors
     weight: mi.Float | None = None,  # of each path, 1 by default
 ) -> None:
-    """Follow each path to the sky, where the patch it meets gains the product of reflectances."""
+    """Follow each path to the sky, where the patch it meets gains the product of reflectances.
+
+    Panes before its own window (a screen behind them) a path passes, as it meets them from the
+    room's side; to what comes back from outdoors windows are black.
+    """
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     weight = mi.Float(1.0 if weight is None else weight)
@@ -45,12 +49,15 @@ def add_daylight_paths(
         slot = row * mi.UInt32(sky.size) + sky.index(direction)
         dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
-
-        position, face, reflectance = tracer.surface_at(hit, position, direction, active)
-        direction = diffuse_direction(face, generator)
-        depth += 1
-        alive, beta = roulette(beta * reflectance, depth, generator)
-        active &= alive & (depth < max_depth)
+        if active:
+            passed = tracer.leaves(hit, direction, active)
+            position, face, reflectance = tracer.surface_at(hit, position, direction, active)
+            position = mi.Point3f(position - dr.select(passed, 2 * tracer.epsilon, 0.0) * face)
+            direction = dr.select(passed, direction, diffuse_direction(face, generator))
+            depth += dr.select(passed, mi.UInt32(0), mi.UInt32(1))
+            alive, onwards = roulette(beta * reflectance, depth, generator)
+            beta = dr.select(passed, beta, onwards)
+            active &= passed | (alive & (depth < max_depth))
 
 
 def daylight_matrix(
@@ -84,8 +91,7 @@ def daylight_matrix(
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
-    # light comes back to the windows; one before another (a screen behind panes) lets it pass
-    something = len(surfaces.triangles) > 0 and not _in_series(groups)
+    something = len(surfaces.triangles) > 0  # light comes back to the windows
     tracer = TracedScene(surfaces, groups, windows_block=something)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     n = int(samples)
@@ -109,22 +115,6 @@ def daylight_matrix(
             seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
-
-
-def _in_series(groups: Sequence[WindowGroup]) -> bool:
-    """Whether a window stands outdoors of another, less than a metre before it."""
-    windows = [window for group in groups for window in group.windows]
-    for inner in windows:
-        n, corners = np.asarray(inner.normal), inner.triangles.reshape(-1, 3)
-        low, high = corners.min(axis=0) - 1e-3, corners.max(axis=0) + 1e-3
-        for outer in windows:
-            points = outer.triangles.reshape(-1, 3)
-            before = float(n @ (points.mean(axis=0) - corners.mean(axis=0)))
-            moved = points - before * n
-            apart = np.any(moved.max(axis=0) < low) or np.any(moved.min(axis=0) > high)
-            if 1e-3 < before < 1.0 and n @ outer.normal > 0.99 and not apart:
-                return True
-    return False
 
 
 def sky_irradiance_matrix(

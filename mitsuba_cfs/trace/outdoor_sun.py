@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -92,7 +91,7 @@ class OutdoorSun:
         point, normal, to_sun = place_and_hour(places, suns)
         cosine = dr.dot(normal, to_sun)
         lit = cosine > 0
-        lit &= ~self._outside.scene.ray_test(mi.Ray3f(point, to_sun), coherent=False, active=lit)
+        lit &= ~self._outside.met_outdoors(point, to_sun, lit)[0].is_valid()
         return dr.select(lit, cosine, 0.0).numpy().reshape(places.size, len(suns))
 
 

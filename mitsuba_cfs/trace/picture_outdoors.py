@@ -70,7 +70,7 @@ def outdoors(
             as of `tile_size`.
     """
     inside = TracedScene(interior, groups)
-    outside = TracedScene(exterior, groups, windows_block=False)
+    outside = TracedScene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     faces = face_numbers(outside.surface.numpy(), outside.normal.numpy().T)
@@ -152,7 +152,7 @@ def _looked_at(
 ) -> tuple[sparse.csr_array, tuple[_Lanes, NDArray[np.int64], NDArray[np.float32], Places]]:
     """Rows [count, P] of what is sky; the other lanes, their triangles, reflectances and places."""
     origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
-    hit = outside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=True)
+    hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
     found = hit.is_valid()
     rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, found).numpy()
     places = face_places(outside, origin, way, hit, found)

@@ -147,6 +147,39 @@ class TracedScene:
         point = mi.Point3f(origin + direction * hit.t + face * self.epsilon)
         return point, face, dr.gather(mi.Float, self.reflectance, hit.prim_index, active)
 
+    def leaves(
+        self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.Bool:
+        """Which active rays meet a window from the room's side."""
+        active = active & hit.is_valid()
+        outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
+        window = dr.gather(mi.Int32, self.group, hit.prim_index, active) != OPAQUE
+        return active & window & (dr.dot(outwards, direction) > 0)
+
+    @dr.syntax
+    def met_outdoors(
+        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
+    ) -> tuple[mi.PreliminaryIntersection3f, mi.Point3f]:
+        """What rays on their way out meet beyond the panes that they pass; whence they last went.
+
+        The panes are those met from the room's side: that the ray starts on, others before it.
+        """
+        origin = mi.Point3f(origin)
+        hit = self._met(origin, direction, active)
+        passed = self.leaves(hit, direction, active)
+        while passed:
+            outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, passed)
+            origin = mi.Point3f(origin + direction * hit.t + outwards * self.epsilon)
+            hit = self._met(origin, direction, passed)
+            passed = self.leaves(hit, direction, passed)
+        return hit, origin
+
+    def _met(
+        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.PreliminaryIntersection3f:
+        ray = mi.Ray3f(origin, direction)
+        return self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+
     def to_local(self, group: mi.Int32, v: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
         """World vector in the frame of a window group (z is the exterior normal)."""
         x, y, z = (dr.gather(mi.Vector3f, row, group, active) for row in self._frame_rows)

@@ -10,7 +10,7 @@ import pytest
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import WindowGroup
+from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 
 from . import rooms
 
@@ -247,17 +247,82 @@ def test_windows_of_one_group_must_share_their_orientation():
         WindowGroup("both", (groups[0].windows[0], groups[1].windows[0]))
 
 
-def test_panes_before_a_screen_do_not_take_its_light():
-    """A screen and the panes before it are windows in series: D of the screen keeps its light."""
-    from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-
+def panes_before_a_screen(gap: float = 0.002) -> tuple[WindowGroup, list[WindowGroup]]:
+    """The test room's window as a screen, alone and a gap [m] behind panes."""
     _, groups = rooms.test_room()
     (screen, *_) = groups[0].windows
-    pane = WindowSurface("pane", screen.triangles + 0.15 * np.asarray(screen.normal))
-    outside, alone = rooms.obstruction(), WindowGroup("screen", (screen,))
-    both = [alone, WindowGroup("panes", (pane,))]
-    found = daylight_matrix(outside, both, subdivision=1, samples=256).values[0]
-    expected = daylight_matrix(outside, [alone], subdivision=1, samples=256).values[0]
-    # 3 % more: what comes back from outdoors passes windows that stand in series
-    assert 0.98 * expected.sum() < found.sum() < 1.05 * expected.sum()
+    pane = WindowSurface("pane", screen.triangles + gap * np.asarray(screen.normal))
+    alone = WindowGroup("screen", (screen,))
+    return alone, [alone, WindowGroup("panes", (pane,))]
+
+
+def test_panes_before_a_screen_do_not_take_its_light():
+    """Nor do they let through what comes back from outdoors, 3 % here."""
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+
+    alone, both = panes_before_a_screen()
+    expected, found = (
+        daylight_matrix(rooms.obstruction(), groups, subdivision=1, samples=512).part(0)
+        for groups in ([alone], both)
+    )
+    total = expected.values.sum()
+    error = np.sqrt((expected.sum_error**2).sum() + (found.sum_error**2).sum())
+    assert error < 0.002 * total
+    assert abs(found.values.sum() - total) < 4 * error
+
+
+def test_cells_of_a_screen_have_its_light():
+    from mitsuba_cfs.trace.cell_daylight import cell_daylight
+    from mitsuba_cfs.window_parts import window_cells
+
+    alone, both = panes_before_a_screen()
+    expected, found = (
+        cell_daylight(
+            rooms.obstruction(), groups, [window_cells(g) for g in groups], samples=4, max_depth=1
+        )[0]
+        for groups in ([alone], both)
+    )
+    # the same rays straight to the sky
+    assert np.abs(found - expected).mean() < 0.001 * expected.mean()
+
+
+def test_a_sensor_sees_the_outdoors_through_a_screen():
+    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.straight_view import straight_view_matrix
+
+    room, _ = rooms.test_room()
+    alone, both = panes_before_a_screen()
+    outside, eye = rooms.obstruction(), [[1.8, 2.0, 0.8]]
+    clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.full(145, 0.5))
+    expected, found = (
+        straight_view_matrix(
+            room, outside, groups, systems, eye, [UP], subdivision=1, max_depth=1
+        ).values[0]
+        for groups, systems in (([alone], [clear]), (both, [clear, None]))
+    )
+    # the same rays straight to the sky
+    assert np.abs(found - expected).sum() < 0.001 * expected.sum()
+
+
+def test_the_reveal_between_panes_and_a_screen_lights_the_screen():
+    """Light comes in through the panes, falls on the reveal and from there on the screen."""
+    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+
+    x0, x1, z0, z1, d = rooms.X0, rooms.X1, rooms.Z0, rooms.Z1, -0.8
+    reveal = rooms.surfaces(
+        [
+            (rooms.quad((x0, d, z0), (x0, 0, z0), (x1, 0, z0), (x1, d, z0)), 0.9),
+            (rooms.quad((x0, d, z1), (x1, d, z1), (x1, 0, z1), (x0, 0, z1)), 0.9),
+            (rooms.quad((x0, d, z0), (x0, d, z1), (x0, 0, z1), (x0, 0, z0)), 0.9),
+            (rooms.quad((x1, d, z0), (x1, 0, z0), (x1, 0, z1), (x1, d, z1)), 0.9),
+        ]
+    )
+    alone, (screen, panes) = panes_before_a_screen(0.8)
+    expected, found = (
+        daylight_matrix(reveal, groups, subdivision=1, samples=512).part(0)
+        for groups in ([alone], [screen, panes])
+    )
+    error = np.sqrt((expected.sum_error**2).sum() + (found.sum_error**2).sum())
+    total = expected.values.sum()
+    assert error < 0.003 * total  # the reveal gives a quarter
+    assert abs(found.values.sum() - total) < 4 * error

@@ -48,6 +48,36 @@ def random_tree_system(seed: int) -> TensorTreeBsdf:
     return TensorTreeBsdf(transmission_front=tree, transmission_back=tree)
 
 
+def test_no_light_of_a_picture_comes_through_the_room_from_behind():
+    """A box closed round the window's outside: no sky or sun may light it through the window."""
+    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.picture_outdoors import outdoors
+
+    room, groups = rooms.test_room()
+    x0, x1, z0, z1, d = rooms.X0 - 1, rooms.X1 + 1, rooms.Z0 - 1, rooms.Z1 + 1, -2.0
+    corners = [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]
+    sides = [
+        rooms.quad((a, d, b), (e, d, f), (e, 0, f), (a, 0, b))
+        for (a, b), (e, f) in zip(corners, corners[1:] + corners[:1], strict=True)
+    ]
+    front = rooms.quad(*((x, d, z) for x, z in corners))
+    inner = rooms.X0, rooms.X1, rooms.Z0, rooms.Z1
+    round_it = ((x0, x1, z0, inner[2]), (x0, x1, inner[3], z1),
+                (x0, inner[0], *inner[2:]), (inner[1], x1, *inner[2:]))  # fmt: skip
+    wall = [rooms.quad((a, 0, b), (c, 0, b), (c, 0, e), (a, 0, e)) for a, c, b, e in round_it]
+    box = rooms.surfaces([(quad, 0.9) for quad in (front, *sides, *wall)])
+    clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.full(145, 0.5))
+    view = fisheye(EYE, (0.0, -1.0, 0.0), 32)
+    found = outdoors(room, box, groups, [clear], view, subdivision=1)
+    values = np.zeros((1, found.sky.shape[0]))
+    behind, none = np.array([[0.0, 0.8, 0.6]]), np.zeros((found.reflected.shape[0], 1), np.float32)
+    found.sun.add_to(values, behind, np.array([1e5]), none)
+    assert found.reflected.shape[0] > 0  # the box is seen
+    assert found.sky.sum() == 0
+    assert found.reflected.sum(axis=1).max() < 1e-2 * np.pi  # seams of float32 let a few rays out
+    assert values.max() == 0
+
+
 @pytest.mark.parametrize("kind", ["glass", "mirror", "diffuser"])
 def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     from mitsuba_cfs.trace.estimate import Stopping
