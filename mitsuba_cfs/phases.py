@@ -71,8 +71,8 @@ def sun_beams(
 
     Args:
         transmission: for each group its T [K, K].
-        through: [G, K] tau, what of T's diagonal goes straight on: the beam at the patches'
-            middles, `mitsuba_cfs.trace.direct_sun.patch_beams`.
+        through: [G, K] tau, what of T's diagonal goes straight on,
+            `mitsuba_cfs.trace.direct_sun.patch_beams`.
         through_sun: [G, H] tau(sun), `mitsuba_cfs.trace.direct_sun.through_beams`.
         direct_daylight: D_d [G, K, P].
         sun: s_d [P, H], the sun alone on the sky's patches.

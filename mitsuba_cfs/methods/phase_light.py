@@ -202,11 +202,9 @@ class PhaseLight:
         return error[: len(self._traced.scene.points)]
 
     def _subdivision_error(self, g: int, row: NDArray[np.int64]) -> NDArray[np.float64]:
-        """What D as a mean over the parts of a group changes in each sensor's mean [S]."""
+        """What D as a mean over a group's parts changes in each sensor's mean, and B's error [S]."""
         points, normals = self._traced.scene.sensors()
         found, straight = np.zeros(len(points)), 0.0
-        if not self._traced.parts.cells:
-            return found
         for j, optics in enumerate(self.filled.systems[g]):
             sky = self._diffuse_sky[:, row == j].sum(axis=1, keepdims=True) / len(row)
             if not sky.any():
@@ -216,7 +214,8 @@ class PhaseLight:
                 through = through - np.diag(self.filled.straight.beam(g, j))
                 mean = self.sky.whole[:, row == j].sum(axis=1) / len(row)
                 straight = straight + seen.error_of(mean) ** 2
-            found += self._traced.parts.cells[g].error(points, normals, through, sky)[:, 0]
+            if self._traced.parts.cells:
+                found += self._traced.parts.cells[g].error(points, normals, through, sky)[:, 0]
         return np.sqrt(found**2 + straight)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""The outdoors that sensors see straight through cut window groups, in place of V_d and D."""
+"""The outdoors that sensors see straight through the windows' beam, in place of V_d and D."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ SHARE = 4  # paths of a sensor for V, for each that looks straight through a cut
 
 
 class StraightViews:
-    """What the straight beam of each cut group shows the sensors, in each of its states.
+    """What the straight beam of each group shows the sensors, in each of its states.
 
         B s - V_d diag(tau) D s
 
-    is added to V T D s: behind an edge that not all points of the windows see alike, patches and
-    means blur what a beam shows.  A group that is not cut has nothing of it.
+    is added to V T D s: patches of 10 to 15 degrees blur the sky that a sensor sees through a
+    beam (11 % of a sensor's light beside a small opening), and means over a group the edges that
+    not all of its points see alike.  The three-phase method has it of cut groups alone: the
+    patches of the others are what it is.
     """
 
     def __init__(self, traced: PhaseScene, systems: Sequence[States]) -> None:
@@ -45,8 +47,10 @@ class StraightViews:
         Args: direct: without what the outdoors reflects.
         """
         traced = self._traced
-        if len(traced.parts.of(g)) < 2 or not self.beam(g, j).any():
+        sharp = traced.five_phase or len(traced.parts.of(g)) > 1
+        if not sharp or not self.beam(g, j).any():
             return None
+        direct = direct and len(traced.scene.exterior.triangles) > 0  # else nothing reflects
         if (g, j, direct) not in self._found:
             scene, chosen = traced.scene, traced.sampling
             ways: list = [None] * len(scene.groups)

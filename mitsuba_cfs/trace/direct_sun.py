@@ -23,6 +23,7 @@ from mitsuba_cfs.trace.lit_room import PatchBeam
 from mitsuba_cfs.trace.sampling import lattice, lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
+BEAM_PLACES = 16  # polar angles in a patch, for the mean of a beam; a quarter as many azimuths
 DISC_STRATA = 16  # directions on the disc for each pair of sensor and sun, in each batch
 
 
@@ -62,6 +63,7 @@ class KlemsScattering:
         self._bins = DirectionBins(basis)
         self._values = mi.Float(np.ascontiguousarray(scattered, dtype=np.float32).ravel())
         self._through = PatchBeam(basis, through, exponent)
+        self.basis, self.beams = basis, np.asarray(through, dtype=float)  # [K] as the data have it
         self.key = ("klems", basis, np.asarray(scattered), np.asarray(through), exponent or -1.0)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
@@ -213,10 +215,26 @@ def through_beams(
 
 
 def patch_beams(scattering: Sequence[Scattering | None], basis: KlemsBasis) -> NDArray[np.float64]:
-    """Transmittance of each group's straight beam at the middles of the basis' patches [G, K]."""
-    middles = mi.Vector3f(basis.incident_directions().T.astype(np.float32))
-    beams = [0.0 if way is None else way.through(middles).numpy() for way in scattering]
-    return np.stack([np.broadcast_to(beam, basis.size) for beam in beams]).astype(float)
+    """What T's diagonal has of each group's straight beam [G, K].
+
+    Of Klems data their own values; of others the mean over each patch in cos(theta) d_omega: clear
+    glass at the middle of the last ring passes a fifth less than that.
+    """
+    return np.stack([_beam_of_patches(way, basis) for way in scattering])
+
+
+def _beam_of_patches(way: Scattering | None, basis: KlemsBasis) -> NDArray[np.float64]:
+    if way is None:
+        return np.zeros(basis.size)
+    if isinstance(way, KlemsScattering) and way.basis == basis:
+        return way.beams
+    places = (np.arange(BEAM_PLACES) + 0.5) / BEAM_PLACES
+    u, v = (axis.ravel() for axis in np.meshgrid(places, places[:: BEAM_PLACES // 4]))
+    theta, phi = basis.angles_within(np.arange(basis.size)[:, None], u, v)
+    sine = np.sin(theta)
+    towards = np.stack([sine * np.cos(phi), -sine * np.sin(phi), np.cos(theta)])
+    beam = way.through(mi.Vector3f(towards.reshape(3, -1).astype(np.float32))).numpy()
+    return np.broadcast_to(beam, theta.size).reshape(theta.shape).mean(axis=1).astype(float)
 
 
 def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) -> _Points:

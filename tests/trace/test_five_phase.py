@@ -230,7 +230,8 @@ def test_a_group_with_fewer_states_ends_with_its_last(corner):
 
 
 def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
-    """V T D s - V_d T D_d s_d + the beam at its own angle + C_ds s_sun, written out."""
+    """V T D s - V_d T D_d s_d + the beam at its own angle, its straight view, C_ds s_sun."""
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
     from mitsuba_cfs.trace.estimate import Stopping
 
@@ -250,6 +251,9 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
         through_beams(scene.groups, ways, sky.direction), matrices.direct_daylight, sky.sun,
     )  # fmt: skip
     expected += np.einsum("sgk,gkh->sh", view - direct_view, at_sun - by_patch)
+    straight = PhaseSystems(matrices, [[one] for one in chosen]).straight
+    expected += straight.light(0, 0, sky)
+    assert straight.matrix(1, 0) is None  # the diffuser has no beam
     expected += exact.values * sky.illuminance / SUN_SOLID_ANGLE
     assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision
 
