@@ -1,21 +1,20 @@
-"""Blackbox data of a layered system from WINDOW's ISO 15099 engine, where `pywincalc` is installed.
+"""A glazing unit's temperatures, U, g and Blackbox data by ISO 15099, layer by layer.
 
-The user builds the layers with pywincalc (glass, shades, blinds, gaps); out come U, the realised
-films, R(T_m, dT), and transmittance, reflectance and g per angle.  Convection at the faces is
-prescribed, so that the films belong to the measuring condition and not to a climate.
+U and g come with surroundings of their own: `NFRC`, `ISO_52022_3`, or prescribed convection, whose
+films belong to the measuring condition and not to a climate.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import Fenestration, LayerResistance, fit_conductance_surface
+from thermal.blackbox import LayerResistance, fit_conductance_surface
 from thermal.errors import require
+from thermal.glazing_unit import Environment, GlazingUnit
+from thermal.layer_balance import INDOORS, UnitArrays, UnitState, settle
 
 FloatArray = NDArray[np.float64]
 CONVECTION_OUTSIDE, CONVECTION_INSIDE = 20.0, 2.7  # [W/(m2 K)]; with radiation about 25 and 7.7
@@ -23,7 +22,111 @@ U_STATE_C = (0.0, 20.0)  # outdoors and indoors
 G_STATE = (25.0, 24.0, 500.0)  # outdoors and indoors [degC], sun [W/m2]
 OUTDOOR_C = (-25.0, -15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0)  # grid of R(T_m, dT)
 INDOOR_C = (5.0, 15.0, 25.0, 35.0, 45.0)
-ANGLES_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 85.0)
+UNSETTLED = 1e-3  # [K] change of the last round beyond which a state has no meaning
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """Surroundings and sun at which U or g of a glazing is stated."""
+
+    outdoor: Environment
+    indoor: Environment
+    sun: float = 0.0  # [W/m2]
+
+
+def prescribed(outdoor_c: float, indoor_c: float, sun: float = 0.0) -> Conditions:
+    """Conditions with the films of a measurement: convection 20 and 2.7 W/(m2 K)."""
+    return Conditions(
+        Environment(outdoor_c, CONVECTION_OUTSIDE), Environment(indoor_c, CONVECTION_INSIDE), sun
+    )
+
+
+# By standard: the state of U, and that of g.  NFRC 100 and 200: wind 5.5 and 2.75 m/s, 4 + 4 v
+NFRC = (
+    Conditions(Environment(-18.0, 26.0), Environment(21.0, None)),
+    Conditions(Environment(32.0, 15.0), Environment(24.0, None), 783.0),
+)
+# ISO 52022-3:2017 (before: EN 13363-2), reference and summer conditions
+ISO_52022_3 = (
+    Conditions(Environment(5.0, 18.0), Environment(20.0, 3.6), 300.0),
+    Conditions(Environment(25.0, 8.0), Environment(25.0, 2.5), 500.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class UnitBalance:
+    """A glazing unit in the steady state."""
+
+    faces_c: FloatArray  # [2 N] front and back of each layer, outside to inside
+    heat_in: float  # to the room, without transmitted sun; ventilated air included [W/m2]
+    films: FloatArray  # [2] convection outdoors and indoors [W/(m2 K)]
+    gap_speed: FloatArray  # [G] [m/s]
+    gap_outlet_c: FloatArray  # [G]
+
+
+def unit_balance(
+    unit: GlazingUnit, conditions: Conditions, absorbed: ArrayLike = 0.0
+) -> UnitBalance:
+    """The steady state of a unit; absorbed: sun in each layer [N] [W/m2].
+
+    Raises: `ThermalInputError` where no state settles.
+    """
+    arrays = unit.arrays(conditions.outdoor, conditions.indoor)
+    return _balance(unit, arrays, _start(unit, conditions), absorbed)
+
+
+def _start(unit: GlazingUnit, conditions: Conditions) -> UnitState:
+    n = len(unit.layers)
+    ends = [e.air_c + 273.15 for e in (conditions.outdoor, conditions.indoor)]
+    faces = np.linspace(ends[0], ends[1], 2 * n + 2)[1:-1].copy()
+    return UnitState(
+        faces, np.zeros(2 * n), np.zeros((n - 1, 6)), np.zeros(2), np.zeros((4 * n, 4 * n + 1))
+    )
+
+
+def _balance(
+    unit: GlazingUnit, arrays: UnitArrays, state: UnitState, absorbed: ArrayLike
+) -> UnitBalance:
+    """The balance from where the state is."""
+    sun = np.broadcast_to(np.asarray(absorbed, dtype=float), (len(unit.layers),)).copy()
+    change = settle(arrays, sun, state)
+    require(change < UNSETTLED, "glazing", f"no steady state ({change:.1g} K)")
+    room = arrays.films[1, 0]
+    heat = state.film[1] * (state.faces[-1] - room) + state.radiosity[-1] - arrays.place[3]
+    if len(unit.gaps) and arrays.air[-1] == INDOORS:
+        heat -= state.gap[-1, 1]  # what the faces lose to the air that comes back warmer
+    return UnitBalance(
+        state.faces - 273.15,
+        float(heat),
+        state.film.copy(),
+        state.gap[:, 2].copy(),
+        state.gap[:, 4] - 273.15,
+    )
+
+
+def iso15099_u_value(unit: GlazingUnit, conditions: Conditions) -> float:
+    """U [W/(m2 K)]: heat through the dark unit by the difference of the air temperatures."""
+    dark = unit_balance(unit, conditions)
+    return -dark.heat_in / (conditions.indoor.air_c - conditions.outdoor.air_c)
+
+
+def iso15099_g_values(
+    unit: GlazingUnit, conditions: Conditions, transmittance: ArrayLike, absorptance: ArrayLike
+) -> FloatArray:
+    """g [...] = tau + (heat with sun - heat without)/sun.
+
+    Args: transmittance: [...] solar; absorptance: of each layer [..., N].
+    """
+    tau, alpha = np.asarray(transmittance, dtype=float), np.asarray(absorptance, dtype=float)
+    layers = len(unit.layers)
+    fits = alpha.shape == (*tau.shape, layers)
+    require(fits, "absorptance", f"expected {(*tau.shape, layers)} values, got {alpha.shape}")
+    arrays = unit.arrays(conditions.outdoor, conditions.indoor)
+    state = _start(unit, conditions)
+    dark = _balance(unit, arrays, state, 0.0).heat_in
+    sun, rows = conditions.sun, alpha.reshape(-1, layers)
+    secondary = [(_balance(unit, arrays, state, sun * row).heat_in - dark) / sun for row in rows]
+    return tau + np.array(secondary).reshape(tau.shape)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,110 +137,32 @@ class Iso15099Data:
     r_outer: float  # [m2 K/W] realised in that state: face to environment
     r_inner: float
     resistance: LayerResistance  # between the two faces
-    incidence: FloatArray  # [A] [rad]
-    transmittance: FloatArray  # [A] solar
-    reflectance: FloatArray  # [A]
-    g_value: FloatArray  # [A]
-
-    def fenestration(self, name: str) -> Fenestration:
-        """The system in the closure "R(T_m, dT)"."""
-        return Fenestration(name, self.u_value, resistance=self.resistance)
 
 
-def iso15099_data(
-    solid_layers: Sequence[Any],
-    gap_layers: Sequence[Any],
-    *,
-    height: float = 1.5,
-    angles_deg: Sequence[float] = ANGLES_DEG,
-    method: str = "SOLAR",
-) -> Iso15099Data:
-    """U, films, R(T_m, dT), optics and g of pywincalc layers, outside to inside.
-
-    Args: height: of the glazing [m]; angles_deg: of incidence (in the plane phi = 0).
-
-    Source: ISO 15099:2003, as WINDOW's engine computes it.
-    """
-    require(len(gap_layers) == len(solid_layers) - 1, "layers", "one gap between two layers")
-
-    def system(outdoor: float, indoor: float, sun: float = 0.0) -> Any:
-        return _system(solid_layers, gap_layers, height, outdoor, indoor, sun)
-
-    u_value, r_outer, _, r_inner, _ = _dark_state(system(*U_STATE_C), *U_STATE_C)
-    states = [
-        _dark_state(system(e, i), e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0
-    ]
+def iso15099_data(unit: GlazingUnit) -> Iso15099Data:
+    """U, realised films and R(T_m, dT) of a unit, films prescribed."""
+    u_value, r_outer, _, r_inner, _ = _dark_state(unit, *U_STATE_C)
+    states = [_dark_state(unit, e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0]
     mean, difference, resistance = (
         np.array(column) for column in zip(*(_middle(state) for state in states), strict=True)
     )
-    bright = system(*G_STATE)
-    optics = [bright.optical_method_results(method, a, 0.0).system_results for a in angles_deg]
-    front = [o.front for o in optics]
-    return Iso15099Data(
-        u_value,
-        r_outer,
-        r_inner,
-        fit_conductance_surface(mean, difference, resistance),
-        np.radians(angles_deg),
-        np.array([_total(f.transmittance) for f in front]),
-        np.array([_total(f.reflectance) for f in front]),
-        np.array([bright.shgc(a, 0.0) for a in angles_deg]),
-    )
+    fit = fit_conductance_surface(mean, difference, resistance)
+    return Iso15099Data(u_value, r_outer, r_inner, fit)
 
 
-def _total(property_: Any) -> float:
-    return float(property_.direct_direct + property_.direct_diffuse)
+DarkState = tuple[float, float, float, float, tuple[float, float]]
 
 
-def _system(
-    solid: Sequence[Any],
-    gaps: Sequence[Any],
-    height: float,
-    outdoor: float,
-    indoor: float,
-    sun: float,
-) -> Any:
-    import pywincalc
-
-    prescribed = pywincalc.BoundaryConditionsCoefficientModelType.HC_PRESCRIBED
-
-    def environment(celsius: float, film: float, light: float) -> Any:
-        kelvin = celsius + 273.15
-        return pywincalc.Environment(
-            air_temperature=kelvin, pressure=101325.0, convection_coefficient=film,
-            coefficient_model=prescribed, radiation_temperature=kelvin, emissivity=1.0,
-            direct_solar_radiation=light,
-        )  # fmt: skip
-
-    return pywincalc.GlazingSystem(
-        solid_layers=list(solid),
-        gap_layers=list(gaps),
-        width_meters=1.0,
-        height_meters=height,
-        environment=pywincalc.Environments(
-            environment(outdoor, CONVECTION_OUTSIDE, sun),
-            environment(indoor, CONVECTION_INSIDE, 0.0),
-        ),
-    )
-
-
-def _dark_state(
-    system: Any, outdoor: float, indoor: float
-) -> tuple[float, float, float, float, tuple[float, float]]:
+def _dark_state(unit: GlazingUnit, outdoor: float, indoor: float) -> DarkState:
     """U, R_e, R, R_i and the temperatures of the outermost and innermost face [degC]."""
-    import pywincalc
-
-    u_value = float(system.u())
-    faces = np.array(system.layer_temperatures(pywincalc.TarcogSystemType.U)) - 273.15
-    heat = u_value * (indoor - outdoor)
-    outer, inner = float(faces[0]), float(faces[-1])
+    balance = unit_balance(unit, prescribed(outdoor, indoor))
+    heat = -balance.heat_in
+    outer, inner = float(balance.faces_c[0]), float(balance.faces_c[-1])
     resistances = ((outer - outdoor) / heat, (inner - outer) / heat, (indoor - inner) / heat)
-    return u_value, *resistances, (outer, inner)
+    return heat / (indoor - outdoor), *resistances, (outer, inner)
 
 
-def _middle(
-    state: tuple[float, float, float, float, tuple[float, float]],
-) -> tuple[float, float, float]:
+def _middle(state: DarkState) -> tuple[float, float, float]:
     """Mean temperature, difference and resistance of a state."""
     *_, resistance, _, (outer, inner) = state
     return 0.5 * (outer + inner), inner - outer, resistance
