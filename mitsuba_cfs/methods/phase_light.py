@@ -175,10 +175,15 @@ class PhaseLight:
 
     def direct_sun(self, state: State | None = None) -> NDArray[np.float64] | None:
         """Illuminance of the sensors straight from the sun [S, L] [lx]; None by three phases."""
+        groups = self.direct_sun_by_group(state)
+        return None if groups is None else sum(groups)
+
+    def direct_sun_by_group(self, state: State | None = None) -> list[NDArray[np.float64]] | None:
+        """The same through each window group alone [G][S, L] [lx]."""
         parts = [self._chosen(g, "sun", row) for g, row in enumerate(self._state(state))]
         if parts[0] is None:
             return None
-        return sum(parts)[: len(self._traced.scene.points)]
+        return [part[: len(self._traced.scene.points)] for part in parts]
 
     def relative_error(self, state: State | None = None) -> NDArray[np.float64]:
         """Standard error of each sensor's mean over the hours [S], from the tracing.
