@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from bim.model import Space
 from scenes.comply.findings import Findings
+from scenes.comply.needs import Need
 from scenes.comply.openings import openings_of
 from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable, RuleTable
 from scenes.comply.uses import RoomUse
@@ -60,26 +62,34 @@ def highest(criterion: CriterionTable, met: Sequence[bool | None]) -> str:
     return names[-1] if names else NOT_MET
 
 
+def values_of(
+    rule: RuleTable, findings: Findings, parts: frozenset[str]
+) -> dict[Need, float | None]:
+    """The values of a rule's needs that look at some parts of the findings."""
+    needs = (need for criterion in rule.criterion for need in criterion.needs)
+    return {need: need.value(findings) for need in needs if need.parts & parts}
+
+
 def assess_room(
-    rules: Mapping[str, RuleTable], findings: Mapping[str, Findings], use: RoomUse
+    rules: Mapping[str, RuleTable],
+    values: Mapping[str, Mapping[Need, float | None]],
+    space: Space,
+    use: RoomUse,
 ) -> Iterator[RoomVerdict]:
     """A room against every criterion.
 
-    Args: findings: by rule, each with the light on the rule's grid.
+    Args: values: of every need by rule, see `values_of`.
     """
     for name, rule in rules.items():
-        found = findings[name]
         for criterion in rule.criterion:
-            if not applies(criterion, found, use):
+            if not applies(criterion, space, use):
                 yield RoomVerdict(name, criterion, False)
                 continue
-            values = tuple(
-                tuple(need.value(found) for need in level.needs) for level in criterion.level
-            )
-            yield RoomVerdict(name, criterion, True, values)
+            found = (tuple(values[name][n] for n in level.needs) for level in criterion.level)
+            yield RoomVerdict(name, criterion, True, tuple(found))
 
 
-def applies(criterion: CriterionTable, found: Findings, use: RoomUse) -> bool:
+def applies(criterion: CriterionTable, space: Space, use: RoomUse) -> bool:
     """Whether a criterion is for a room: by its use, its occupation and its openings."""
     if criterion.occupied and not use.occupied:
         return False
@@ -87,7 +97,7 @@ def applies(criterion: CriterionTable, found: Findings, use: RoomUse) -> bool:
         return False
     if criterion.openings == "any":
         return True
-    roof = bool(found.space.windows) and all(one.is_horizontal for one in openings_of(found.space))
+    roof = bool(space.windows) and all(one.is_horizontal for one in openings_of(space))
     return roof == (criterion.openings == "roof")
 
 

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.metrics.autonomy import daylight_autonomy
+from mitsuba_cfs.metrics.lm83 import sunlit_hours
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
-from mitsuba_cfs.sky.weather import Weather
-from scenes.comply.assess import BuildingVerdict, RoomVerdict, assess_building, assess_room
+from mitsuba_cfs.sky.annual import AnnualSky
+from scenes.comply.assess import assess_building, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import Calendar, Findings, GridLight, calendar_of
+from scenes.comply.findings import Findings, GridLight, calendar_of
 from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import Outdoors, outdoors_of
-from scenes.comply.rules import RuleTable
-from scenes.comply.sunlight import SunDay, SunExposure, sun_day, sun_exposure
+from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
+from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
@@ -35,46 +35,7 @@ from scenes.run.building import read_building
 from scenes.run.inputs import named_spaces
 from scenes.run.rooms import RoomSeries
 
-
-@dataclass(frozen=True, slots=True)
-class RoomLights:
-    """The light of a room on the grid of each rule, and its glare."""
-
-    space: Space
-    by_rule: Mapping[str, GridLight]
-    dgp: NDArray[np.float64] | None  # [N] of the hours of use
-    groups: tuple[str, ...]  # names of the window groups
-    seconds: float
-    template: str = ""  # name of the equal room that was computed; "": this one
-
-
-@dataclass(frozen=True, slots=True)
-class CheckedRoom:
-    """A room against all rules, with what the drawings show."""
-
-    space: Space
-    use: RoomUse
-    verdicts: tuple[RoomVerdict, ...]
-    findings: Mapping[str, Findings]  # by rule
-    groups: tuple[str, ...] = ()
-    template: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Compliance:
-    """A building against rules."""
-
-    building: Building
-    rules: Mapping[str, RuleTable]
-    rooms: tuple[CheckedRoom, ...]
-    verdicts: tuple[BuildingVerdict, ...]
-    calendar: Calendar
-    weather: Weather
-    day: SunDay
-    assumptions: tuple[str, ...]  # sentences
-    notes: tuple[str, ...]
-    problems: tuple[Problem, ...]
-    seconds: dict[str, float]  # by part
+LIGHT, RAYS = frozenset({"open", "operated", "glare"}), frozenset({"view", "sun"})
 
 
 def check_building(
@@ -187,7 +148,9 @@ class Check:
     def lights(self, spaces: list[Space]) -> tuple[dict[str, RoomLights], list[Problem], list[str]]:
         """The light of each room by GUID, equal rooms computed once."""
         if not self.lit:
-            return {s.guid: RoomLights(s, {}, None, (), 0.0) for s in spaces}, [], []
+            rules = self.files.rules.items()
+            none = {name: values_of(rule, Findings(self.calendar), LIGHT) for name, rule in rules}
+            return {s.guid: RoomLights(s, {}, none) for s in spaces}, [], []
         start, options = time.monotonic(), self.options
         self.progress("sky", 0.0)
         skies = skies_for(self.files.weather, options.room.method, options.room.sampling)
@@ -204,9 +167,11 @@ class Check:
         self.seconds["light"] = round(time.monotonic() - start, 1)
         return {result.space.guid: result for result in results}, problems, notes
 
-    def _light(self, space: Space, skies, cache, progress: Progress) -> RoomLights:
+    def _light(
+        self, space: Space, skies: AnnualSky, cache: MatrixCache | None, progress: Progress
+    ) -> RoomLights:
         """One room's light on all grids, and its glare where that is wanted."""
-        start, rules = time.monotonic(), self.files.rules
+        rules = self.files.rules
         grids = {name: sensor_grid_of(space, rule.grid) for name, rule in rules.items()}
         distinct = list(dict.fromkeys(grids.values()))
         room = RoomSimulation(
@@ -216,42 +181,52 @@ class Check:
         operated = {
             distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts
         }
-        found = lights_of(room, operated)
-        dgp = None
+        found, dgp = lights_of(room, operated), None
         if self.options.annual_glare and "glare" in self.parts:
             used = working_hours(self.files.weather, *self.options.room.occupancy.hours)
             dgp = room.annual_glare()["dgp"].fillna(0.0).to_numpy()[used]
-        by_rule = {name: found[distinct.index(grid)] for name, grid in grids.items()}
-        names = tuple(group.name for group in room.windows.groups)
-        seconds = round(time.monotonic() - start, 2)
-        return RoomLights(space, by_rule, dgp, names, seconds)
+        lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
+        values = {
+            name: values_of(rules[name], Findings(self.calendar, light, dgp=dgp), LIGHT)
+            for name, light in lights.items()
+        }
+        summaries = {id(light): self._summary(light) for light in found}
+        by_rule = {name: summaries[id(light)] for name, light in lights.items()}
+        return RoomLights(space, by_rule, values, tuple(g.name for g in room.windows.groups))
+
+    def _summary(self, light: GridLight) -> GridSummary:
+        ten = self.calendar.ten
+        light_of_use = light.open if light.operated is None else light.operated
+        return GridSummary(
+            light.points,
+            light.factor,
+            daylight_autonomy(light_of_use, ten),
+            sunlit_hours(light.direct, ten, step_h=self.calendar.step_h),
+            None if light.closed is None else light.closed[ten].mean(axis=0),
+        )
 
     def room(
         self, space: Space, use: RoomUse, light: RoomLights, view: ViewOut, sun: SunExposure
     ) -> CheckedRoom:
         """A room with windows against all rules."""
-        findings = {
-            name: Findings(space, self.calendar, light.by_rule.get(name), view, sun, light.dgp)
-            for name in self.files.rules
+        rules, findings = self.files.rules, Findings(self.calendar, view=view, sun=sun)
+        values = {
+            name: {**light.values[name], **values_of(rule, findings, RAYS)}
+            for name, rule in rules.items()
         }
-        verdicts = tuple(assess_room(self.files.rules, findings, use))
-        return CheckedRoom(space, use, verdicts, findings, light.groups, light.template)
+        verdicts = tuple(assess_room(rules, values, space, use))
+        return CheckedRoom(space, use, verdicts, view, sun, light if light.grids else None)
 
     def dark_room(self, space: Space, use: RoomUse) -> CheckedRoom:
         """An occupied room without any window: it has no daylight, no view and no sun."""
-        hours, groups = len(self.calendar.times), 0
-        none = np.zeros((hours, 1), dtype=np.float32)
-        blind = np.zeros((hours, groups), dtype=bool)
-        light = GridLight(np.zeros((1, 3)), none, none, np.zeros(1), none, blind)
+        none = np.zeros((len(self.calendar.times), 1), dtype=np.float32)
+        light = GridLight(np.zeros((1, 3)), none, none, np.zeros(1), none) if self.lit else None
         view = ViewOut(np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((1, 3), dtype=bool))
-        sun = SunExposure((), ())
-        findings = {
-            name: Findings(space, self.calendar, light if self.lit else None, view, sun)
-            for name in self.files.rules
-        }
-        return CheckedRoom(
-            space, use, tuple(assess_room(self.files.rules, findings, use)), findings
-        )
+        findings = Findings(self.calendar, light, view, SunExposure((), ()))
+        rules = self.files.rules
+        values = {name: values_of(rule, findings, LIGHT | RAYS) for name, rule in rules.items()}
+        verdicts = tuple(assess_room(rules, values, space, use))
+        return CheckedRoom(space, use, verdicts, None, None, None)
 
     def assumptions(self, rooms: list[CheckedRoom]) -> list[str]:
         """What was assumed, in sentences."""
@@ -283,7 +258,5 @@ class Check:
 def moved_lights(found: RoomLights, space: Space) -> RoomLights:
     """The light of a template room for one equal to it, moved to where that stands."""
     shift = corner(space) - corner(found.space)
-    moved = {id(light): replace(light, points=light.points + shift)
-             for light in found.by_rule.values()}  # fmt: skip
-    by_rule = {name: moved[id(light)] for name, light in found.by_rule.items()}
-    return replace(found, space=space, by_rule=by_rule, seconds=0.0, template=found.space.label)
+    grids = {name: replace(grid, points=grid.points + shift) for name, grid in found.grids.items()}
+    return replace(found, space=space, grids=grids, template=found.space.label)

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Space
 from mitsuba_cfs.metrics.schedules import daylight_hours, lm83_hours
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.sunlight import SunExposure
@@ -55,9 +54,8 @@ class Calendar:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """A room and what was computed of it; None is not computed."""
+    """What was computed of a room; None is not computed."""
 
-    space: Space
     calendar: Calendar
     light: GridLight | None = None  # on the grid of the rules that look at it
     view: ViewOut | None = None
