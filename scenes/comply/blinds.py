@@ -23,12 +23,13 @@ def open_and_closed(
     Open is the first state.  Closed is what is given, else the window's last state, else the
     default shade behind the open state.
     """
-    known: dict[int, States] = {}
+    known: dict[tuple[int, ...], States] = {}
     for states in systems.values():
-        if id(states) not in known:
+        key = tuple(map(id, states))
+        if key not in known:
             last = states[-1] if len(states) > 1 else None
-            known[id(states)] = (states[0], closed or last or with_default_shade(states[0]))
-    return {guid: known[id(states)] for guid, states in systems.items()}
+            known[key] = (states[0], closed or last or with_default_shade(states[0]))
+    return {guid: known[tuple(map(id, states))] for guid, states in systems.items()}
 
 
 def with_default_shade(system: FenestrationSystem) -> FenestrationSystem:

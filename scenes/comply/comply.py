@@ -21,7 +21,7 @@ from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, calendar_of
 from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.options import ComplyOptions
-from scenes.comply.outdoors import Outdoors, outdoors_of
+from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.uses import UNKNOWN, RoomUse
@@ -104,7 +104,7 @@ class Check:
         self.notes += files.weather.notes
         self.calendar = calendar_of(files.weather)
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
-        self.outdoors: Outdoors = outdoors_of(self.building)
+        self.outdoors: OutdoorMesh = outdoors_of(self.building)
         self.seconds: dict[str, float] = {}
 
     @property

@@ -19,7 +19,7 @@ _NOTHING = Element("", "nothing", "IfcSite", -1e9 + np.eye(3)[None], 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Outdoors:
+class OutdoorMesh:
     """The elements of a building as one mesh."""
 
     mesh: RayMesh
@@ -54,11 +54,11 @@ class Outdoors:
         return distance, element
 
 
-def outdoors_of(building: Building) -> Outdoors:
+def outdoors_of(building: Building) -> OutdoorMesh:
     """The elements of a building in one mesh; one far below where there are none."""
     elements = building.elements or (_NOTHING,)
     counts = [len(element.triangles) for element in elements]
-    return Outdoors(
+    return OutdoorMesh(
         ray_mesh(np.concatenate([element.triangles for element in elements])),
         np.repeat(np.arange(len(elements)), counts),
         tuple(element.guid for element in elements),

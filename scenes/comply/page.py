@@ -11,6 +11,7 @@ from markupsafe import Markup
 from scenes.comply import tables
 from scenes.comply.drawings import plans, sun_bars
 from scenes.comply.results import CheckedRoom, Compliance
+from scenes.comply.rules import RuleTable
 from scenes.figures.chart import Chart
 from scenes.figures.plan import FloorPlan
 from scenes.quick import NOTE
@@ -20,6 +21,16 @@ from scenes.report.room import facts
 from scenes.report.tables import Column, Table
 
 STYLE = files(__package__) / "templates" / "dossier.css"
+
+
+@dataclass(frozen=True, slots=True)
+class DossierRule:
+    """The section of one rule."""
+
+    rule: RuleTable
+    building: Table
+    rooms: Table
+    without: tuple[str, ...]  # titles of criteria that no room is for
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +57,22 @@ def dossier_html(result: Compliance, *, quick: bool = False) -> str:
         facts=summary(result),
         notes=([NOTE] if quick else []) + list(result.notes),
         assumptions=result.assumptions,
-        rules=[(name, rule, tables.building_table(result, name))
-               for name, rule in result.rules.items()],
-        overview=tables.rooms_table(result),
+        rules=[dossier_rule(result, name) for name in result.rules],
         rooms=rooms,
         problems=problems_table(result),
         seconds=", ".join(f"{name} {value:g} s" for name, value in result.seconds.items()),
         style=Markup("\n".join(one.read_text("utf-8") for one in style)),
     )  # fmt: skip
+
+
+def dossier_rule(result: Compliance, name: str) -> DossierRule:
+    """Tables of a rule."""
+    return DossierRule(
+        result.rules[name],
+        tables.building_table(result, name),
+        tables.rooms_table(result, name),
+        tables.without_rooms(result, name),
+    )
 
 
 def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierRoom:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bim.rays import RayMesh
 from scenes.comply.openings import Opening
-from scenes.comply.outdoors import Outdoors
+from scenes.comply.outdoors import OutdoorMesh
 
 FloatArray = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class Sight:
 
     opening: Opening
     room: RayMesh
-    outdoors: Outdoors
+    outdoors: OutdoorMesh
     own: NDArray[np.bool_]  # [E] of the elements outdoors: the room's windows
 
     def intervals(self, eyes: FloatArray) -> FloatArray:

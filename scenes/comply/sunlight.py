@@ -13,7 +13,7 @@ from bim.model import Space
 from mitsuba_cfs.sky.sun import day_of_sun
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.openings import Opening, openings_of
-from scenes.comply.outdoors import Outdoors, opaque_room
+from scenes.comply.outdoors import OutdoorMesh, opaque_room
 
 FloatArray = NDArray[np.float64]
 Intervals = list[tuple[float, float]]  # minutes of the day, local standard time
@@ -76,7 +76,7 @@ def sun_day(weather: Weather, month: int, day: int, least_altitude_deg: float) -
     return SunDay(date, directions, float(np.radians(least_altitude_deg)))
 
 
-def sun_exposure(space: Space, outdoors: Outdoors, day: SunDay) -> SunExposure:
+def sun_exposure(space: Space, outdoors: OutdoorMesh, day: SunDay) -> SunExposure:
     """Hours of sun at the reference points of a room's openings on a cloudless day.
 
     The reference point is on the inner surface of the wall in the middle of the opening's width,

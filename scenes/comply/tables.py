@@ -50,13 +50,11 @@ def building_table(result: Compliance, rule: str) -> Table:
     columns += [Column("Value"), Column("Limit"), _text("Met"), Column("Rooms")]
     rows = []
     for verdict in result.verdicts:
-        if verdict.rule != rule:
+        if verdict.rule != rule or not verdict.rooms:
             continue
         one = verdict.criterion
         for level, value, met in zip(one.level, verdict.values, verdict.met, strict=True):
             what, number, limit = _compared(level, value)
-            if not verdict.rooms:
-                number, what = MISSING, "no room that it is for"
             rows.append(
                 (one.title, one.clause, level.name, what, number, limit, yes_or_no(met),
                  str(verdict.rooms))
@@ -77,14 +75,17 @@ def _compared(level: LevelTable, value: float | None) -> tuple[str, str, str]:
     return OVER[level.over], number, limit
 
 
-def rooms_table(result: Compliance) -> Table:
+def without_rooms(result: Compliance, rule: str) -> tuple[str, ...]:
+    """Titles of the criteria of a rule that no room is for."""
+    verdicts = (v for v in result.verdicts if v.rule == rule and not v.rooms)
+    return tuple(verdict.criterion.title for verdict in verdicts)
+
+
+def rooms_table(result: Compliance, rule: str) -> Table:
     """Every room with the level that it reaches of each criterion that is for some room."""
-    numbers = [i for i, v in enumerate(result.verdicts) if v.rooms]
+    numbers = [i for i, v in enumerate(result.verdicts) if v.rule == rule and v.rooms]
     columns = [_text("Room"), _text("Use"), Column("Area", "m²")]
-    for i in numbers:
-        verdict = result.verdicts[i]
-        meaning = f"{result.rules[verdict.rule].title}: {verdict.criterion.title}"
-        columns.append(Column(f"{verdict.rule} {verdict.criterion.key}", "", meaning, False))
+    columns += [_text(result.verdicts[i].criterion.title) for i in numbers]
     rows = [
         (
             room.space.label,
@@ -94,7 +95,7 @@ def rooms_table(result: Compliance) -> Table:
         )
         for room in result.rooms
     ]
-    return Table("All rooms", tuple(columns), tuple(rows))
+    return Table("Room by room", tuple(columns), tuple(rows))
 
 
 def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.sensors import sensor_grid
 from scenes.comply.openings import openings_of
-from scenes.comply.outdoors import Outdoors, opaque_room
+from scenes.comply.outdoors import OutdoorMesh, opaque_room
 from scenes.comply.sight import LAYERS, Sight
 
 FloatArray = NDArray[np.float64]
@@ -48,7 +48,7 @@ class ViewOut:
 
 def view_out(
     space: Space,
-    outdoors: Outdoors,
+    outdoors: OutdoorMesh,
     *,
     spacing: float = SPACING,
     eye_height: float = SEATED,
