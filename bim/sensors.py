@@ -87,6 +87,18 @@ def sensor_grid(
     return points, np.tile([0.0, 0.0, 1.0], (len(points), 1))
 
 
+def plane_sides(space: Space, height: float, margin: float) -> tuple[float, float]:
+    """Sides [m] of the rectangle round the work plane, along its longest edge and across.
+
+    Raises: `RoomError` for a room that is lower than its work plane.
+    """
+    plane = _section(space, height)
+    inner = plane.buffer(-margin, join_style="mitre")
+    plane = inner if inner.area >= SMALLEST_AREA else plane
+    x0, y0, x1, y1 = _along_longest_edge(plane)[0].bounds
+    return float(x1 - x0), float(y1 - y0)
+
+
 def _section(space: Space, height: float) -> shapely.Geometry:
     """The room's outline at a height above its floor [m]."""
     if not space.faces:

@@ -17,6 +17,7 @@ from scenes.streams import open_streams
 # name: help in one line. The module <name> of one of PLACES defines `command`.
 COMMANDS = {
     "run": "IFC, weather and fenestration to daylight, glare, heat and comfort.",
+    "comply": "Rooms against EN 17037, LM-83, LEED, BREEAM: a dossier that prints.",
     "demo": "The whole job on the office that comes with the program.",
     "doctor": "Versions, the variant that traces the rays, and a self-test.",
     "ifc": "What an IFC file holds, and what is wrong with it.",

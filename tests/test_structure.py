@@ -30,7 +30,7 @@ RANKS = {
         {"fenestration", "cost", "report", "plots", "photovoltaics"},
         {"room"},
         {"run", "fenestration_exports"},
-        {"heat", "calibration", "picture_files", "simulation", "year_of_glare"},
+        {"comply", "heat", "calibration", "picture_files", "simulation", "year_of_glare"},
         {"study", "view_picture"},
         {"study_report"},
         {"commands"},

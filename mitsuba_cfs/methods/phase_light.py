@@ -175,10 +175,15 @@ class PhaseLight:
 
     def direct_sun(self, state: State | None = None) -> NDArray[np.float64] | None:
         """Illuminance of the sensors straight from the sun [S, L] [lx]; None by three phases."""
+        groups = self.direct_sun_by_group(state)
+        return None if groups is None else sum(groups)
+
+    def direct_sun_by_group(self, state: State | None = None) -> list[NDArray[np.float64]] | None:
+        """The same through each window group alone [G][S, L] [lx]."""
         parts = [self._chosen(g, "sun", row) for g, row in enumerate(self._state(state))]
         if parts[0] is None:
             return None
-        return sum(parts)[: len(self._traced.scene.points)]
+        return [part[: len(self._traced.scene.points)] for part in parts]
 
     def relative_error(self, state: State | None = None) -> NDArray[np.float64]:
         """Standard error of each sensor's mean over the hours [S], from the tracing.
@@ -197,7 +202,7 @@ class PhaseLight:
             share = np.bincount(row, minlength=len(self.sensors[g])) / len(row)
             sun = sum(w * s.sun_error for w, s in zip(share, self.sensors[g], strict=True))
             variance = variance + (sun / len(row)) ** 2
-        mean = self._of_all(state).mean(axis=1)
+        """What D as a mean over a group's parts changes at each sensor, B's error too [S]."""
         error = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
         return error[: len(self._traced.scene.points)]
 

@@ -142,3 +142,20 @@ def daylight_factor_level(
         if enough and least:
             level = candidate
     return level
+
+
+def greatest_cell(length: float, width: float) -> float:
+    """Greatest size p [m] of a cell of the grid on a reference plane of these sides [m].
+
+        p = 0.5 x 5^log10(d),
+
+    with d the longer side, or the shorter one where the longer is at least twice as long; 10 m at
+    the most.
+
+    Source: EN 17037:2018, annex B.1; the rule is that of EN 12464-1.
+    """
+    longer, shorter = max(length, width), min(length, width)
+    if not shorter > 0:
+        raise ValueError(f"expected a plane of two sides, got {length} x {width} m")
+    d = shorter if longer >= 2 * shorter else longer
+    return float(min(0.5 * 5 ** np.log10(d), 10.0))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -94,27 +96,12 @@ def blinds_closed(
 
 
 def blinds_operated(
-    blinds_open: ArrayLike,
-    blinds_down: ArrayLike,
-    direct_illuminance: ArrayLike,
-    *,
-    areas: ArrayLike | None = None,
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Illuminance [H, S] with the blinds of each group as LM-83 moves them, and when [H, W] down.
+    direct_illuminance: Sequence[ArrayLike], *, areas: ArrayLike | None = None
+) -> NDArray[np.bool_]:
+    """Time steps [G, H] in which the blinds of each window group are closed, as LM-83 moves them.
 
-    Args:
-        blinds_open, blinds_down: [W, H, S] [lx] by window group, in either state.
-        direct_illuminance: [W, H, S] [lx] straight from the sun, blinds open.
+    Args: direct_illuminance: [G][H, S] [lx] straight from the sun through each group alone, open.
+
+    Source: IES LM-83-12, 2.2.6: the groups are moved each for itself.
     """
-    up, down = np.asarray(blinds_open, dtype=float), np.asarray(blinds_down, dtype=float)
-    direct = np.asarray(direct_illuminance, dtype=float)
-    if up.ndim != 3 or up.shape != down.shape or up.shape != direct.shape:
-        raise ValueError(
-            f"expected three arrays [W, H, S], got {up.shape}, {down.shape}, {direct.shape}"
-        )
-    total = np.zeros(up.shape[1:])
-    closed = np.zeros((up.shape[1], len(up)), dtype=bool)
-    for i in range(len(up)):
-        closed[:, i] = blinds_closed(direct[i], areas=areas)
-        total += np.where(closed[:, i, None], down[i], up[i])
-    return total, closed
+    return np.stack([blinds_closed(direct, areas=areas) for direct in direct_illuminance])

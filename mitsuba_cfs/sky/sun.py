@@ -27,14 +27,25 @@ def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float6
     """
     if model not in SUN_MODELS:
         raise ValueError(f"sun model: expected one of {SUN_MODELS}, got {model!r}")
-    found = _spa_directions(weather) if model == "spa" else _radiance_directions(weather)
+    spa = model == "spa"
+    found = _spa_directions(weather, weather.midpoints) if spa else _radiance_directions(weather)
     return rotated(found, weather.turned_deg) if weather.turned_deg else found
 
 
-def _spa_directions(weather: Weather) -> NDArray[np.float64]:
+def day_of_sun(weather: Weather, day: pd.Timestamp) -> NDArray[np.float64]:
+    """Unit vectors [1441, 3] towards the sun at each minute of a day, from midnight to midnight.
+
+    Local standard time at the weather's place; by the Solar Position Algorithm, as above.
+    """
+    times = pd.date_range(day, periods=24 * 60 + 1, freq="min")
+    found = _spa_directions(weather, times)
+    return rotated(found, weather.turned_deg) if weather.turned_deg else found
+
+
+def _spa_directions(weather: Weather, times: pd.DatetimeIndex) -> NDArray[np.float64]:
     from pvlib import solarposition
 
-    utc = weather.midpoints - pd.Timedelta(hours=weather.timezone_h)
+    utc = times - pd.Timedelta(hours=weather.timezone_h)
     pressure, temperature = weather.pressure_pa, weather.dry_bulb_c
     standard = air.standard_pressure(weather.elevation_m)
     table = solarposition.spa_python(

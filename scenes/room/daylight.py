@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -25,13 +27,19 @@ from scenes.room.windows import RoomWindows
 
 
 def room_scene(
-    building: Building, space: Space, windows: RoomWindows, grid: SensorGrid, picture_size: int
+    building: Building,
+    space: Space,
+    windows: RoomWindows,
+    grids: Sequence[SensorGrid],
+    picture_size: int,
 ) -> DaylightScene:
     """Triangles, window groups, sensors and view of a room in the visible band.
 
-    Args: picture_size: pixels of a side of the view.
+    Args:
+        grids: of the sensors, one after the other.
+        picture_size: pixels of a side of the view.
     """
-    points, _ = sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)
+    points = np.concatenate([grid_points(space, grid) for grid in grids])
     position, direction = view_point(space)
     return DaylightScene(
         interior_surfaces(space, "visible"),
@@ -41,6 +49,11 @@ def room_scene(
         np.tile([0.0, 0.0, 1.0], (len(points), 1)),
         fisheye(position, direction, picture_size),
     )
+
+
+def grid_points(space: Space, grid: SensorGrid) -> NDArray[np.float64]:
+    """Sensors [S, 3] of a grid in a room [m]."""
+    return sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)[0]
 
 
 def room_daylight(
@@ -65,10 +78,16 @@ def room_daylight(
     # LM-83's direct sun and the daylight factor are those of open blinds
     direct = light.direct_sun()
     direct = None if direct is None else sky.whole_year(direct.astype(np.float32)).T
-    overcast = cie_patches("overcast", ReinhartSky(sampling.subdivision), 1.0)
-    factor = daylight_factor(light.filled.coefficients() @ overcast, 1.0)
+    factor = overcast_factor(light)
     table, of_room = daylight_metrics(scene.points, illuminance, factor, weather, direct)
     return DaylightResult(scene.points, illuminance, error, table, of_room)
+
+
+def overcast_factor(light: PhaseLight) -> NDArray[np.float64]:
+    """Daylight factor of the sensors [S] (0 to 1) with every window in its first state."""
+    subdivision = light.filled.traced.sampling.subdivision
+    overcast = cie_patches("overcast", ReinhartSky(subdivision), 1.0)
+    return daylight_factor(light.filled.coefficients() @ overcast, 1.0)
 
 
 def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.DataFrame:

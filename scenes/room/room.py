@@ -10,7 +10,7 @@ result = compute_room(building, space, in_all_windows(space, system), weather, R
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TypeVar
@@ -46,7 +46,7 @@ from scenes.room.holes import hole_problems
 from scenes.room.operation import Operation
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
-from scenes.room.options import RoomOptions
+from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.solar import RoomSun
 from scenes.room.thermal import fenestration_table, thermal_result
@@ -137,14 +137,16 @@ class RoomSimulation:
         operation: OperationTables | None = None,
         skies: AnnualSky | None = None,
         cache: MatrixCache | None = None,
+        grids: Sequence[SensorGrid] = (),
         progress: Progress = silent,
     ) -> None:
-        """See `compute_room`."""
+        """See `compute_room`; grids: of the sensors in place of the options' one."""
         if operation is not None:
             operation = operation.of_room(building, space)
         self.building, self.space, self.weather, self.options = building, space, weather, options
         self.sampling, self.outputs = options.sampling, options.outputs
         self.operation, self.cache, self.progress = operation, cache, progress
+        self.grids = tuple(grids) or (options.grid,)
         self.skies = (
             skies_for(weather, options.method, options.sampling) if skies is None else skies
         )
@@ -162,7 +164,7 @@ class RoomSimulation:
     def scene(self) -> DaylightScene:
         """Triangles, window groups, sensors and view in the visible band."""
         return room_scene(
-            self.building, self.space, self.windows, self.options.grid, self.outputs.picture_size
+            self.building, self.space, self.windows, self.grids, self.outputs.picture_size
         )
 
     @cached_property

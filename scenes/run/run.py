@@ -11,11 +11,10 @@ from pathlib import Path
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Problem, Space
-from bim.templates import template_rooms
 from mitsuba_cfs import variants
-from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, item, part, silent
+from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -25,13 +24,14 @@ from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.drawn_shades import traced_building
-from scenes.room.equal_rooms import moved_result, same_light, same_systems
+from scenes.room.equal_rooms import moved_result
 from scenes.room.operation import Operation, check_states
 from scenes.room.room import compute_room, skies_for
 from scenes.run.building import read_building
 from scenes.run.files import JobFiles, read_files
 from scenes.run.inputs import chosen_spaces, sha256
 from scenes.run.options import JobOptions
+from scenes.run.rooms import RoomSeries
 
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
@@ -182,47 +182,26 @@ def _rooms(
     on_room: OnRoom | None = None,
 ) -> tuple[list[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
-    found: dict[str, RoomYear] = {}
-    problems, notes = [], []
     cache = MatrixCache.of_user() if options.cache else None
-    sampling = options.room.sampling
-    equal = {s.guid: group for group in template_rooms(inputs.spaces) for s in group}
-    for number, space in enumerate(inputs.spaces, 1):
-        name = space.label
-        steps = item(progress, "room", number, len(inputs.spaces), name)
-        try:
-            twin = next(
-                (
-                    other
-                    for other in equal[space.guid]
-                    if other.guid in found
-                    and not found[other.guid].template
-                    and same_systems(other, space, inputs.systems)
-                    and _operated_alike(inputs, other, space)
-                    and same_light(inputs.building, other, space, sampling, cache)
-                ),
-                None,
-            )
-            if twin is not None:
-                found[space.guid] = moved_result(found[twin.guid], space)
-                notes.append(
-                    f"Room {name} is like {twin.label} in shape, orientation, "
-                    "materials, windows and in what shades it: its results are those."
-                )
-            else:
-                found[space.guid] = compute_room(
-                    inputs.building, space, inputs.systems, inputs.weather, options.room,
-                    operation=inputs.operation, skies=skies, cache=cache, progress=steps,
-                )  # fmt: skip
-        except RoomError as error:
-            if len(inputs.spaces) == 1:
-                where = f"space {name}"
-                raise DataError(str(error), file=options.building, element=where) from error
-            problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
-            continue
-        if on_room is not None:
-            on_room(found[space.guid])
-    return list(found.values()), problems, notes
+
+    def compute(space: Space, steps: Progress) -> RoomYear:
+        return compute_room(
+            inputs.building, space, inputs.systems, inputs.weather, options.room,
+            operation=inputs.operation, skies=skies, cache=cache, progress=steps,
+        )  # fmt: skip
+
+    return RoomSeries(
+        inputs.building,
+        inputs.spaces,
+        inputs.systems,
+        options.room.sampling,
+        cache,
+        compute,
+        moved_result,
+        options.building,
+        lambda one, other: _operated_alike(inputs, one, other),
+        on_room or (lambda room: None),
+    ).results(progress)
 
 
 def _operated_alike(inputs: JobInputs, one: Space, other: Space) -> bool:

@@ -155,12 +155,10 @@ def test_blinds_close_on_more_than_two_percent():
 
 
 def test_each_group_has_its_own_blinds():
-    up, down = np.full((2, 3, 4), 100.0), np.full((2, 3, 4), 10.0)
     direct = np.zeros((2, 3, 4))
     direct[0, 1], direct[1, 2] = 5000.0, 5000.0
-    light, closed = lm83.blinds_operated(up, down, direct)
-    np.testing.assert_array_equal(light[:, 0], [200, 110, 110])
-    np.testing.assert_array_equal(closed, [[False, False], [True, False], [False, True]])
+    closed = lm83.blinds_operated(direct)
+    np.testing.assert_array_equal(closed, [[False, True, False], [False, False, True]])
 
 
 # --- EN 17037 ---------------------------------------------------------------------------------

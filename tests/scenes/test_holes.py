@@ -29,7 +29,7 @@ def problems_of(cache=None, *, missing: str = ""):
     building = shoebox()
     (space,) = building.spaces
     windows = room_windows(space, in_all_windows(space, read_system(BLIND)))
-    scene = room_scene(building, space, windows, SensorGrid(), 64)
+    scene = room_scene(building, space, windows, [SensorGrid()], 64)
     if missing:
         room = scene.interior
         keep = room.surface != [face.name for face in space.faces].index(missing)

@@ -1,0 +1,114 @@
+"""`cfs comply`: the rooms of a building against daylight rules, with a dossier that prints."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+
+from scenes import quick as quick_run
+from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.quick_option import given, quick_option
+from scenes.commands.room_options import (
+    eye_height_option,
+    join_option,
+    needed_weather_option,
+    no_cache_option,
+    out_folder_option,
+    seed_option,
+    space_option,
+    subdivide_option,
+    system_option,
+)
+from scenes.comply.options import ComplyOptions
+from scenes.room.options import RoomOptions
+
+DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight chosen
+
+
+@click.command()
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@needed_weather_option
+@click.option(
+    "--standard", "standards", multiple=True, required=True, metavar="NAME|FILE.toml",
+    help="Rules to check: en17037, lm83, leed-v4.1, breeam-hea01, well-v2, or a file of your own.",
+)  # fmt: skip
+@system_option
+@click.option(
+    "--closed", type=FILE,
+    help="BSDF XML file of every window with its blinds closed; default: the last state that the "
+    "IFC holds, else LM-83's shade.",
+)  # fmt: skip
+@out_folder_option
+@space_option("spaces", "default: all")
+@join_option
+@click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
+@click.option(
+    "--day", default="03-21", show_default=True, metavar="MM-DD",
+    help="Of the exposure to sunlight, 02-01 to 03-21.",
+)  # fmt: skip
+@click.option(
+    "--sun-altitude", "least_altitude_deg", type=click.FloatRange(0, 45),
+    help="Least altitude of the sun that counts [deg]; default: the rule's for the country.",
+)  # fmt: skip
+@eye_height_option
+@click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
+@subdivide_option
+@seed_option
+@no_cache_option
+@quick_option
+def command(
+    building: Path,
+    *,
+    weather: Path,
+    system: Path | None,
+    closed: Path | None,
+    uses: Path | None,
+    out: Path,
+    standards: tuple[str, ...],
+    day: str,
+    quick: bool,
+    no_cache: bool,
+    **chosen,
+) -> None:
+    """The rooms of an IFC building against daylight rules: a dossier and a table of all values."""
+    own = {k: chosen.pop(k) for k in ("spaces", "join", "least_altitude_deg", "eye_height")}
+    glare = chosen.pop("annual_glare")
+    if quick:
+        chosen |= quick_run.picks(quick_run.ROOM, given())
+    options = ComplyOptions(
+        building, weather, standards, system, closed, uses=uses, day=day_of(day),
+        annual_glare=glare, cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen), **own,
+    )  # fmt: skip
+    from scenes.comply.files import read_files
+    from scenes.result_folder import ResultFolder
+
+    folder = ResultFolder(out, "comply", inputs=(building, weather, system, closed, uses))
+    files = read_files(options)  # before anything heavy is loaded
+    from scenes.commands.compiling import compiled_beside
+    from scenes.commands.progress_bar import ProgressBar
+    from scenes.comply.comply import check_building
+    from scenes.comply.outputs import write_compliance
+
+    if quick:
+        click.echo(quick_run.NOTE)
+    with ProgressBar() as progress, compiled_beside():
+        result = check_building(options, progress, files)
+        write_compliance(result, folder, quick=quick)
+    for verdict in result.verdicts:
+        if verdict.rooms:
+            name = f"{verdict.rule}, {verdict.criterion.title}"
+            click.echo(f"{name}: {verdict.reached} ({verdict.rooms} room(s))")
+    for text in (*result.assumptions, *result.notes):
+        click.echo(f"note: {text}")
+    click.echo(f"dossier: {out / 'dossier.html'}")
+
+
+def day_of(text: str) -> tuple[int, int]:
+    """Month and day of "MM-DD", between those of EN 17037."""
+    found = re.fullmatch(r"(\d{1,2})-(\d{1,2})", text)
+    day = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not DAYS[0] <= day <= DAYS[1] or day[1] > (29 if day[0] == 2 else 31) or day[1] < 1:
+        raise click.UsageError(f"--day {text!r}: expected a day from 02-01 to 03-21, as 03-21")
+    return day

@@ -1,0 +1,262 @@
+"""The rooms of a building against rules: light, view and sun of each, then every criterion."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from bim.model import Building, Problem, Space
+from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.metrics.autonomy import daylight_autonomy
+from mitsuba_cfs.metrics.lm83 import sunlit_hours
+from mitsuba_cfs.metrics.schedules import working_hours
+from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from scenes.comply.assess import assess_building, assess_room, values_of
+from scenes.comply.blinds import open_and_closed
+from scenes.comply.files import ComplyFiles, read_files
+from scenes.comply.findings import Findings, GridLight, calendar_of
+from scenes.comply.light import lights_of, sensor_grid_of
+from scenes.comply.options import ComplyOptions
+from scenes.comply.outdoors import OutdoorMesh, outdoors_of
+from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
+from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
+from scenes.comply.uses import UNKNOWN, RoomUse
+from scenes.comply.view_out import ViewOut, view_out
+from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
+from scenes.fenestration.systems import States
+from scenes.room.drawn_shades import traced_building
+from scenes.room.equal_rooms import corner
+from scenes.room.room import RoomSimulation, skies_for
+from scenes.run.building import read_building
+from scenes.run.inputs import named_spaces
+from scenes.run.rooms import RoomSeries
+
+LIGHT, RAYS = frozenset({"open", "operated", "glare"}), frozenset({"view", "sun"})
+
+
+def check_building(
+    options: ComplyOptions, progress: Progress = silent, files: ComplyFiles | None = None
+) -> Compliance:
+    """The rooms of a building file against the rules of the options.
+
+    Raises: `DataError` for a file that cannot be used, before anything is traced.
+    """
+    files = files or read_files(options)
+    steps = part(progress, 0.1, 1.0)
+    building = read_building(options.building, join=options.join, progress=steps)
+    return check_rooms(building, options, files, progress)
+
+
+def check_rooms(
+    building: Building, options: ComplyOptions, files: ComplyFiles, progress: Progress = silent
+) -> Compliance:
+    """The rooms of a building against the rules of the options."""
+    check = Check(building, options, files, progress)
+    spaces = named_spaces(building, options.spaces, options.building)
+    uses = check.uses_of(spaces)
+    glazed = [space for space in spaces if space.windows]
+    dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
+    if not glazed:
+        raise DataError("no space has a window", file=options.building, element="IfcWindow")
+    views, view_problems = check.views(glazed)
+    lights, problems, notes = check.lights(glazed)
+    rooms = []
+    for space in spaces:
+        if space.guid in lights and space.guid in views:
+            rooms.append(
+                check.room(space, uses[space.guid], lights[space.guid], *views[space.guid])
+            )
+        elif space in dark:
+            rooms.append(check.dark_room(space, uses[space.guid]))
+    if not rooms:
+        raise DataError("none of its rooms could be computed", file=options.building)
+    verdicts = assess_building([r.verdicts for r in rooms], [r.space.floor_area for r in rooms])
+    return Compliance(
+        check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
+        check.day, tuple(check.assumptions(rooms)), tuple(dict.fromkeys([*check.notes, *notes])),
+        (*building.problems, *view_problems, *problems), check.seconds,
+    )  # fmt: skip
+
+
+class Check:
+    """A building on its way through the rules: what its rooms share."""
+
+    def __init__(
+        self, building: Building, options: ComplyOptions, files: ComplyFiles, progress: Progress
+    ) -> None:
+        """From what was read."""
+        self.options, self.files, self.progress = options, files, progress
+        self.parts = frozenset(p for rule in files.rules.values() for p in rule.parts)
+        windows = [w for space in building.spaces for w in space.windows]
+        if options.spaces:
+            chosen = named_spaces(building, options.spaces, options.building)
+            windows = [w for space in chosen for w in space.windows]
+        systems = fill_windows(windows, files.given, building.file) if self.lit else {}
+        self.systems: dict[str, States] = {guid: states[:1] for guid, states in systems.items()}
+        if "operated" in self.parts:
+            self.systems = open_and_closed(systems, files.closed)
+        self.building = traced_building(building, self.systems)
+        self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
+        self.notes += files.weather.notes
+        self.calendar = calendar_of(files.weather)
+        self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
+        self.outdoors: OutdoorMesh = outdoors_of(self.building)
+        self.seconds: dict[str, float] = {}
+
+    @property
+    def lit(self) -> bool:
+        """Whether the rules look at light at all."""
+        glare = "glare" in self.parts and self.options.annual_glare
+        return bool(self.parts & {"open", "operated"}) or glare
+
+    def uses_of(self, spaces: list[Space]) -> dict[str, RoomUse]:
+        """The use of each room by GUID; rooms without a window and without a use count as none."""
+        texts = {}
+        if self.building.file is not None:
+            from bim.ifc.room_uses import read_room_uses  # reads IFC: only where there is a file
+
+            texts = read_room_uses(self.building.file)
+        found = {}
+        for space in spaces:
+            use = self.files.uses.of(space, texts.get(space.guid, ()))
+            if use.key == UNKNOWN and not space.windows:
+                use = replace(use, occupied=False, source="no window and no use: not occupied")
+            found[space.guid] = use
+        return found
+
+    def views(
+        self, spaces: list[Space]
+    ) -> tuple[dict[str, tuple[ViewOut, SunExposure]], list[Problem]]:
+        """View and sunlight of each room by GUID, by rays against the whole building."""
+        start, found, problems = time.monotonic(), {}, []
+        for number, space in enumerate(spaces):
+            self.progress("view and sunlight", number / len(spaces))
+            try:
+                view = view_out(space, self.outdoors, eye_height=self.options.eye_height)
+            except RoomError as error:
+                problems.append(Problem(space.guid, str(error), "the room was left out"))
+                continue
+            found[space.guid] = view, sun_exposure(space, self.outdoors, self.day)
+        self.progress("view and sunlight", 1.0)
+        self.seconds["view and sunlight"] = round(time.monotonic() - start, 1)
+        return found, problems
+
+    def lights(self, spaces: list[Space]) -> tuple[dict[str, RoomLights], list[Problem], list[str]]:
+        """The light of each room by GUID, equal rooms computed once."""
+        if not self.lit:
+            rules = self.files.rules.items()
+            none = {name: values_of(rule, Findings(self.calendar), LIGHT) for name, rule in rules}
+            return {s.guid: RoomLights(s, {}, none) for s in spaces}, [], []
+        start, options = time.monotonic(), self.options
+        self.progress("sky", 0.0)
+        skies = skies_for(self.files.weather, options.room.method, options.room.sampling)
+        self.progress("sky", 1.0)
+        cache = MatrixCache.of_user() if options.cache else None
+
+        def compute(space: Space, steps: Progress) -> RoomLights:
+            return self._light(space, skies, cache, steps)
+
+        results, problems, notes = RoomSeries(
+            self.building, spaces, self.systems, options.room.sampling, cache, compute,
+            moved_lights, options.building,
+        ).results(self.progress)  # fmt: skip
+        self.seconds["light"] = round(time.monotonic() - start, 1)
+        return {result.space.guid: result for result in results}, problems, notes
+
+    def _light(
+        self, space: Space, skies: AnnualSky, cache: MatrixCache | None, progress: Progress
+    ) -> RoomLights:
+        """One room's light on all grids, and its glare where that is wanted."""
+        rules = self.files.rules
+        grids = {name: sensor_grid_of(space, rule.grid) for name, rule in rules.items()}
+        distinct = list(dict.fromkeys(grids.values()))
+        room = RoomSimulation(
+            self.building, space, self.systems, self.files.weather, self.options.room,
+            skies=skies, cache=cache, grids=distinct, progress=progress,
+        )  # fmt: skip
+        operated = {
+            distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts
+        }
+        found, dgp = lights_of(room, operated), None
+        if self.options.annual_glare and "glare" in self.parts:
+            used = working_hours(self.files.weather, *self.options.room.occupancy.hours)
+            dgp = room.annual_glare()["dgp"].fillna(0.0).to_numpy()[used]
+        lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
+        values = {
+            name: values_of(rules[name], Findings(self.calendar, light, dgp=dgp), LIGHT)
+            for name, light in lights.items()
+        }
+        summaries = {id(light): self._summary(light) for light in found}
+        by_rule = {name: summaries[id(light)] for name, light in lights.items()}
+        return RoomLights(space, by_rule, values, tuple(g.name for g in room.windows.groups))
+
+    def _summary(self, light: GridLight) -> GridSummary:
+        ten = self.calendar.ten
+        light_of_use = light.open if light.operated is None else light.operated
+        return GridSummary(
+            light.points,
+            light.factor,
+            daylight_autonomy(light_of_use, ten),
+            sunlit_hours(light.direct, ten, step_h=self.calendar.step_h),
+            None if light.closed is None else light.closed[ten].mean(axis=0),
+        )
+
+    def room(
+        self, space: Space, use: RoomUse, light: RoomLights, view: ViewOut, sun: SunExposure
+    ) -> CheckedRoom:
+        """A room with windows against all rules."""
+        rules, findings = self.files.rules, Findings(self.calendar, view=view, sun=sun)
+        values = {
+            name: {**light.values[name], **values_of(rule, findings, RAYS)}
+            for name, rule in rules.items()
+        }
+        verdicts = tuple(assess_room(rules, values, space, use))
+        return CheckedRoom(space, use, verdicts, view, sun, light if light.grids else None)
+
+    def dark_room(self, space: Space, use: RoomUse) -> CheckedRoom:
+        """An occupied room without any window: it has no daylight, no view and no sun."""
+        none = np.zeros((len(self.calendar.times), 1), dtype=np.float32)
+        light = GridLight(np.zeros((1, 3)), none, none, np.zeros(1), none) if self.lit else None
+        view = ViewOut(np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((1, 3), dtype=bool))
+        findings = Findings(self.calendar, light, view, SunExposure((), ()))
+        rules = self.files.rules
+        values = {name: values_of(rule, findings, LIGHT | RAYS) for name, rule in rules.items()}
+        verdicts = tuple(assess_room(rules, values, space, use))
+        return CheckedRoom(space, use, verdicts, None, None, None)
+
+    def assumptions(self, rooms: list[CheckedRoom]) -> list[str]:
+        """What was assumed, in sentences."""
+        files, options = self.files, self.options
+        found = []
+        if "sun" in self.parts:
+            month, day = options.day
+            found.append(
+                f"Sunlight on {day:02d}.{month:02d}., the sun from "
+                f"{files.least_altitude_deg:g}° above the horizon ({files.altitude_source})."
+            )
+        if "view" in self.parts:
+            found.append(
+                f"View out: eyes {options.eye_height:g} m above the floor, 0.5 m apart and off the "
+                "walls, are the utilised area; furniture does not count."
+            )
+        if "glare" in self.parts and not options.annual_glare:
+            found.append("Glare was not computed: --annual-glare rates every hour with daylight.")
+        if "open" in self.parts and self.calendar.median_diffuse is None:
+            found.append("The weather file has no diffuse illuminance: no daylight factor method.")
+        found += [
+            f"{room.space.label}: {room.use.key}, {room.use.source}."
+            for room in rooms
+            if room.use.assumed
+        ]
+        return found
+
+
+def moved_lights(found: RoomLights, space: Space) -> RoomLights:
+    """The light of a template room for one equal to it, moved to where that stands."""
+    shift = corner(space) - corner(found.space)
+    grids = {name: replace(grid, points=grid.points + shift) for name, grid in found.grids.items()}
+    return replace(found, space=space, grids=grids, template=found.space.label)

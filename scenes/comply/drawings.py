@@ -1,0 +1,95 @@
+"""Drawings of a room in a dossier: plans of the view and of the light, bars of the sun."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from scenes.comply.results import CheckedRoom, Compliance
+from scenes.figures.chart import Chart, ChartMark, box
+from scenes.figures.plan import FloorPlan, plan, plan_frame
+from scenes.figures.scale import ColourScale, Tick
+from scenes.report.numbers import rounded
+
+FIRST_HOUR, LAST_HOUR = 4, 21  # of the sun's bars
+MOST_BARS = 12  # openings with a bar of their own
+
+
+def plans(result: Compliance, room: CheckedRoom) -> tuple[FloorPlan, ...]:
+    """Plans of what the rules look at in a room."""
+    return (*_view_plans(result, room), *_light_plans(room))
+
+
+def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
+    wanted = any("view" in rule.parts for rule in result.rules.values())
+    if room.view is None or not wanted:
+        return
+    frame = plan_frame(room.space, room.view.points)
+    angle = room.view.sight_angle_deg
+    scale = ColourScale(0, 90, "Horizontal sight angle", "°")
+    text = f"{rounded(float(np.min(angle)), 0)} to {rounded(float(np.max(angle)), 0)}° by place."
+    yield plan(frame, angle, scale, title="Horizontal sight angle", explanation=text)
+    layers = room.view.layer_count
+    scale = ColourScale(0, 3, "Layers", "")
+    text = "Landscape, sky and ground that one opening shows; 0 where the landscape is not seen."
+    yield plan(frame, layers, scale, title="Layers of the view", explanation=text)
+
+
+def _light_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
+    if room.light is None:
+        return
+    shown: set[int] = set()
+    for name, grid in room.light.grids.items():
+        if id(grid) in shown:
+            continue
+        shown.add(id(grid))
+        frame = plan_frame(room.space, grid.points)
+        factor = 100 * grid.factor
+        scale = ColourScale(0, max(float(np.ceil(factor.max())), 1.0), "Daylight factor", "%")
+        text = f"On the grid of {name}, {grid.points[0, 2] - room.space.floor_level:.2f} m high."
+        yield plan(frame, factor, scale, title="Daylight factor", explanation=text, digits=1)
+        operated = "blinds operated" if grid.closed is not None else "blinds open"
+        scale = ColourScale(0, 100, "Daylight autonomy", "%")
+        text = f"300 lx, 8 to 18 o'clock, {operated}, on the grid of {name}."
+        values = 100 * grid.autonomy
+        yield plan(frame, values, scale, title="Daylight autonomy", explanation=text)
+        if grid.sunlit_hours.any():
+            top = float(np.ceil(grid.sunlit_hours.max() / 50) * 50)
+            scale = ColourScale(0, top, "Direct sun", "h")
+            text = f"1000 lx of direct sun, blinds open, on the grid of {name}."
+            yield plan(frame, grid.sunlit_hours, scale, title="Sunlit hours", explanation=text)
+
+
+def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
+    """When the sun may shine on each opening, and on any."""
+    wanted = any("sun" in rule.parts for rule in result.rules.values())
+    if room.sun is None or not wanted or not room.sun.openings:
+        return None
+    openings = room.sun.openings[:MOST_BARS]
+    rows = [("any opening", room.sun.times), *((one.name, one.times) for one in openings)]
+    count = len(rows)
+    x_range, y_range = (60.0 * FIRST_HOUR, 60.0 * LAST_HOUR), (0.0, float(count))
+    marks = []
+    for style, some in (("part1", rows[:1]), ("part0", rows[1:])):
+        start = 0 if style == "part1" else 1
+        path = "".join(
+            box(a, b, count - 1 - i + 0.2, count - i - 0.2, x_range, y_range)
+            for i, (_, times) in enumerate(some, start)
+            for a, b in times
+        )
+        marks.append(ChartMark(path, style, filled=True))
+    hours = range(FIRST_HOUR, LAST_HOUR + 1)
+    span = LAST_HOUR - FIRST_HOUR
+    more = len(room.sun.openings) - len(openings)
+    return Chart(
+        "Possible sun at the openings",
+        f"{result.day.day.day} {result.day.day:%B}, local standard time, cloudless; "
+        f"{room.sun.hours:.2f} h at any opening"
+        + (f"; {more} more openings in the table." if more else "."),
+        "Hour", "",
+        tuple(Tick(100 * (h - FIRST_HOUR) / span, str(h), "") for h in hours),
+        tuple(Tick(100 * (count - i - 0.5) / count, name, "", False)
+              for i, (name, _) in enumerate(rows)),
+        tuple(marks), height=40 + 26 * count,
+    )  # fmt: skip

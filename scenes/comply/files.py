@@ -1,0 +1,64 @@
+"""The small files and choices of a check against rules, read before its building is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from bim.ifc.corrections import corrections_beside
+from bim.ifc.head import check_head
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.weather import Weather
+from scenes.comply.options import OTHER_ALTITUDE_DEG, ComplyOptions
+from scenes.comply.rules import RuleTable, read_rule
+from scenes.comply.uses import RoomUses, read_uses
+from scenes.fenestration.systems import FenestrationSystem, Given, given_light, read_system
+from scenes.run.files import check_names
+from scenes.run.inputs import read_weather
+
+
+@dataclass(frozen=True, slots=True)
+class ComplyFiles:
+    """What the files of a check hold, all but the building."""
+
+    weather: Weather
+    rules: dict[str, RuleTable]  # by name
+    uses: RoomUses
+    given: Given
+    closed: FenestrationSystem | None
+    least_altitude_deg: float
+    altitude_source: str  # in words
+
+
+def read_files(options: ComplyOptions) -> ComplyFiles:
+    """The rules, the weather, the systems and the uses of a check.
+
+    Raises: `DataError` for what cannot be used.
+    """
+    check_head(options.building)
+    corrections_beside(options.building)
+    check_names(options.spaces)
+    rules = {Path(name).stem if name[-5:] == ".toml" else name: read_rule(name)
+             for name in options.standards}  # fmt: skip
+    if not rules:
+        raise DataError("expected at least one rule", field="--standard")
+    weather = read_weather(options.weather)
+    altitude, source = least_altitude(options, rules, weather)
+    closed = None if options.closed is None else read_system(options.closed, by="--closed")
+    uses = read_uses(options.uses)
+    return ComplyFiles(weather, rules, uses, given_light(options.system), closed, altitude, source)
+
+
+def least_altitude(
+    options: ComplyOptions, rules: dict[str, RuleTable], weather: Weather
+) -> tuple[float, str]:
+    """Least altitude of the sun [deg] that counts as sunlight, and where it is from."""
+    if options.least_altitude_deg is not None:
+        return options.least_altitude_deg, "given by --sun-altitude"
+    country = weather.site.rpartition(", ")[2]
+    for name, rule in rules.items():
+        if country in rule.least_altitude_deg:
+            return rule.least_altitude_deg[country], f"of {country}, by the rule file {name}"
+    return OTHER_ALTITUDE_DEG, (
+        f"assumed: no rule file has one for {country or 'the country'}; --sun-altitude gives it"
+    )

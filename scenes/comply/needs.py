@@ -1,0 +1,313 @@
+"""What rules ask of a room: each need names a quantity, says it in words, and finds its value."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from mitsuba_cfs.glare.classes import exceeded_share
+from mitsuba_cfs.metrics.autonomy import area_share, daylight_autonomy
+from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, reached_on_area
+from mitsuba_cfs.metrics.lm83 import annual_sunlight_exposure
+from scenes.comply.findings import Findings
+from scenes.toml_file import Positive, Share, TomlTable
+
+ROUNDING = 1e-9  # of shares of an area
+
+
+class Need(TomlTable):
+    """A limit of a quantity of a room."""
+
+    at_least: float | None = None
+    at_most: float | None = None
+
+    parts: ClassVar[frozenset[str]] = frozenset()  # of `Findings` that it needs
+    unit: ClassVar[str] = ""  # "%" values are shares and shown times 100
+    digits: ClassVar[int] = 0
+
+    @model_validator(mode="after")
+    def _has_one_limit(self) -> Need:
+        if (self.at_least is None) == (self.at_most is None):
+            raise ValueError("expected either at_least or at_most")
+        return self
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        raise NotImplementedError
+
+    def value(self, room: Findings) -> float | None:
+        """The quantity of a room; None where it was not computed."""
+        raise NotImplementedError
+
+    def met(self, value: float | None) -> bool | None:
+        """Whether a value keeps the limit; None where there is none."""
+        if value is None:
+            return None
+        if self.at_least is not None:
+            return value >= self.at_least - ROUNDING
+        return value <= (self.at_most or 0.0) + ROUNDING
+
+
+class ReachedLux(Need):
+    """EN 17037, method 2: illuminance that a share of the area has for a share of the time."""
+
+    what: Literal["reached_lux"]
+    area: Share
+    time: Share = HALF_TIME
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    unit: ClassVar[str] = "lx"
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return (
+            f"illuminance reached on {100 * self.area:g} % of the reference plane "
+            f"in {100 * self.time:g} % of the daylight hours"
+        )
+
+    def value(self, room: Findings) -> float | None:
+        """Illuminance [lx]."""
+        light = room.light
+        if light is None:
+            return None
+        values = light.open[room.daylight_hours]
+        weights = np.full(values.shape[1], 1 / values.shape[1])
+        return float(exceeded(reached_on_area(values, weights, self.area), self.time))
+
+
+class ReachedFactor(Need):
+    """EN 17037, method 1: daylight factor of a share of the area over the target's."""
+
+    what: Literal["reached_factor"]
+    area: Share
+    lux: Positive
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    digits: ClassVar[int] = 2
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return (
+            f"daylight factor of {100 * self.area:g} % of the reference plane over that which "
+            f"gives {self.lux:g} lx under the site's median diffuse sky"
+        )
+
+    def value(self, room: Findings) -> float | None:
+        """Ratio of the daylight factors."""
+        if room.light is None or room.median_diffuse is None:
+            return None
+        factor = room.light.factor
+        weights = np.full(len(factor), 1 / len(factor))
+        reached = float(reached_on_area(factor[None], weights, self.area)[0])
+        return reached * room.median_diffuse / self.lux
+
+
+class ViewShare(Need):
+    """EN 17037: share of the utilised area with a sight angle, a distance and layers at once."""
+
+    what: Literal["view"]
+    angle_deg: Positive
+    distance: Positive
+    layers: Annotated[int, Field(ge=1, le=3)]
+
+    parts: ClassVar[frozenset[str]] = frozenset({"view"})
+    unit: ClassVar[str] = "%"
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        layers = "layer, the landscape" if self.layers == 1 else "layers with the landscape"
+        return (
+            f"share of the utilised area with a sight angle of {self.angle_deg:g}°, "
+            f"{self.distance:g} m of distance and {self.layers} {layers}"
+        )
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        if room.view is None:
+            return None
+        return room.view.share(self.angle_deg, self.distance, self.layers)
+
+
+class SunHours(Need):
+    """EN 17037: hours of possible sun at the openings on the chosen day."""
+
+    what: Literal["sun_hours"]
+
+    parts: ClassVar[frozenset[str]] = frozenset({"sun"})
+    unit: ClassVar[str] = "h"
+    digits: ClassVar[int] = 2
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return "hours of possible sun at the reference points of the openings"
+
+    def value(self, room: Findings) -> float | None:
+        """Hours."""
+        return None if room.sun is None else room.sun.hours
+
+
+class DgpExceeded(Need):
+    """EN 17037: share of the hours of use in which the daylight glare probability is above."""
+
+    what: Literal["dgp_exceeded"]
+    limit: Share
+
+    parts: ClassVar[frozenset[str]] = frozenset({"glare"})
+    unit: ClassVar[str] = "%"
+    digits: ClassVar[int] = 1
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return f"share of the hours of use with a daylight glare probability above {self.limit:g}"
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        return None if room.dgp is None else exceeded_share(room.dgp, self.limit)
+
+
+class SpatialAutonomy(Need):
+    """IES LM-83: share of the area that has an illuminance for a share of the ten hours a day."""
+
+    what: Literal["sda"]
+    lux: Positive
+    time: Share
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open", "operated"})
+    unit: ClassVar[str] = "%"
+    digits: ClassVar[int] = 1
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return f"sDA {self.lux:g} lx, {100 * self.time:g} % of 8 to 18 o'clock, blinds operated"
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        if room.light is None or room.light.operated is None:
+            return None
+        autonomy = daylight_autonomy(room.light.operated, room.ten_hours, self.lux)
+        return area_share(autonomy >= self.time)
+
+
+class SunlightExposure(Need):
+    """IES LM-83: share of the area with direct sun for more than some hours, blinds open."""
+
+    what: Literal["ase"]
+    lux: Positive
+    hours: Positive
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    unit: ClassVar[str] = "%"
+    digits: ClassVar[int] = 1
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return f"ASE {self.lux:g} lx of direct sun for more than {self.hours:g} h, blinds open"
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        if room.light is None:
+            return None
+        return annual_sunlight_exposure(
+            room.light.direct, room.ten_hours, step_h=room.step_h,
+            threshold=self.lux, most_hours=self.hours,
+        )  # fmt: skip
+
+
+class Equinox(Need):
+    """LEED, option 2: share of the area within limits at clear hours round the equinoxes."""
+
+    what: Literal["equinox"]
+    low: Positive
+    high: Positive
+    clocks: tuple[int, ...]
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    unit: ClassVar[str] = "%"
+    digits: ClassVar[int] = 1
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        clocks = " and ".join(map(str, self.clocks))
+        return (
+            f"share of the area with {self.low:g} to {self.high:g} lx at {clocks} o'clock "
+            "of the clear days"
+        )
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1, of the points that keep the limits at every one of the hours."""
+        if room.light is None:
+            return None
+        kept = np.ones(room.light.open.shape[1], dtype=bool)
+        for clock in self.clocks:
+            mean = room.light.open[room.clear_hours(clock)].mean(axis=0)
+            kept &= (mean >= self.low) & (mean <= self.high)
+        return area_share(kept)
+
+
+class MeanHours(Need):
+    """BREEAM: hours of the year in which the mean illuminance of the room is reached."""
+
+    what: Literal["mean_hours"]
+    lux: Positive
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    unit: ClassVar[str] = "h"
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return f"hours of the year with {self.lux:g} lx as a mean over the room"
+
+    def value(self, room: Findings) -> float | None:
+        """Hours."""
+        if room.light is None:
+            return None
+        enough = room.light.open.mean(axis=1, dtype=float) >= self.lux
+        return float(room.step_h * np.count_nonzero(enough))
+
+
+class WorstHours(Need):
+    """BREEAM: hours of the year in which the worst lit point has an illuminance."""
+
+    what: Literal["worst_hours"]
+    lux: Positive
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    unit: ClassVar[str] = "h"
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return f"hours of the year with {self.lux:g} lx at the worst lit point"
+
+    def value(self, room: Findings) -> float | None:
+        """Hours."""
+        if room.light is None:
+            return None
+        return float(room.step_h * np.count_nonzero(room.light.open >= self.lux, axis=0).min())
+
+
+AnyNeed = Annotated[
+    ReachedLux
+    | ReachedFactor
+    | ViewShare
+    | SunHours
+    | DgpExceeded
+    | SpatialAutonomy
+    | SunlightExposure
+    | Equinox
+    | MeanHours
+    | WorstHours,
+    Field(discriminator="what"),
+]

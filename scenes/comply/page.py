@@ -1,0 +1,130 @@
+"""The dossier as one self-contained page that prints: verdicts, rooms, clauses, sources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.resources import files
+
+import jinja2
+from markupsafe import Markup
+
+from scenes.comply import tables
+from scenes.comply.drawings import plans, sun_bars
+from scenes.comply.results import CheckedRoom, Compliance
+from scenes.comply.rules import RuleTable
+from scenes.figures.chart import Chart
+from scenes.figures.plan import FloorPlan
+from scenes.quick import NOTE
+from scenes.report.numbers import rounded
+from scenes.report.page import TEMPLATES, environment
+from scenes.report.room import facts
+from scenes.report.tables import Column, Table
+
+STYLE = files(__package__) / "templates" / "dossier.css"
+
+
+@dataclass(frozen=True, slots=True)
+class DossierRule:
+    """The section of one rule."""
+
+    rule: RuleTable
+    building: Table
+    rooms: Table
+    without: tuple[str, ...]  # titles of criteria that no room is for
+
+
+@dataclass(frozen=True, slots=True)
+class DossierRoom:
+    """The section of one room."""
+
+    anchor: str
+    name: str
+    facts: tuple[tuple[str, str], ...]
+    tables: tuple[Table, ...]
+    plans: tuple[FloorPlan, ...]
+    sun: Chart | None
+    openings: Table | None
+
+
+def dossier_html(result: Compliance, *, quick: bool = False) -> str:
+    """The dossier as text: no script, font or picture is fetched from anywhere."""
+    pages = environment()
+    pages.loader = jinja2.ChoiceLoader([jinja2.PackageLoader(__package__), pages.loader])
+    rooms = [dossier_room(result, room, i) for i, room in enumerate(result.rooms, 1)]
+    style = (TEMPLATES.joinpath("style.css"), STYLE)
+    return pages.get_template("dossier.html.j2").render(
+        title=result.building.name or "Building",
+        facts=summary(result),
+        notes=([NOTE] if quick else []) + list(result.notes),
+        assumptions=result.assumptions,
+        rules=[dossier_rule(result, name) for name in result.rules],
+        rooms=rooms,
+        problems=problems_table(result),
+        seconds=", ".join(f"{name} {value:g} s" for name, value in result.seconds.items()),
+        style=Markup("\n".join(one.read_text("utf-8") for one in style)),
+    )  # fmt: skip
+
+
+def dossier_rule(result: Compliance, name: str) -> DossierRule:
+    """Tables of a rule."""
+    return DossierRule(
+        result.rules[name],
+        tables.building_table(result, name),
+        tables.rooms_table(result, name),
+        tables.without_rooms(result, name),
+    )
+
+
+def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierRoom:
+    """Tables and drawings of a room."""
+    found = [tables.room_table(result, room, name) for name in result.rules]
+    return DossierRoom(
+        f"room-{number}",
+        room.space.label,
+        room_facts(room),
+        tuple(table for table in found if table.rows),
+        plans(result, room),
+        sun_bars(result, room),
+        tables.openings_table(room),
+    )
+
+
+def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
+    """Size, use and blinds of a room in words."""
+    template = "" if room.light is None else room.light.template
+    rows = [*facts(room.space, template), ("Use", f"{room.use.key}, {room.use.source}")]
+    if not room.use.occupied:
+        rows.append(("Occupied", "not regularly: left out of what looks at occupied rooms"))
+    if room.light is not None:
+        shares = {
+            f"{name}: {rounded(100 * share, 0)} %": None
+            for grid in room.light.grids.values()
+            if grid.closed is not None
+            for name, share in zip(room.light.groups, grid.closed.tolist(), strict=True)
+        }
+        if shares:
+            rows.append(("Blinds closed, of 8 to 18 o'clock", ", ".join(shares)))
+    return tuple(rows)
+
+
+def summary(result: Compliance) -> tuple[tuple[str, str], ...]:
+    """What was checked, in a few facts."""
+    building, weather = result.building, result.weather
+    file = "" if building.file is None else building.file.name
+    median = result.calendar.median_diffuse
+    rows = [
+        ("Model", file or building.name),
+        ("Weather", f"{weather.site} ({weather.file.name if weather.file else 'no file'})"),
+        ("Rooms", f"{len(result.rooms)} of {len(building.spaces)}"),
+        ("Rules", "; ".join(rule.edition for rule in result.rules.values())),
+    ]
+    if median is not None:
+        rows.append(("Median diffuse illuminance", f"{rounded(median, 0)} lx"))
+    return tuple(rows)
+
+
+def problems_table(result: Compliance) -> Table:
+    """What is wrong with the building's file and what was done about it."""
+    columns = tuple(Column(c, numeric=False) for c in ("Where", "What", "Consequence and repair"))
+    rows = tuple((p.where, p.what, p.consequence) for p in result.problems)
+    return Table("Problems of the model", columns, rows)

@@ -1,0 +1,96 @@
+"""Rule files: what an edition of a standard asks, as data, with its clauses and sources."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from mitsuba_cfs.errors import DataError
+from scenes.comply.needs import AnyNeed, Need
+from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
+
+FOLDER = files(__package__) / "rules"
+NOT_MET = "not met"
+
+
+class GridTable(TomlTable):
+    """Where the sensors of a rule are."""
+
+    height: Positive  # above the floor [m]
+    margin: Annotated[float, Field(ge=0)]  # off the walls [m]
+    spacing: Positive | None = None  # [m]; None: EN 17037's p, by the size of the room
+
+
+class LevelTable(TomlTable):
+    """A level of a criterion, or its points: the needs that are all met."""
+
+    name: str
+    needs: Annotated[tuple[AnyNeed, ...], Field(min_length=1)]
+    over: Literal["room", "area mean", "each room", "area of rooms"] = "room"
+    share: Share | None = None  # of the area whose rooms meet the needs, for "area of rooms"
+
+    @model_validator(mode="after")
+    def _has_its_share(self) -> LevelTable:
+        if (self.over == "area of rooms") != (self.share is not None):
+            raise ValueError('over = "area of rooms" and share belong together')
+        return self
+
+
+class CriterionTable(TomlTable):
+    """One thing that a rule asks, with its levels from the least to the highest."""
+
+    key: str
+    title: str
+    clause: str
+    openings: Literal["any", "walls", "roof"] = "any"  # of the rooms that it is for
+    occupied: bool = False  # of regularly occupied rooms alone
+    uses: tuple[str, ...] = ()  # of rooms of these uses alone; none: of all
+    level: Annotated[tuple[LevelTable, ...], Field(min_length=1)]
+
+    @property
+    def needs(self) -> Iterator[Need]:
+        """The needs of all levels."""
+        return (need for level in self.level for need in level.needs)
+
+
+class RuleTable(TomlTable):
+    """A rule file."""
+
+    title: str
+    edition: str
+    source: Annotated[tuple[str, ...], Field(min_length=1)]
+    grid: GridTable
+    criterion: Annotated[tuple[CriterionTable, ...], Field(min_length=1)]
+    least_altitude_deg: dict[str, float] = Field({})  # of the sun, by country of a weather file
+
+    @property
+    def parts(self) -> frozenset[str]:
+        """The parts of `Findings` that the rule needs."""
+        return frozenset(
+            part for one in self.criterion for need in one.needs for part in need.parts
+        )
+
+
+def rule_names() -> tuple[str, ...]:
+    """Names of the rules that come with the program."""
+    return tuple(
+        sorted(Path(str(one)).stem for one in FOLDER.iterdir() if one.name[-5:] == ".toml")
+    )
+
+
+def read_rule(name: str) -> RuleTable:
+    """The rule of that name, or of a TOML file.
+
+    Raises: `DataError` for a name that is none and a file that is wrong.
+    """
+    path = Path(name)
+    if path.suffix != ".toml":
+        if name not in rule_names():
+            known = ", ".join(rule_names())
+            raise DataError(f"no rule {name!r}; there are {known}, and files", field="--standard")
+        path = Path(str(FOLDER / f"{name}.toml"))
+    return validated(RuleTable, read_table(path), path)

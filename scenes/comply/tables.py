@@ -1,0 +1,170 @@
+"""Tables of a dossier: verdicts of the building and of a room, every number with its clause."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from scenes.comply.assess import NOT_FOR_IT
+from scenes.comply.needs import Need
+from scenes.comply.results import CheckedRoom, Compliance
+from scenes.comply.rules import LevelTable
+from scenes.report.numbers import MISSING, rounded
+from scenes.report.tables import Column, Table
+
+OVER = {
+    "room": "share of the floor area whose rooms meet it",
+    "each room": "share of the floor area whose rooms meet it, all are to",
+    "area of rooms": "share of the floor area whose rooms meet it",
+}
+COLUMNS = (
+    "room", "guid", "use", "floor_area_m2", "rule", "edition", "clause", "criterion", "level",
+    "quantity", "value", "limit", "unit", "met",
+)  # fmt: skip
+
+
+def shown(need: Need, value: float | None) -> str:
+    """A value with its unit."""
+    if value is None:
+        return MISSING
+    factor = 100 if need.unit == "%" else 1
+    return f"{rounded(factor * value, need.digits)} {need.unit}".strip()
+
+
+def limit_of(need: Need) -> str:
+    """The limit of a need with its unit."""
+    word, value = ("≥", need.at_least) if need.at_least is not None else ("≤", need.at_most)
+    factor = 100 if need.unit == "%" else 1
+    return f"{word} {factor * (value or 0):g} {need.unit}".strip()
+
+
+def yes_or_no(met: bool | None) -> str:
+    """Whether something is met, in a word."""
+    return MISSING if met is None else ("yes" if met else "no")
+
+
+def building_table(result: Compliance, rule: str) -> Table:
+    """The building against the criteria of a rule, level by level."""
+    columns = [_text("Criterion"), _text("Clause"), _text("Level"), _text("What is compared")]
+    columns += [Column("Value"), Column("Limit"), _text("Met"), Column("Rooms")]
+    rows = []
+    for verdict in result.verdicts:
+        if verdict.rule != rule or not verdict.rooms:
+            continue
+        one = verdict.criterion
+        for level, value, met in zip(one.level, verdict.values, verdict.met, strict=True):
+            what, number, limit = _compared(level, value)
+            rows.append(
+                (one.title, one.clause, level.name, what, number, limit, yes_or_no(met),
+                 str(verdict.rooms))
+            )  # fmt: skip
+    return Table("The building", tuple(columns), tuple(rows))
+
+
+def _compared(level: LevelTable, value: float | None) -> tuple[str, str, str]:
+    """What a level compares over the rooms, its value and its limit."""
+    if level.over == "area mean":
+        need = level.needs[0]
+        words = f"{need.words}; mean over the floor area"
+        return words, shown(need, value), limit_of(need)
+    number = MISSING if value is None else f"{rounded(100 * value, 0)} %"
+    limit = {"each room": "≥ 100 %", "room": "–"}.get(
+        level.over, f"≥ {100 * (level.share or 0):g} %"
+    )
+    return OVER[level.over], number, limit
+
+
+def without_rooms(result: Compliance, rule: str) -> tuple[str, ...]:
+    """Titles of the criteria of a rule that no room is for."""
+    verdicts = (v for v in result.verdicts if v.rule == rule and not v.rooms)
+    return tuple(verdict.criterion.title for verdict in verdicts)
+
+
+def rooms_table(result: Compliance, rule: str) -> Table:
+    """Every room with the level that it reaches of each criterion that is for some room."""
+    numbers = [i for i, v in enumerate(result.verdicts) if v.rule == rule and v.rooms]
+    columns = [_text("Room"), _text("Use"), Column("Area", "m²")]
+    columns += [_text(result.verdicts[i].criterion.title) for i in numbers]
+    rows = [
+        (
+            room.space.label,
+            room.use.key if room.use.occupied else f"{room.use.key} (not occupied)",
+            rounded(room.space.floor_area, 1),
+            *(_short(room.verdicts[i].reached) for i in numbers),
+        )
+        for room in result.rooms
+    ]
+    return Table("Room by room", tuple(columns), tuple(rows))
+
+
+def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:
+    """A room against the criteria of a rule: every need with its value, limit and clause."""
+    columns = [_text("Criterion"), _text("Clause"), _text("Level"), _text("Quantity")]
+    columns += [Column("Value"), Column("Limit"), _text("Met")]
+    rows = []
+    for verdict in room.verdicts:
+        if verdict.rule != rule or not verdict.applies:
+            continue
+        one = verdict.criterion
+        for level, values in zip(one.level, verdict.values, strict=True):
+            rows += [
+                (one.title, one.clause, level.name, need.words, shown(need, value), limit_of(need),
+                 yes_or_no(need.met(value)))
+                for need, value in zip(level.needs, values, strict=True)
+            ]  # fmt: skip
+    return Table(result.rules[rule].title, tuple(columns), tuple(rows))
+
+
+def openings_table(room: CheckedRoom) -> Table | None:
+    """The sunlight of each opening of a room."""
+    if room.sun is None:
+        return None
+    columns = [_text("Opening"), *(Column(axis, "m") for axis in "xyz"), Column("Sun", "h")]
+    columns.append(_text("Times (local standard time)"))
+    rows = [
+        (one.name, *(f"{v:.2f}" for v in one.point), f"{one.hours:.2f}", spans(one.times))
+        for one in room.sun.openings
+    ]
+    return Table("Sunlight at the openings", tuple(columns), tuple(rows))
+
+
+def spans(times: tuple[tuple[float, float], ...]) -> str:
+    """Intervals in minutes of the day as clock times."""
+    return ", ".join(f"{_clock(start)}–{_clock(end)}" for start, end in times) or "none"
+
+
+def values_frame(result: Compliance) -> pd.DataFrame:
+    """Every need of every room that it is for, one a row."""
+    return pd.DataFrame(list(_rows(result)), columns=list(COLUMNS))
+
+
+def _rows(result: Compliance) -> Iterator[tuple]:
+    for room in result.rooms:
+        for verdict in room.verdicts:
+            if not verdict.applies:
+                continue
+            rule, one = result.rules[verdict.rule], verdict.criterion
+            for level, values in zip(one.level, verdict.values, strict=True):
+                for need, value in zip(level.needs, values, strict=True):
+                    factor = 100 if need.unit == "%" else 1
+                    limit = need.at_least if need.at_least is not None else need.at_most
+                    yield (
+                        room.space.label, room.space.guid, room.use.key, room.space.floor_area,
+                        verdict.rule, rule.edition, one.clause, one.key, level.name, need.words,
+                        None if value is None else factor * value, factor * (limit or 0.0),
+                        need.unit, yes_or_no(need.met(value)),
+                    )  # fmt: skip
+
+
+def _clock(minutes: float) -> str:
+    whole = int(minutes + 0.5)
+    return f"{whole // 60:02d}:{whole % 60:02d}"
+
+
+def _short(reached: str) -> str:
+    return MISSING if reached == NOT_FOR_IT else reached
+
+
+def _text(label: str) -> Column:
+    return Column(label, numeric=False)

@@ -1,0 +1,111 @@
+"""The use of each room: from a mapping file, else from what the IFC file says, else assumed."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from pydantic import Field
+
+from bim.model import Space
+from scenes.toml_file import TomlTable, read_table, validated
+
+UNKNOWN = "unknown"
+WORDS = Path(str(files(__package__) / "uses.toml"))
+GERMAN = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
+BEGINNING = 5  # letters from which on a word may also begin a longer one
+
+Texts = Mapping[str, Sequence[tuple[str, str]]]  # by GUID: where it is said, and the text
+
+
+class UseTable(TomlTable):
+    """A use of rooms, and the words by which it is known."""
+
+    key: str
+    occupied: bool
+    words: tuple[str, ...] = ()
+
+
+class UsesFile(TomlTable):
+    """A mapping file: uses by words, and rooms by name, number or GUID."""
+
+    use: tuple[UseTable, ...] = ()
+    rooms: dict[str, str] = Field({})  # name, number, label or GUID: key of a use
+
+
+@dataclass(frozen=True, slots=True)
+class RoomUse:
+    """What a room is used for, and how that is known."""
+
+    key: str
+    occupied: bool  # people are there regularly and for long
+    source: str  # in words
+    assumed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RoomUses:
+    """How rooms get their use."""
+
+    uses: tuple[UseTable, ...]  # those of the user's file first
+    rooms: Mapping[str, str]
+    file: str = ""  # that names rooms
+
+    def of(self, space: Space, texts: Sequence[tuple[str, str]] = ()) -> RoomUse:
+        """The use of a room.
+
+        Args: texts: what the IFC file says beside names and type, see `bim.ifc.room_uses`.
+        """
+        for name in (space.guid, space.label, space.name, space.long_name):
+            if name and name in self.rooms:
+                return self._named(self.rooms[name])
+        for where, text in self._texts(space, texts):
+            for use in self.uses:
+                word = next((word for word in use.words if _holds(text, word)), None)
+                if word is not None:
+                    source = f"{where} {text!r} holds {word!r}"
+                    return RoomUse(use.key, use.occupied, source, where in ("name", "long name"))
+        return RoomUse(UNKNOWN, True, "nothing says what it is used for: regularly occupied", True)
+
+    def _named(self, key: str) -> RoomUse:
+        use = next((one for one in self.uses if one.key == key), None)
+        occupied = use.occupied if use is not None else True
+        return RoomUse(key, occupied, f"named in {self.file}")
+
+    @staticmethod
+    def _texts(space: Space, texts: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+        yield from texts
+        names = (("type", space.type_name), ("long name", space.long_name), ("name", space.name))
+        yield from ((where, text) for where, text in names if text)
+
+
+def read_uses(path: Path | None = None) -> RoomUses:
+    """The words that come with the program, after those of a user's file where there is one.
+
+    Raises: `DataError` that names file and key.
+    """
+    shipped = validated(UsesFile, read_table(WORDS), WORDS)
+    if path is None:
+        return RoomUses(shipped.use, {})
+    own = validated(UsesFile, read_table(path), path)
+    return RoomUses((*own.use, *shipped.use), own.rooms, path.name)
+
+
+def _holds(text: str, word: str) -> bool:
+    """Whether a text has a word, or a longer word that begins with it."""
+    word = _plain(word)
+    end = "" if len(word) >= BEGINNING else r"(?![a-z])"
+    return re.search(rf"(?<![a-z]){re.escape(word)}{end}", _plain(text)) is not None
+
+
+@cache
+def _plain(text: str) -> str:
+    """Small letters without accents; German umlauts as two letters."""
+    text = text.casefold().translate(GERMAN)
+    apart = unicodedata.normalize("NFKD", text)
+    return "".join(letter for letter in apart if not unicodedata.combining(letter))

@@ -1,0 +1,119 @@
+"""The light that rules look at: grids from one scene, blinds moved by group, the default shade."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.metrics import lm83
+from mitsuba_cfs.sky.epw import read_epw
+from scenes.comply.blinds import diffuse_shade, open_and_closed, with_default_shade
+from scenes.comply.light import lights_of, sensor_grid_of
+from scenes.comply.rules import GridTable, read_rule
+from scenes.demo import WEATHER
+from scenes.fenestration.systems import FenestrationSystem
+from scenes.room.options import RoomOptions, SensorGrid
+from scenes.room.room import RoomSimulation, skies_for
+
+EVERY = 23  # hour with the sun up: all hours of the day and all seasons come
+
+
+def glazing(tau=0.7):
+    klems = specular_klems(Glazing("clear", tau, 0.1, 0.1, 2), KLEMS_FULL)
+    return FenestrationSystem("clear", klems, klems, source="made")
+
+
+def test_the_default_shade_passes_five_per_cent():
+    """Of what the glazing passes, evenly: tau(incident) x 0.05, the same in every direction."""
+    clear = glazing()
+    shaded = with_default_shade(clear).visible
+    passed = shaded.direct_hemispherical(shaded.transmission_front)
+    wanted = 0.05 * clear.visible.direct_hemispherical(clear.visible.transmission_front)
+    np.testing.assert_allclose(passed, wanted, rtol=1e-12)
+    assert np.ptp(shaded.transmission_front, axis=0).max() < 1e-12
+    shade = diffuse_shade(0.05)
+    whole = shade.direct_hemispherical(shade.transmission_front)
+    np.testing.assert_allclose(whole, 0.05, rtol=1e-12)
+
+
+def test_closed_is_what_is_given_else_held_else_default():
+    clear, blind, given = glazing(), glazing(0.2), glazing(0.1)
+    systems = {"a": (clear,), "b": (clear, blind)}
+    found = open_and_closed(systems, None)
+    assert found["a"][0] is clear and "default shade" in found["a"][1].name
+    assert found["b"] == (clear, blind)
+    assert all(states[1] is given for states in open_and_closed(systems, given).values())
+    same = open_and_closed({"a": (clear,), "b": tuple([clear])}, None)
+    assert same["a"] is same["b"]  # windows of one system stay one group
+
+
+def test_grids_of_rules():
+    """LM-83's is 0.6 m wide and high; EN 17037's has whole cells no wider than p."""
+    space = shoebox(4.0, 6.0).spaces[0]
+    assert sensor_grid_of(space, read_rule("lm83").grid) == SensorGrid(
+        spacing=0.6, height=0.76, margin=0.0
+    )
+    grid = sensor_grid_of(space, read_rule("en17037").grid)  # a plane of 3 x 5 m
+    p = 0.5 * 5 ** np.log10(5.0)
+    assert grid.spacing == pytest.approx(5.0 / 4) and 5.0 / 4 <= p < 5.0 / 3
+    assert (grid.height, grid.margin) == (0.85, 0.5)
+
+
+@pytest.fixture(scope="module")
+def room(variant):
+    """East and west windows, two grids, a sample of the year's hours."""
+    weather = read_epw(WEATHER)
+    sides = [WindowRectangle(1.5, 0.9, 2.0, 1.8, side=side) for side in ("left", "right")]
+    building = shoebox(windows=sides)
+    space = building.spaces[0]
+    options = RoomOptions.of(
+        sky_subdivision=1, sensor_samples=1024, patch_samples=256, sun_points=64
+    )
+    skies = skies_for(weather, "five-phase", options.sampling)
+    skies = skies.part(np.arange(0, len(skies.lit), EVERY))
+    systems = open_and_closed({w.guid: (glazing(),) for w in space.windows}, None)
+    same = {w.guid: systems[space.windows[0].guid] for w in space.windows}
+    grids = [sensor_grid_of(space, GridTable(height=0.76, margin=0.3, spacing=1.5)),
+             sensor_grid_of(space, GridTable(height=0.85, margin=0.5, spacing=1.0))]  # fmt: skip
+    return RoomSimulation(building, space, same, weather, options, skies=skies, grids=grids)
+
+
+@pytest.mark.slow
+def test_blinds_are_moved_group_by_group(room):
+    """East closes in the morning, west in the afternoon; the light is that of these states."""
+    operated, other = lights_of(room, {0})
+    assert other.operated is None and len(other.points) != len(operated.points)
+    np.testing.assert_allclose(operated.points[:, 2], 0.76)
+    np.testing.assert_allclose(other.points[:, 2], 0.85)
+    lit = room.skies.lit
+    closed = operated.closed[lit]
+    assert 0.02 < closed.mean() < 0.5 and not closed.all(axis=1).any()
+    east = next(g for g, group in enumerate(room.windows.groups) if group.name == "E")
+    before_noon = room.weather.midpoints[lit].hour < 12
+    assert closed[before_noon, east].any() and not closed[~before_noon, east].any()
+    # by hand: state by state through the same matrices
+    count = len(operated.points)
+    through = [part[:count] for part in room.light.direct_sun_by_group()]
+    over = np.stack([np.mean(part >= 1000.0, axis=0) > 0.02 for part in through])
+    np.testing.assert_array_equal(closed.T, over)
+    np.testing.assert_allclose(sum(through).T, operated.direct[lit], rtol=1e-6)
+    for states in ((0, 0), (1, 0), (0, 1)):
+        hours = np.all(over == np.array(states, dtype=bool)[:, None], axis=0)
+        row = np.tile(np.array(states)[:, None], len(lit))
+        wanted = room.light.illuminance(row)[:count, hours].T
+        np.testing.assert_allclose(operated.operated[lit][hours], wanted, rtol=1e-6)
+    # with closed blinds it is darker, with open ones the same
+    opened, moved = operated.open[lit], operated.operated[lit]
+    assert (moved[over.any(axis=0)] < opened[over.any(axis=0)]).all()
+    np.testing.assert_array_equal(moved[~over.any(axis=0)], opened[~over.any(axis=0)])
+
+
+def test_operation_by_group_of_arrays():
+    """2 of 100 points are not over 2 %, 3 are; each group for itself."""
+    direct = np.zeros((2, 3, 100))
+    direct[0, 1, :2], direct[0, 2, :3], direct[1, 0, :50] = 1000.0, 1000.0, 2000.0
+    wanted = [[False, False, True], [True, False, False]]
+    np.testing.assert_array_equal(lm83.blinds_operated(direct), wanted)

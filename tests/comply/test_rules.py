@@ -1,0 +1,266 @@
+"""Rules as data: the files, the verdicts that they give, and the faults that they name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.metrics import en17037
+from mitsuba_cfs.sky.epw import read_epw
+from scenes.comply.assess import (
+    NOT_COMPUTED,
+    NOT_FOR_IT,
+    RoomVerdict,
+    assess_building,
+    assess_room,
+    values_of,
+)
+from scenes.comply.findings import Findings, GridLight, calendar_of
+from scenes.comply.rules import NOT_MET, read_rule, rule_names
+from scenes.comply.sunlight import SunExposure
+from scenes.comply.uses import RoomUse
+from scenes.comply.view_out import ViewOut
+from scenes.demo import WEATHER
+
+OFFICE = RoomUse("office", True, "")
+STORE = RoomUse("storage", False, "")
+
+
+@pytest.fixture(scope="module")
+def calendar():
+    return calendar_of(read_epw(WEATHER))
+
+
+def light(open_lx, *, operated=None, direct=None, factor=None):
+    open_lx = np.asarray(open_lx, dtype=np.float32)
+    count = open_lx.shape[1]
+    return GridLight(
+        np.zeros((count, 3)),
+        open_lx,
+        np.zeros_like(open_lx) if direct is None else direct,
+        np.zeros(count) if factor is None else np.asarray(factor),
+        operated,
+    )
+
+
+def reached(name, findings, use=OFFICE, building=None):
+    rule = read_rule(name)
+    space = (building or shoebox()).spaces[0]
+    values = {name: values_of(rule, findings, rule.parts)}
+    return {v.criterion.key: v.reached for v in assess_room({name: rule}, values, space, use)}
+
+
+@pytest.mark.parametrize("name", rule_names())
+def test_each_rule_is_whole(name):
+    rule = read_rule(name)
+    assert rule.title and rule.edition and all(rule.source)
+    keys = [criterion.key for criterion in rule.criterion]
+    assert len(set(keys)) == len(keys)
+    for criterion in rule.criterion:
+        assert criterion.clause and all(need.words for need in criterion.needs)
+        for level in criterion.level:
+            assert level.over != "area mean" or len(level.needs) == 1
+
+
+def test_provision_is_that_of_the_library(calendar):
+    """Method 2 of the rule file and `daylight_provision` find one level, for many rooms."""
+    random = np.random.default_rng(1)
+    found = set()
+    for scale in np.geomspace(100, 3000, 24):
+        lux = random.gamma(2.0, scale / 2, (8760, 1)) * random.uniform(0.2, 1.8, (1, 20))
+        wanted = en17037.daylight_provision(lux.astype(np.float32), calendar.daylight)
+        level = reached("en17037", Findings(calendar, light(lux)))["provision"]
+        found.add(level)
+        assert level == {0: NOT_MET}.get(wanted.level, wanted.level.name.lower())
+    assert found == {NOT_MET, "minimum", "medium", "high"}
+
+
+def test_daylight_factor_is_that_of_the_library(calendar):
+    """Method 1 with the file's median diffuse illuminance."""
+    found = set()
+    for scale in np.geomspace(0.005, 0.2, 30):
+        factor = scale * np.linspace(0.3, 1.7, 20)
+        wanted = en17037.daylight_factor_level(factor, calendar.median_diffuse)
+        findings = Findings(calendar, light(np.zeros((8760, 20)), factor=factor))
+        level = reached("en17037", findings)["daylight_factor"]
+        found.add(level)
+        assert level == {0: NOT_MET}.get(wanted, wanted.name.lower())
+    assert len(found) == 4
+
+
+def test_rooflights_have_a_table_of_their_own(calendar):
+    """500 lx on 96 % of the plane: high for no wall opening without its minimum target."""
+    lux = np.full((8760, 50), 500.0)
+    lux[:, :2] = 0.0
+    roof = shoebox(windows=[WindowRectangle(1, 1, 2, 2, side="ceiling")])
+    findings = Findings(calendar, light(lux))
+    assert reached("en17037", findings, building=roof)["provision_roof"] == "medium"
+    assert reached("en17037", findings, building=roof)["provision"] == NOT_FOR_IT
+    assert reached("en17037", findings)["provision"] == "medium"
+    assert reached("en17037", findings)["provision_roof"] == NOT_FOR_IT
+
+
+@pytest.mark.parametrize(
+    ("hours", "level"),
+    [(1.49, NOT_MET), (1.5, "minimum"), (2.99, "minimum"), (3.0, "medium"), (4.0, "high")],
+)
+def test_levels_of_sunlight(calendar, hours, level):
+    sun = SunExposure((), ((600.0, 600.0 + 60 * hours),))
+    assert reached("en17037", Findings(calendar, sun=sun))["sunlight"] == level
+
+
+def test_view_wants_all_three_at_one_eye(calendar):
+    """Half of the eyes have the angle, the other half the distance: not met."""
+    angle, distance = np.array([60.0, 60, 5, 5]), np.array([3.0, 3, 90, 90])
+    view = ViewOut(np.zeros((4, 3)), angle, distance, np.ones((4, 3), dtype=bool))
+    assert reached("en17037", Findings(calendar, view=view))["view_out"] == NOT_MET
+    wide = ViewOut(np.zeros((4, 3)), np.array([28.0, 28, 28, 5]), distance + 90, view.layers)
+    assert reached("en17037", Findings(calendar, view=wide))["view_out"] == "medium"
+
+
+@pytest.mark.parametrize(
+    ("share", "value", "level"),
+    [(0.05, 0.46, "minimum"), (0.05, 0.41, "medium"), (0.05, 0.36, "high"), (0.06, 0.46, NOT_MET)],
+)
+def test_levels_of_glare(calendar, share, value, level):
+    """The rest of the hours is at the level's own limit, which does not count as above."""
+    base = {"minimum": 0.45, "medium": 0.40, "high": 0.35}.get(level, 0.2)
+    dgp = np.full(1000, base)
+    dgp[: int(1000 * share)] = value
+    assert reached("en17037", Findings(calendar, dgp=dgp))["glare"] == level
+
+
+def test_what_was_not_computed_is_no_failure(calendar):
+    found = reached("en17037", Findings(calendar))
+    assert found["glare"] == found["view_out"] == found["provision"] == NOT_COMPUTED
+
+
+def test_sda_is_of_operated_blinds(calendar):
+    """300 lx with the blinds open in all hours, with operated ones on half of the points."""
+    lux = np.full((8760, 10), 300.0, dtype=np.float32)
+    operated = lux.copy()
+    operated[:, 6:] = 299.0
+    found = reached("lm83", Findings(calendar, light(lux, operated=operated)))
+    assert found["sda"] == "nominally accepted"
+    assert reached("lm83", Findings(calendar, light(lux)))["sda"] == NOT_COMPUTED
+
+
+def test_clear_hours_of_the_equinoxes(calendar):
+    """Two days, each with the interval before and after the clock hour."""
+    hours = calendar.clear_hours(9)
+    times = calendar.times[hours]
+    assert len(hours) == 4 and set(times.hour) == {8, 9} and set(times.minute) == {30}
+    assert {t.month for t in times} <= {3, 4, 9, 10}
+
+
+def test_option_2_counts_points_that_keep_both_hours(calendar):
+    lux = np.full((8760, 10), 1000.0)
+    lux[calendar.clear_hours(9), :2] = 200.0
+    lux[calendar.clear_hours(15), 1:4] = 4000.0  # the mean of the two days and hours
+    rule = read_rule("leed-v4.1")
+    found = values_of(rule, Findings(calendar, light(lux)), frozenset({"open"}))
+    (value,) = {v for need, v in found.items() if need.what == "equinox"}
+    assert value == pytest.approx(0.6)
+
+
+def test_breeam_counts_hours_of_the_year(calendar):
+    """300 lx as a mean for 2000 hours and 90 lx at the worst point; the use decides."""
+    lux = np.zeros((8760, 4))
+    lux[:2000] = [390.0, 390.0, 330.0, 90.0]
+    assert reached("breeam-hea01", Findings(calendar, light(lux)))["offices"] == "2 credits"
+    lux[1999] = 0.0
+    found = reached("breeam-hea01", Findings(calendar, light(lux)))
+    assert found["offices"] == NOT_MET and found["dwellings"] == NOT_FOR_IT
+
+
+def test_rooms_that_are_not_occupied_are_left_out(calendar):
+    findings = Findings(calendar, light(np.zeros((8760, 2))))
+    assert reached("leed-v4.1", findings, use=STORE)["option_1"] == NOT_FOR_IT
+
+
+def test_the_building_is_a_mean_over_the_floor_area(calendar):
+    """sDA 100 % on 10 m2 and 0 % on 30 m2: 25 %; a room without values leaves it open."""
+    rule = read_rule("leed-v4.1")
+    criterion = rule.criterion[0]
+    each = rule.criterion[1]
+
+    def room(value):
+        return [
+            RoomVerdict("leed-v4.1", criterion, True, ((value,),) * 3),
+            RoomVerdict("leed-v4.1", each, True, ((value,),)),
+        ]
+
+    mean, all_rooms = assess_building([room(1.0), room(0.0)], [10.0, 30.0])
+    assert mean.values == pytest.approx([0.25] * 3) and mean.reached == NOT_MET
+    assert all_rooms.values == pytest.approx([0.25]) and all_rooms.reached == NOT_MET
+    mean, all_rooms = assess_building([room(1.0), room(0.55)], [10.0, 30.0])
+    assert mean.reached == "2 points" and all_rooms.reached.startswith("1 more point")
+    mean, _ = assess_building([room(1.0), room(None)], [10.0, 30.0])
+    assert mean.reached == NOT_COMPUTED
+
+
+def test_a_share_of_the_floor_area(calendar):
+    """BREEAM: 80 % of the area of the offices."""
+    criterion = read_rule("breeam-hea01").criterion[0]
+
+    def room(hours):
+        return [RoomVerdict("breeam-hea01", criterion, True, ((hours, 3000.0),))]
+
+    (verdict,) = assess_building([room(2000.0), room(1999.0)], [80.0, 20.0])
+    assert verdict.values == pytest.approx([0.8]) and verdict.reached == "2 credits"
+    (verdict,) = assess_building([room(2000.0), room(1999.0)], [79.0, 21.0])
+    assert verdict.reached == NOT_MET
+
+
+FILE = """
+title = "Own"
+edition = "1"
+source = ["mine"]
+grid = {{height = 0.8, margin = 0.5}}
+[[criterion]]
+key = "a"
+title = "A"
+clause = "1"
+[[criterion.level]]
+name = "yes"
+{level}
+"""
+
+
+@pytest.mark.parametrize(
+    ("level", "said"),
+    [
+        ('needs = [{what = "sun_hours", at_least = 2, at_most = 3}]', "either at_least or at_most"),
+        ('needs = [{what = "sun_hours"}]', "either at_least or at_most"),
+        ('needs = [{what = "sun_hours", at_leats = 2}]', "at_leats: no such key"),
+        ('needs = [{what = "moon_hours", at_least = 2}]', "criterion.0.level.0.needs.0"),
+        ('over = "area of rooms"\nneeds = [{what = "sun_hours", at_least = 2}]', "share belong"),
+        ("needs = []", "at least 1 entries"),
+    ],
+)
+def test_a_fault_of_a_rule_file_is_one_line(tmp_path, level, said):
+    path = tmp_path / "own.toml"
+    path.write_text(FILE.format(level=level))
+    with pytest.raises(DataError, match=r"own\.toml") as fault:
+        read_rule(str(path))
+    assert said in str(fault.value)
+
+
+def test_an_own_rule_file_is_read(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(FILE.format(level='needs = [{what = "sun_hours", at_least = 2}]'))
+    assert read_rule(str(path)).criterion[0].level[0].name == "yes"
+    with pytest.raises(DataError, match="no rule 'en17073'"):
+        read_rule("en17073")
+
+
+def test_size_of_a_cell():
+    """EN 12464-1 tabulates p: 0.5 m at 1 m, 1.0 m at 2.7 m, 2.5 m at 10 m, 5 m at 27 m... 10 m."""
+    for d, p in ((1.0, 0.5), (10.0, 2.5), (100.0, 10.0), (1000.0, 10.0)):
+        assert en17037.greatest_cell(d, 0.9 * d) == pytest.approx(p)
+    assert en17037.greatest_cell(10.0, 1.0) == pytest.approx(0.5)
+    assert en17037.greatest_cell(1.0, 10.0) == pytest.approx(0.5)
+    with pytest.raises(ValueError, match="two sides"):
+        en17037.greatest_cell(1.0, 0.0)
