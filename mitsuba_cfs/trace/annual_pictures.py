@@ -28,7 +28,7 @@ from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.trace.image import picture_matrix_blocks
+from mitsuba_cfs.trace.image import picture_part_blocks
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
@@ -78,7 +78,7 @@ def view_matrices(
         folder: of the files where they lie on disk (they go with the process); the system's
             temporary folder by default.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
-        options: basis, samples, max_depth, seed of `picture_matrix_blocks`.
+        options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
     tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
@@ -86,30 +86,23 @@ def view_matrices(
     m = len(keys)
     columns = len(groups) * options.get("basis", KLEMS_FULL).size
     indirect, lit = (_storage((m, columns), 8 * m * columns > memory, folder) for _ in range(2))
-    black = Surfaces(surfaces.triangles, np.zeros_like(surfaces.reflectance), surfaces.surface)
     depth = options.pop("max_depth", 32)
-    traced = (
-        picture_matrix_blocks(
-            surfaces,
-            groups,
-            view,
-            max_depth=depth,
-            window_reflectance=window_reflectance,
-            progress=progress,
-            **options,
-        ),
-        picture_matrix_blocks(
-            surfaces, groups, view, max_depth=1, window_reflectance=window_reflectance, **options
-        ),
-        picture_matrix_blocks(black, groups, view, max_depth=1, **options),
+    traced = picture_part_blocks(
+        surfaces,
+        groups,
+        view,
+        max_depth=depth,
+        window_reflectance=window_reflectance,
+        progress=progress,
+        **options,
     )
     seen, start = [], 0
-    for (block, whole), (_, one), (_, none) in zip(*traced, strict=True):
-        shape, part = (len(block), columns), row[start : start + len(block)]
-        # with equal random numbers each part holds the next; rounding alone can go below zero
-        _add_rows(indirect, part, np.maximum(whole - one, 0).reshape(shape))
-        _add_rows(lit, part, np.maximum(one - none, 0).reshape(shape))
-        seen.append(sparse.csr_array(none.reshape(shape)))
+    for block, parts in traced:
+        shown, one, more = parts.reshape(len(parts), len(block), columns)
+        part = row[start : start + len(block)]
+        _add_rows(indirect, part, more)
+        _add_rows(lit, part, one)
+        seen.append(sparse.csr_array(shown))
         start += len(block)
     seen = sparse.csr_array(sparse.vstack(seen))
     share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0)
@@ -120,19 +113,21 @@ def view_matrices(
     total = np.maximum(np.bincount(row, share, minlength=m), 0.5 / options.get("samples", 32))
     for rows in (indirect, lit):
         rows /= total[:, None].astype(np.float32)
+    elements, close = None, None
+    if depth > 1:
+        area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
+        elements, close = sun_elements(tracer, area, view, pixels, row, tile, seed=seed)
     smooth = sparse.csr_array(sparse.eye_array(m, dtype=np.float32))
     if tile > 1:
-        smooth = smoothing(Tiles(tile, view.width), keys, total).astype(np.float32)
+        smooth = smoothing(Tiles(tile, view.width), keys, total, close).astype(np.float32)
         for start in range(0, columns, KLEMS_FULL.size):
             part = slice(start, start + KLEMS_FULL.size)
             for rows in (indirect, lit):
                 rows[:, part] = smooth @ rows[:, part]
-    elements = None
-    if depth > 1:
-        area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
-        elements = sun_elements(tracer, area, view, pixels, row, seed=seed)
-        mean = sparse.diags_array((1 / total).astype(np.float32)) @ elements.share
-        elements = replace(elements, share=sparse.csr_array(mean), smooth=smooth)
+    if elements is not None:
+        mean = sparse.diags_array((1 / total).astype(np.float32))
+        of = [sparse.csr_array(mean @ s) for s in (elements.share, elements.near)]
+        elements = replace(elements, share=of[0], near=of[1], smooth=smooth)
     parts = (PictureMatrix(rows, row, share) for rows in (indirect, lit))
     return ViewMatrices(view, pixels, *parts, seen, elements)
 
