@@ -54,6 +54,11 @@ class SunElements:
         mean = far.reshape(-1, POINTS, irradiance.shape[1]).mean(axis=1)
         return self.smooth @ (self.share @ mean) + self.near @ near
 
+    def of_rows(self, rows: sparse.csr_array, smooth: sparse.csr_array) -> SunElements:
+        """Of other rows [k] that these make up [k, m], with their smoothing."""
+        share, near = (sparse.csr_array(rows @ part) for part in (self.share, self.near))
+        return SunElements(self.places, share, near, smooth)
+
 
 @dataclass(frozen=True, slots=True)
 class _Hits:
@@ -168,7 +173,7 @@ def sun_elements(
     area: float,
     view: View,
     pixels: NDArray[np.int64],
-    row: NDArray[np.int64],
+    half: NDArray[np.int64],
     tile: int,
     *,
     samples: int = 8,
@@ -176,36 +181,37 @@ def sun_elements(
 ) -> tuple[SunElements, NDArray[np.bool_]]:
     """Elements by the places that paths of a view's pixels meet after what the pixel shows.
 
-    And the rows [m] that show what another surface is near to.
+    Their rows are the halves [2 m].  And the rows [m] that show what another surface is near to.
 
     Args:
         area: of the room's surfaces [m2].
-        pixels, row: [n] pixels, and the row of each; a row's luminance is the sum of its pixels'.
+        pixels, half: [n] pixels, and the half of a row that each is of: 2 * row or 1 more; the
+            luminance of a half is the sum of its pixels'.
         tile: pixels across of the squares whose light is shared.
         samples: paths of each pixel, fewer in large pictures.
     """
     samples = int(np.clip(PATHS // max(len(pixels), 1), 1, samples))
     edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
     look = _Look(tracer, view, tile, edge, seed)
-    m = int(row.max(initial=-1)) + 1
+    m = int(half.max(initial=-1)) // 2 + 1
     far, close = [], np.zeros(m, dtype=bool)
     for part in _blocks(np.arange(len(pixels)), samples):
-        hits, beside = look.far(pixels[part], row[part], samples, int(part[0]))
+        hits, beside = look.far(pixels[part], half[part], samples, int(part[0]))
         far.append(hits)
-        close[beside] = True
+        close[beside // 2] = True
     rays_each = -(-NEAR_RAYS // tile**2)
-    chosen = np.flatnonzero(close[row])
+    chosen = np.flatnonzero(close[half // 2])
     number = np.zeros(len(pixels), dtype=np.int64)
-    number[chosen] = _numbered(row[chosen])
+    number[chosen] = _numbered(half[chosen])
     blocks = _blocks(chosen, rays_each)
-    near = [look.near(pixels[p], row[p], number[p], rays_each) for p in blocks]
+    near = [look.near(pixels[p], half[p], number[p], rays_each) for p in blocks]
     shares, places = [], []
     for hits, points in ((_Hits.joined(far), POINTS), (_Hits.joined(near), 1)):
         element, count = _elements(hits, edge)
         entries = hits.weight.astype(np.float32), (hits.row, element)
-        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(m, count))))
+        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(2 * m, count))))
         places.append(hits.places.some(_chosen(element, count, points, seed)))
-    alone = sparse.csr_array(sparse.eye_array(m, dtype=np.float32))
+    alone = sparse.csr_array(sparse.eye_array(2 * m, dtype=np.float32))
     return SunElements(Places.joined(places), *shares, alone), close
 
 
