@@ -51,6 +51,10 @@ class PictureMatrix:
                 "expected [m, N], [n], [n]"
             )
 
+    def with_rows(self, rows: NDArray[np.float32]) -> PictureMatrix:
+        """The same pixels of other rows."""
+        return PictureMatrix(rows, self.row, self.share)
+
     def add_to(
         self,
         values: NDArray[np.float32],
@@ -112,6 +116,9 @@ class Pictures(Protocol):
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """The same without the sun's disc, and the disc [h] as far as it is seen."""
 
+    def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Half of what pictures [h, n] of two halves of the paths differ by [cd/m2]."""
+
 
 @dataclass(frozen=True, slots=True)
 class ThreePhasePictures:
@@ -122,6 +129,7 @@ class ThreePhasePictures:
     reflected: PictureMatrix  # of n pixels
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel
     luminance: NDArray[np.float32]  # [G, K, H] of the windows towards the room, T D s [cd/m2]
+    unlike: NDArray[np.float32] | None = None  # [m, G * K] half of what halves of `reflected` differ
 
     def __post_init__(self) -> None:
         n, N = len(self.pixels), self.reflected.rows.shape[1]
@@ -146,6 +154,14 @@ class ThreePhasePictures:
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """See `Pictures`; the sun is part of the patches."""
         return self.values(batch), [None] * len(batch)
+
+    def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """See `Pictures`; none where the halves are not known."""
+        values = np.zeros((len(batch), len(self.pixels)), dtype=np.float32)
+        if self.unlike is not None:
+            luminance = flat(self.luminance, self.seen.shape[1])[:, batch]
+            self.reflected.with_rows(self.unlike).add_to(values, luminance)
+        return values
 
 
 def annual_glare(

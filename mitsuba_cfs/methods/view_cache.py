@@ -15,7 +15,7 @@ from mitsuba_cfs.files import opened_arrays, replacing
 from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
-from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
+from mitsuba_cfs.trace.annual_pictures import ViewMatrices, ViewNoise, view_matrices
 from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sun_paths import Places
 
@@ -40,7 +40,7 @@ def kept_view(
     except UNREADABLE:
         path.unlink(missing_ok=True)
     found = trace()
-    if 2 * found.lit.rows.nbytes <= LARGEST:
+    if 4 * found.lit.rows.nbytes <= LARGEST:
         _write(path, found)
         cache.trim(keep=path)
     return found
@@ -50,11 +50,17 @@ def _read(path: Path, view: View) -> ViewMatrices:
     with opened_arrays(path) as data:
         row, share = data["row"], data["share"]
         parts = (PictureMatrix(data[name], row, share) for name in ("indirect", "lit"))
-        elements = None
+        elements: list[SunElements | None] = [None, None]
         if "places_point" in data:
             places = Places(data["places_point"], data["places_normal"])
-            elements = SunElements(places, _sparse(data, "elements"), _sparse(data, "smooth"))
-        found = ViewMatrices(view, data["pixels"], *parts, _sparse(data, "seen"), elements)
+            smooth = _sparse(data, "smooth")
+            elements = [
+                SunElements(places, _sparse(data, f"far{i}"), _sparse(data, f"near{i}"), smooth)
+                for i in range(2)
+            ]
+        noise = ViewNoise(data["indirect_noise"], data["lit_noise"], elements[1])
+        seen = _sparse(data, "seen")
+        found = ViewMatrices(view, data["pixels"], *parts, seen, noise, elements[0])
     os.utime(path)  # used now
     return found
 
@@ -70,18 +76,24 @@ def _write(path: Path, found: ViewMatrices) -> None:
                 pixels=found.pixels,
                 indirect=found.indirect.rows,
                 lit=found.lit.rows,
+                indirect_noise=found.noise.indirect,
+                lit_noise=found.noise.lit,
                 row=found.lit.row,
                 share=found.lit.share,
                 **_arrays("seen", found.seen),
-                **_of_elements(found.elements),
+                **_of_elements(found.elements, found.noise.elements),
             )
 
 
-def _of_elements(elements: SunElements | None) -> dict[str, np.ndarray]:
-    if elements is None:
-        return {}
-    points = {"places_point": elements.places.point, "places_normal": elements.places.normal}
-    return points | _arrays("elements", elements.share) | _arrays("smooth", elements.smooth)
+def _of_elements(*elements: SunElements | None) -> dict[str, np.ndarray]:
+    """The elements, and those of their noise, which are in the same places."""
+    arrays: dict[str, np.ndarray] = {}
+    for i, found in enumerate(elements):
+        if found is not None:
+            arrays |= _arrays(f"far{i}", found.share) | _arrays(f"near{i}", found.near)
+            arrays |= _arrays("smooth", found.smooth)
+            arrays |= {"places_point": found.places.point, "places_normal": found.places.normal}
+    return arrays
 
 
 def _arrays(name: str, matrix: sparse.csr_array) -> dict[str, np.ndarray]:

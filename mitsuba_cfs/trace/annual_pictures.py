@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.trace.image import picture_matrix_blocks
+from mitsuba_cfs.trace.image import picture_part_blocks
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
@@ -40,6 +40,19 @@ NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
 
 
 @dataclass(frozen=True, slots=True)
+class ViewNoise:
+    """Half the difference of the matrices that two halves of the paths give; axes as theirs.
+
+    The halves are the squares of a chequerboard of pixels.  A picture of the sum of both differs
+    from the truth, in its root mean square, by as much as the halves differ from it.
+    """
+
+    indirect: NDArray[np.float32]  # [m, G * K]
+    lit: NDArray[np.float32]  # [m, G * K]
+    elements: SunElements | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class ViewMatrices:
     """A view's matrix in three parts, none of which is negative: V = indirect + lit + seen."""
 
@@ -48,13 +61,15 @@ class ViewMatrices:
     indirect: PictureMatrix  # light after two reflections or more, V - V_d
     lit: PictureMatrix  # light of the windows that falls on what the pixel shows, in V_d
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel, in V_d
+    noise: ViewNoise
     elements: SunElements | None = None  # of the rows of `indirect`, for the sun's beam
 
     def three_phase(self, luminance: ArrayLike) -> ThreePhasePictures:
         """Pictures of hours with window luminances T D s [G, K, H]."""
         whole = PictureMatrix(self.indirect.rows + self.lit.rows, self.lit.row, self.lit.share)
-        luminance = np.asarray(luminance, dtype=np.float32)
-        return ThreePhasePictures(self.view, self.pixels, whole, self.seen, luminance)
+        luminance, noise = np.asarray(luminance, dtype=np.float32), self.noise
+        rows = noise.indirect + noise.lit
+        return ThreePhasePictures(self.view, self.pixels, whole, self.seen, luminance, rows)
 
 
 def view_matrices(
@@ -74,67 +89,88 @@ def view_matrices(
     Args:
         tile: pixels across of the squares that share their reflected light, each face of each
             surface for itself, by default as of `tile_size`; 1: every pixel has its own.
-        memory: budget [bytes]; 800 x 800 pixels and a window group take 45 MB, without tiles 582.
+        memory: budget [bytes]; 800 x 800 pixels and a window group take 83 MB, without tiles 1160.
         folder: of the files where they lie on disk (they go with the process); the system's
             temporary folder by default.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
-        options: basis, samples, max_depth, seed of `picture_matrix_blocks`.
+        options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
     tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
     pixels, row, group, keys = _tiles(tracer, view, tile)
-    m = len(keys)
-    columns = len(groups) * options.get("basis", KLEMS_FULL).size
-    indirect, lit = (_storage((m, columns), 8 * m * columns > memory, folder) for _ in range(2))
-    black = Surfaces(surfaces.triangles, np.zeros_like(surfaces.reflectance), surfaces.surface)
-    depth = options.pop("max_depth", 32)
-    traced = (
-        picture_matrix_blocks(
-            surfaces,
-            groups,
-            view,
-            max_depth=depth,
-            window_reflectance=window_reflectance,
-            progress=progress,
-            **options,
-        ),
-        picture_matrix_blocks(
-            surfaces, groups, view, max_depth=1, window_reflectance=window_reflectance, **options
-        ),
-        picture_matrix_blocks(black, groups, view, max_depth=1, **options),
-    )
-    seen, start = [], 0
-    for (block, whole), (_, one), (_, none) in zip(*traced, strict=True):
-        shape, part = (len(block), columns), row[start : start + len(block)]
-        # with equal random numbers each part holds the next; rounding alone can go below zero
-        _add_rows(indirect, part, np.maximum(whole - one, 0).reshape(shape))
-        _add_rows(lit, part, np.maximum(one - none, 0).reshape(shape))
-        seen.append(sparse.csr_array(none.reshape(shape)))
-        start += len(block)
-    seen = sparse.csr_array(sparse.vstack(seen))
+    m, half = len(keys), 2 * row + _second_half(pixels, view)
+    shape = (2 * m, len(groups) * options.get("basis", KLEMS_FULL).size)
+    sums = [_storage(shape, 8 * math.prod(shape) > memory, folder) for _ in range(2)]
+    options["window_reflectance"] = window_reflectance
+    blocks = picture_part_blocks(surfaces, groups, view, progress=progress, **options)
+    seen = _summed(blocks, half, sums)
     share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0)
     if window_reflectance is not None:  # where a window reflects, all of a pixel does
         reflecting = np.append(np.asarray(window_reflectance) > 0, False)  # OPAQUE is the last
         share = np.where(reflecting[group], 1.0, share)
     share = share.astype(np.float32)
-    total = np.maximum(np.bincount(row, share, minlength=m), 0.5 / options.get("samples", 32))
-    for rows in (indirect, lit):
-        rows /= total[:, None].astype(np.float32)
+    total = np.bincount(half, share, minlength=2 * m)
+    elements, close = None, None
+    if options.get("max_depth", 2) > 1:
+        area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
+        elements, close = sun_elements(tracer, area, view, pixels, half, tile, seed=seed)
+    least = 0.5 / options.get("samples", 32)
     smooth = sparse.csr_array(sparse.eye_array(m, dtype=np.float32))
     if tile > 1:
-        smooth = smoothing(Tiles(tile, view.width), keys, total).astype(np.float32)
-        for start in range(0, columns, KLEMS_FULL.size):
-            part = slice(start, start + KLEMS_FULL.size)
-            for rows in (indirect, lit):
-                rows[:, part] = smooth @ rows[:, part]
-    elements = None
-    if depth > 1:
-        area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
-        elements = sun_elements(tracer, area, view, pixels, row, seed=seed)
-        mean = sparse.diags_array((1 / total).astype(np.float32)) @ elements.share
-        elements = replace(elements, share=sparse.csr_array(mean), smooth=smooth)
-    parts = (PictureMatrix(rows, row, share) for rows in (indirect, lit))
-    return ViewMatrices(view, pixels, *parts, seen, elements)
+        count = np.maximum(total.reshape(-1, 2).sum(axis=1), least)
+        smooth = smoothing(Tiles(tile, view.width), keys, count, close).astype(np.float32)
+    mean, noise = _of_halves(total, least)
+    for start in range(0, shape[1], KLEMS_FULL.size):
+        part = slice(start, start + KLEMS_FULL.size)
+        for rows in sums:
+            of_halves = np.array(rows[:, part])
+            rows[:m, part], rows[m:, part] = (smooth @ (a @ of_halves) for a in (mean, noise))
+    found = (None, None)
+    if elements is not None:
+        found = tuple(elements.of_rows(a, smooth) for a in (mean, noise))
+    parts = (PictureMatrix(rows[:m], row, share) for rows in sums)
+    off = ViewNoise(*(rows[m:] for rows in sums), found[1])
+    return ViewMatrices(view, pixels, *parts, seen, off, found[0])
+
+
+def _second_half(pixels: NDArray[np.int64], view: View) -> NDArray[np.int64]:
+    """1 for the pixels on the black squares of a chequerboard, else 0."""
+    row, column = np.divmod(pixels, view.width)
+    return (row + column) % 2
+
+
+def _of_halves(
+    total: NDArray[np.float64], least: float
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """What sums over the halves of rows [2 m] become: the rows' means, and their noise [m, 2 m].
+
+    Args: total: [2 m] what is behind each sum; least: of a row's, or it is a sliver.
+    """
+    m, (first, second) = len(total) // 2, total.reshape(-1, 2).T
+    place = np.repeat(np.arange(m), 2), np.arange(2 * m)
+    mean = np.repeat(1 / np.maximum(first + second, least), 2)
+    both = np.minimum(first, second) > least
+    unlike = 0.5 / np.maximum(np.where(both, (first, second), np.inf), least) * [[1], [-1]]
+    parts = ((mean, place), (unlike.T.ravel(), place))
+    mean, noise = (sparse.csr_array(part, shape=(m, 2 * m)).astype(np.float32) for part in parts)
+    return mean, noise
+
+
+def _summed(
+    blocks: Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]],
+    half: NDArray[np.int64],
+    sums: Sequence[NDArray[np.float32]],
+) -> sparse.csr_array:
+    """Add what comes after more reflections, and after one, to the rows' sums; what is seen."""
+    seen, start = [], 0
+    for block, parts in blocks:
+        shown, one, more = parts.reshape(len(parts), len(block), -1)
+        part = half[start : start + len(block)]
+        for rows, values in zip(sums, (more, one), strict=True):
+            _add_rows(rows, part, values)
+        seen.append(sparse.csr_array(shown))
+        start += len(block)
+    return sparse.csr_array(sparse.vstack(seen))
 
 
 def _tiles(tracer: TracedScene, view: View, tile: int) -> tuple[NDArray[np.int64], ...]:
@@ -260,6 +296,19 @@ class FivePhasePictures:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         discs = self._sun.discs(self._directions[batch], self._illuminance[batch])
         return self._values(batch), discs
+
+    def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        m, noise, rest = self._matrices, self._matrices.noise, self._rest[:, batch]
+        suns, strength = self._directions[batch], self._illuminance[batch]
+        scattered = self._sun.scattered_luminance(suns, strength).reshape(rest.shape)
+        more = None
+        if self._elements is not None and noise.elements is not None:
+            more = self._sun.on_elements(noise.elements, suns, strength)
+        values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
+        m.indirect.with_rows(noise.indirect).add_to(values, self._reflected[:, batch], more)
+        m.lit.with_rows(noise.lit).add_to(values, rest + scattered)
+        return values
 
     def _values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Luminance [h, n] without the sun's disc."""

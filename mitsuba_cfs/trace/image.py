@@ -20,6 +20,7 @@ from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.view_paths import add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
+PARTS = 3  # of a pixel's row: windows seen, their light on what is seen, the rest
 
 
 def luminance_pictures(
@@ -37,7 +38,7 @@ def luminance_pictures(
 
     Args:
         window_luminance: [G, K, H] of the windows towards the room, T D s [cd/m2].
-        samples, options: see `picture_matrix_blocks`.
+        samples, options: see `picture_part_blocks`.
     """
     window_luminance = np.asarray(window_luminance, dtype=np.float32)
     G, K, H = window_luminance.shape
@@ -50,6 +51,20 @@ def luminance_pictures(
 
 
 def picture_matrix_blocks(
+    surfaces: Surfaces, groups: Sequence[WindowGroup], view: View, **options: Any
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
+    """Blocks of the view matrix of a picture: pixel numbers [n] and their rows [n, G, K].
+
+    The rows of a pixel hold its radiance per unit radiance of each window patch: 1 shared among the
+    patches that it sees directly, and what the surfaces it sees reflect.
+
+    Args: options: of `picture_part_blocks`.
+    """
+    for pixels, parts in picture_part_blocks(surfaces, groups, view, **options):
+        yield pixels, parts.sum(axis=0)
+
+
+def picture_part_blocks(
     surfaces: Surfaces,
     groups: Sequence[WindowGroup],
     view: View,
@@ -61,11 +76,11 @@ def picture_matrix_blocks(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
-    """Blocks of the view matrix of a picture: pixel numbers [n] and their rows [n, G, K].
+    """Blocks of the view matrix of a picture in three parts [3, n, G, K], of the same paths.
 
-    Pixels (row * width + column) that show nothing are left out.  The rows of a pixel hold its
-    radiance per unit radiance of each window patch: 1 shared among the patches that it sees
-    directly, and what the surfaces it sees reflect.  Results do not depend on the block size.
+    The first holds the windows that a pixel shows, the second what surfaces that it shows reflect of
+    the windows' light, the last what comes after more reflections.  Pixels (row * width + column)
+    that show nothing are left out.  Results do not depend on the block size.
 
     Args:
         samples: paths for each pixel, at as many places within it.
@@ -74,14 +89,14 @@ def picture_matrix_blocks(
     tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
     bins = DirectionBins(basis)
     shape = (len(groups), bins.size)
-    size = max(256, BLOCK_BYTES // (8 * int(np.prod(shape))))
+    size = max(256, BLOCK_BYTES // (8 * PARTS * int(np.prod(shape))))
     size = min(size, max(1, 2**31 // samples))
     _, counts = pixel_directions(view)
     shown = np.flatnonzero(counts.reshape(-1))
     for start in range(0, len(shown), size):
         pixels = shown[start : start + size]
         matrix = _block(tracer, bins, view, pixels, samples=samples, max_depth=max_depth, seed=seed)
-        yield pixels, matrix.reshape(len(pixels), *shape)
+        yield pixels, matrix.reshape(PARTS, len(pixels), *shape)
         progress("picture", (start + len(pixels)) / len(shown))
 
 
@@ -95,8 +110,8 @@ def _block(
     max_depth: int,
     seed: int,
 ) -> NDArray[np.float32]:
-    """Rows [n, G * K] of some pixels."""
-    matrix = dr.zeros(mi.Float64, len(pixels) * bins.size * len(tracer.groups))
+    """Rows [PARTS * n, G * K] of some pixels."""
+    matrix = dr.zeros(mi.Float64, PARTS * len(pixels) * bins.size * len(tracer.groups))
     eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
     number = mi.UInt32(pixels.astype(np.uint32))
     for j, (dx, dy) in enumerate(pixel_places(samples)):
@@ -111,6 +126,7 @@ def _block(
             mi.Vector3f(directions.T.astype(np.float32)),
             mi.Bool(exists),
             row=dr.arange(mi.UInt32, dr.width(number)),
+            apart=dr.opaque(mi.UInt32, len(pixels)),
             stream=number,
             sample=dr.opaque(mi.UInt32, j),
             generator=path_generator(
@@ -131,6 +147,7 @@ def add_picture_paths(
     active: mi.Bool,
     *,
     row: mi.UInt32,
+    apart: mi.UInt32,  # rows between what is seen, what that reflects, and what more reflect; or 0
     stream: mi.UInt32,  # of the stratified samples: a pixel
     sample: mi.UInt32,
     generator: mi.PCG32,
@@ -155,9 +172,10 @@ def add_picture_paths(
         tracer,
         bins,
         matrix,
-        row,
+        row + apart,
         position,
         face,
+        later=apart,
         beta=reflectance * dr.inv_pi,
         sample=sample,
         stream=mi.sample_tea_32(stream, mi.UInt32(0x1F123BB5))[0],

@@ -75,24 +75,40 @@ def neighbours(tiles: Tiles, key: NDArray[np.int64], step: int) -> sparse.csr_ar
     return sparse.csr_array(entries, shape=(len(key), len(key)))
 
 
-def smoothing(tiles: Tiles, key: NDArray[np.int64], count: NDArray) -> sparse.csr_array:
+def smoothing(
+    tiles: Tiles,
+    key: NDArray[np.int64],
+    count: NDArray,
+    close: NDArray[np.bool_] | None = None,
+) -> sparse.csr_array:
     """What means over tiles [m] become when the tiles round each on its face smooth them [m, m].
 
     An even face stays even, and the sum of count times mean stays what it is: the weights 1 2 1
     are scaled to diag(x) A diag(x) with row and column sums of 1 (Sinkhorn and Knopp 1967).
 
-    Args: key: [m] as of `neighbours`; count: [m] how much stands behind each mean.
+    Args:
+        key: [m] as of `neighbours`; count: [m] how much stands behind each mean.
+        close: [m] tiles that another surface is close to, as in a corner: light changes fast there,
+            and they are smoothed by the tiles that touch them alone.
     """
     count = np.maximum(np.asarray(count, dtype=float), 1e-12)
     whole = sparse.csr_array(sparse.eye_array(len(key)))
     for step in STEPS:
         near, x = neighbours(tiles, key, step), np.ones(len(key))
+        if close is not None and step > 1:
+            near = _apart(near, close)
         for _ in range(BALANCINGS):
             x = np.sqrt(x / (near @ (count * x)))
         weights = sparse.diags_array(x) @ near @ sparse.diags_array(x * count)
         rows = sparse.diags_array(1 / np.maximum(weights.sum(axis=1), 1e-300))
         whole = sparse.csr_array(rows @ weights @ whole)
     return whole
+
+
+def _apart(near: sparse.csr_array, close: NDArray[np.bool_]) -> sparse.csr_array:
+    """Weights of neighbours [m, m] with some tiles [m] for themselves."""
+    others = sparse.diags_array((~close).astype(float))
+    return sparse.csr_array(others @ near @ others + sparse.diags_array(close.astype(float)))
 
 
 def _find(

@@ -17,6 +17,7 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
     disc_parts,
@@ -36,8 +37,8 @@ PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered 
 class PictureSun:
     """What a view shows of the sun, without any reflection but the pixel's own.
 
-    Every pixel is looked at through its middle, and the sun's beam falls on it or not; the sun's
-    disc itself is cut into small pieces, so that it has its solid angle whatever the pixels' size.
+    Every pixel is looked at through its middle, and the sun's beam falls on it or not; only pixels
+    at the edge of a shadow are looked at in several places.  The sun's disc itself is cut into small pieces, so that it has its solid angle whatever the pixels' size.
     """
 
     def __init__(
@@ -107,7 +108,7 @@ class PictureSun:
         if not len(lit):
             return
         towards, strength = suns[lit], illuminance[lit]
-        self._add(values, lit, self._surface, towards, strength, self._beam_on_surfaces)
+        self._add(values, lit, self._surface, towards, strength, self._beam_on_surfaces, edges=True)
         for g, (pane, _, _) in enumerate(self._panes):
             self._add(values, lit, pane, towards, strength, self._scattered_in_panes, g)
 
@@ -149,8 +150,11 @@ class PictureSun:
             found[hour] = seen_disc(way, part * (illuminance[hour] / SUN_SOLID_ANGLE))
         return found
 
-    def _add(self, values, lit, columns, suns, strength, kernel, *options) -> None:
-        """Add what a kernel gives for pairs of hours and pixels, some hours at a time."""
+    def _add(self, values, lit, columns, suns, strength, kernel, *options, edges=False) -> None:
+        """Add what a kernel gives for pairs of hours and pixels, some hours at a time.
+
+        Args: edges: whether what it gives ends within pixels, which are then looked at again.
+        """
         if not len(columns):
             return
         step = max(1, LANES // len(columns))
@@ -163,6 +167,8 @@ class PictureSun:
             hour = lane // width
             found = kernel(lane - hour * width, hour, towards, light, *options)
             found = found.numpy().reshape(-1, len(columns))
+            if edges:
+                self._look_again(found, suns[part], strength[part])
             for row, hour_values in zip(lit[part], found, strict=True):
                 values[row, columns] += hour_values
 
@@ -175,6 +181,33 @@ class PictureSun:
         rho = dr.gather(mi.Float, self._reflectance, pixel)
         value = rho * dr.inv_pi * cosine * tau * dr.gather(mi.Float, light, hour)
         return dr.select(tau > 0, value, 0.0)
+
+    def _look_again(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
+        """Put the mean over its places into each pixel of surfaces [h, m] that a shadow's edge
+        crosses: where the sun falls on its middle and not on a neighbour's, or the reverse.
+        """
+        hour, column = edge_pixels(found > 0, self.pixels[self._surface], self._view)
+        step = LANES // EDGE_PLACES
+        for start in range(0, len(hour), step):
+            part = slice(start, start + step)
+            way = places_in_pixels(self._view, self.pixels[self._surface[column[part]]])
+            to_sun = np.repeat(suns[hour[part]], EDGE_PLACES, axis=0)
+            shown = self._beam_seen(way, to_sun).reshape(-1, EDGE_PLACES).mean(axis=1)
+            found[hour[part], column[part]] = shown * light[hour[part]]
+
+    def _beam_seen(self, way: NDArray, suns: NDArray) -> NDArray[np.float32]:
+        """Luminance [r] of surfaces in directions from the eye per unit illuminance of suns."""
+        tracer, direction = self._inside, mi.Vector3f(way.T.astype(np.float32))
+        ray = mi.Ray3f(self._eye, direction)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False)
+        shown = hit.is_valid()
+        place, normal, rho = tracer.surface_at(hit, self._eye, direction, shown)
+        shown &= dr.gather(mi.Int32, tracer.group, hit.prim_index, shown) == OPAQUE
+        number = dr.arange(mi.UInt32, len(way))
+        to_sun = on_disc_of(mi.Vector3f(suns.T.astype(np.float32)), number)
+        cosine = dr.dot(normal, to_sun)
+        tau = self._straight(place, to_sun, shown & (cosine > 0))
+        return dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0).numpy()
 
     def _straight(self, place: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:
         """Transmittance of the straight way from places in the room to the sun; 0 if hidden."""

@@ -5,10 +5,16 @@
 Elements are small parts of the surfaces; the sun on them is found by shadow rays, hour by hour.  A
 few paths from a tile of pixels would meet the window's patch with the sun once or never, and make
 the tile white or dark.
+
+What lies far from a place lights it much as the places beside it, and many tiles share it.  What is
+near (the wall that meets the floor in a corner) does not: it is taken by rays of each tile's own, to
+elements as small as they are near.  The weight of a place at distance d from a surface that is D
+from the eye goes over from one to the other between d = NEAR D / 2 and NEAR D.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import drjit as dr
@@ -17,30 +23,149 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mitsuba_cfs.images.view import View, rays
+from mitsuba_cfs.images.view import View, pixel_solid_angles, rays
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS
-from mitsuba_cfs.trace.sampling import pixel_places
+from mitsuba_cfs.trace.sampling import lattice_2d, pixel_places
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 
 ELEMENTS = 1024  # into which the surfaces' area is divided, about
-POINTS = 4  # on each, that the sun is taken at
+POINTS = 4  # on each, that the sun is taken at; one on those near a tile
 PATHS = 2**19  # of a view at most, but one of each pixel
 RAYS = 2**18  # at once
+NEAR_TILES = 12  # [tiles' widths] that a surface is near within, twice what smoothing spans
+NEAR_RAYS = 256  # of each tile to what is near
+FINENESS = 0.5  # edge of an element near a tile over how near it is
+HALVINGS = 4  # of the elements' edge at most
 
 
 @dataclass(frozen=True, slots=True)
 class SunElements:
     """Parts of the surfaces that reflect the sun, and what each row of a picture has of them."""
 
-    places: Places  # [e * POINTS]
+    places: Places  # [e * POINTS + f]
     share: sparse.csr_array  # [m, e] luminance of a row per unit irradiance of an element
-    smooth: sparse.csr_array  # [m, m] of rows, afterwards: the product of both would be full
+    near: sparse.csr_array  # [m, f] the same of the smaller elements near rows, not to be smoothed
+    smooth: sparse.csr_array  # [m, m] of rows, after `share`: the product of both would be full
 
     def rows(self, irradiance: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Luminance [m, h] of rows under the irradiance [e * POINTS, h] of the elements' places."""
-        mean = irradiance.reshape(-1, POINTS, irradiance.shape[1]).mean(axis=1)
-        return self.smooth @ (self.share @ mean)
+        """Luminance [m, h] of rows under the irradiance [.., h] of the elements' places."""
+        far, near = np.split(irradiance, [POINTS * self.share.shape[1]])
+        mean = far.reshape(-1, POINTS, irradiance.shape[1]).mean(axis=1)
+        return self.smooth @ (self.share @ mean) + self.near @ near
+
+    def of_rows(self, rows: sparse.csr_array, smooth: sparse.csr_array) -> SunElements:
+        """Of other rows [k] that these make up [k, m], with their smoothing."""
+        share, near = (sparse.csr_array(rows @ part) for part in (self.share, self.near))
+        return SunElements(self.places, share, near, smooth)
+
+
+@dataclass(frozen=True, slots=True)
+class _Hits:
+    """Places that reflect to the rows of a picture."""
+
+    row: NDArray[np.int64]  # [q]
+    weight: NDArray[np.float64]  # [q] luminance of the row per unit irradiance of the place
+    places: Places  # [q]
+    halvings: NDArray[np.int64]  # [q] of the edge of the place's element
+
+    @staticmethod
+    def joined(parts: list[_Hits]) -> _Hits:
+        """All of several."""
+        none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
+        return _Hits(
+            np.concatenate([none, *(p.row for p in parts)]),
+            np.concatenate([nothing, *(p.weight for p in parts)]),
+            Places.joined([p.places for p in parts]),
+            np.concatenate([none, *(p.halvings for p in parts)]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """Where rays of pixels meet what reflects; axis r."""
+
+    ray: NDArray[np.int64]  # [r] number of the pixel
+    sample: NDArray[np.int64]  # [r] and of the ray in it
+    value: NDArray[np.float64]  # [r] rho / pi over the number of the pixel's rays
+    places: Places
+    reach: NDArray[np.float64]  # [r] how near is near [m]
+
+    def far_share(self, path: NDArray[np.int64], met: Places) -> NDArray[np.float64]:
+        """What of the light of places met first counts as far, 0 to 1."""
+        return np.clip(2 * self.distance(path, met) / self.reach[path] - 1, 0.0, 1.0)
+
+    def distance(self, path: NDArray[np.int64], met: Places) -> NDArray[np.float64]:
+        """Of places from those that the paths start at [m]."""
+        return np.linalg.norm(met.point - self.places.point[path], axis=1)
+
+
+class _Look:
+    """Traces a view's pixels to what reflects sun to what they show."""
+
+    def __init__(self, tracer: TracedScene, view: View, tile: int, edge: float, seed: int) -> None:
+        self._tracer, self._view, self._edge, self._seed = tracer, view, edge, seed
+        width = float(np.sqrt(pixel_solid_angles(view).max()))
+        self._near = NEAR_TILES * tile * width if tile > 1 else 0.0  # over the distance to the eye
+
+    def far(
+        self, pixels: NDArray[np.int64], row: NDArray[np.int64], samples: int, key: int
+    ) -> tuple[_Hits, NDArray[np.int64]]:
+        """What paths meet but for what is near, and the rows [..] that something is near to."""
+        shown = self._shown(pixels, samples)
+        found = reflecting_places(self._tracer, shown.places, self._seed * 1_000_003 + key)
+        weight = found.weight * shown.value[found.path]
+        path, met = found.path[: found.first], found.places.some(np.arange(found.first))
+        far = shown.far_share(path, met)
+        weight[: found.first] *= far
+        rows = row[shown.ray[found.path]]
+        some = np.flatnonzero(weight > 0)
+        none = np.zeros(len(some), dtype=np.int64)
+        hits = _Hits(rows[some], weight[some], found.places.some(some), none)
+        return hits, np.unique(rows[: found.first][far < 1])
+
+    def near(
+        self,
+        pixels: NDArray[np.int64],
+        row: NDArray[np.int64],
+        number: NDArray[np.int64],
+        samples: int,
+    ) -> _Hits:
+        """What rays of pixels, each with its number in its row, find near; stratified over a row."""
+        shown = self._shown(pixels, samples)
+        of_row, sample = row[shown.ray], number[shown.ray] * samples + shown.sample
+        stream = mi.UInt32((of_row + self._seed * 1_000_003 & 0xFFFFFFFF).astype(np.uint32))
+        u = lattice_2d(mi.UInt32(sample.astype(np.uint32)), stream, 0)
+        point, normal = shown.places.points(), shown.places.normals()
+        way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        hit = self._tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
+        found = hit.is_valid()
+        rho = dr.gather(mi.Float, self._tracer.reflectance, hit.prim_index, found).numpy()
+        met, path = face_places(self._tracer, point, way, hit, found), np.arange(len(rho))
+        distance = shown.distance(path, met)
+        weight = np.where(found.numpy(), rho * shown.value * (1 - shown.far_share(path, met)), 0.0)
+        some = np.flatnonzero(weight > 0)
+        finer = np.log2(self._edge / (FINENESS * np.maximum(distance[some], 1e-6)))
+        halvings = np.clip(np.ceil(finer), 0, HALVINGS).astype(np.int64)
+        return _Hits(of_row[some], weight[some], met.some(some), halvings)
+
+    def _shown(self, pixels: NDArray[np.int64], samples: int) -> _Shown:
+        tracer, view = self._tracer, self._view
+        eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+        dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
+        number = np.repeat(pixels, samples)
+        x, y = (number % view.width + dx) / view.width, number // view.width + dy
+        directions, exists = rays(view, x, 1.0 - y / view.height)
+        way = mi.Vector3f(directions.T.astype(np.float32))
+        ray = mi.Ray3f(eye, way)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=mi.Bool(exists))
+        found = mi.Bool(exists) & hit.is_valid()
+        rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found).numpy()
+        places = face_places(tracer, eye, way, hit, found)
+        kept = np.flatnonzero(found.numpy() & (rho > 0))
+        reach = np.maximum(self._near * hit.t.numpy()[kept], 1e-6)
+        value = rho[kept] / (np.pi * samples)
+        return _Shown(kept // samples, kept % samples, value, places.some(kept), reach)
 
 
 def sun_elements(
@@ -48,80 +173,86 @@ def sun_elements(
     area: float,
     view: View,
     pixels: NDArray[np.int64],
-    row: NDArray[np.int64],
+    half: NDArray[np.int64],
+    tile: int,
     *,
     samples: int = 8,
     seed: int = 0,
-) -> SunElements:
+) -> tuple[SunElements, NDArray[np.bool_]]:
     """Elements by the places that paths of a view's pixels meet after what the pixel shows.
+
+    Their rows are the halves [2 m].  And the rows [m] that show what another surface is near to.
 
     Args:
         area: of the room's surfaces [m2].
-        pixels, row: [n] pixels, and the row of each; a row's luminance is the sum of its pixels'.
+        pixels, half: [n] pixels, and the half of a row that each is of: 2 * row or 1 more; the
+            luminance of a half is the sum of its pixels'.
+        tile: pixels across of the squares whose light is shared.
         samples: paths of each pixel, fewer in large pictures.
     """
     samples = int(np.clip(PATHS // max(len(pixels), 1), 1, samples))
-    rows, weights, met = [], [], []
-    size = max(1, RAYS // samples)
-    for start in range(0, len(pixels), size):
-        block = pixels[start : start + size]
-        of_ray, value, places = _shown(tracer, view, block, samples)
-        if not places.size:
-            continue
-        found = reflecting_places(tracer, places, seed * 1_000_003 + start)
-        rows.append(row[start : start + size][of_ray[found.path]])
-        weights.append(found.weight * value[found.path])
-        met.append(found.places)
-    places = Places.joined(met)
     edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
-    element, count = _elements(places, edge)
-    none = np.empty(0, dtype=np.int64)
-    weight = np.concatenate([np.empty(0), *weights]).astype(np.float32)
-    entries = weight, (np.concatenate([none, *rows]), element)
-    m = int(row.max(initial=-1)) + 1
-    share = sparse.csr_array(sparse.coo_array(entries, shape=(m, count)))
-    alone = sparse.csr_array(sparse.eye_array(m, dtype=np.float32))
-    return SunElements(places.some(_chosen(element, count, seed)), share, alone)
+    look = _Look(tracer, view, tile, edge, seed)
+    m = int(half.max(initial=-1)) // 2 + 1
+    far, close = [], np.zeros(m, dtype=bool)
+    for part in _blocks(np.arange(len(pixels)), samples):
+        hits, beside = look.far(pixels[part], half[part], samples, int(part[0]))
+        far.append(hits)
+        close[beside // 2] = True
+    rays_each = -(-NEAR_RAYS // tile**2)
+    chosen = np.flatnonzero(close[half // 2])
+    number = np.zeros(len(pixels), dtype=np.int64)
+    number[chosen] = _numbered(half[chosen])
+    blocks = _blocks(chosen, rays_each)
+    near = [look.near(pixels[p], half[p], number[p], rays_each) for p in blocks]
+    shares, places = [], []
+    for hits, points in ((_Hits.joined(far), POINTS), (_Hits.joined(near), 1)):
+        element, count = _elements(hits, edge)
+        entries = hits.weight.astype(np.float32), (hits.row, element)
+        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(2 * m, count))))
+        places.append(hits.places.some(_chosen(element, count, points, seed)))
+    alone = sparse.csr_array(sparse.eye_array(2 * m, dtype=np.float32))
+    return SunElements(Places.joined(places), *shares, alone), close
 
 
-def _shown(
-    tracer: TracedScene, view: View, pixels: NDArray[np.int64], samples: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], Places]:
-    """Pixel of each ray that meets what reflects, rho / pi over the samples, and the place."""
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
-    dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
-    number = np.repeat(pixels, samples)
-    x, y = (number % view.width + dx) / view.width, number // view.width + dy
-    directions, exists = rays(view, x, 1.0 - y / view.height)
-    way = mi.Vector3f(directions.T.astype(np.float32))
-    ray = mi.Ray3f(eye, way)
-    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=mi.Bool(exists))
-    found = mi.Bool(exists) & hit.is_valid()
-    rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found).numpy()
-    places = face_places(tracer, eye, way, hit, found)
-    kept = np.flatnonzero(found.numpy() & (rho > 0))
-    return kept // samples, rho[kept] / (np.pi * samples), places.some(kept)
+def _blocks(numbers: NDArray[np.int64], samples: int) -> Iterator[NDArray[np.int64]]:
+    """Some at a time, so that their rays fit."""
+    size = max(1, RAYS // samples)
+    for start in range(0, len(numbers), size):
+        yield numbers[start : start + size]
 
 
-def _elements(places: Places, edge: float) -> tuple[NDArray[np.int64], int]:
+def _numbered(row: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The number of each among those of its row [n]."""
+    order = np.argsort(row, kind="stable")
+    _, first, place = np.unique(row[order], return_index=True, return_inverse=True)
+    number = np.empty(len(row), dtype=np.int64)
+    number[order] = np.arange(len(row)) - first[place]
+    return number
+
+
+def _elements(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], int]:
     """The element of each place, cubes of an edge [m] by the side of the surface; how many."""
+    places = hits.places
     if not places.size:
         return np.empty(0, dtype=np.int64), 0
-    cube = np.floor(places.point / edge).astype(np.int64)
+    cube = np.floor(places.point * (0.5 ** -hits.halvings / edge)[:, None]).astype(np.int64)
     side = np.round(places.normal * FACE_STEPS).astype(np.int64)
-    table = np.concatenate([cube, side], axis=1)
+    table = np.concatenate([cube, side, hits.halvings[:, None]], axis=1)
     table -= table.min(axis=0)
     key = np.ravel_multi_index(tuple(table.T), tuple(table.max(axis=0) + 1))
     found, element = np.unique(key, return_inverse=True)
     return element, len(found)
 
 
-def _chosen(element: NDArray[np.int64], count: int, seed: int) -> NDArray[np.int64]:
-    """`POINTS` places of each element, again where it has fewer [count * POINTS]."""
+def _chosen(
+    element: NDArray[np.int64], count: int, points: int, seed: int
+) -> NDArray[np.int64]:
+    """Some places of each element, again where it has fewer [count * points]."""
     if not count:
         return np.empty(0, dtype=np.int64)
     random = np.random.default_rng(seed)
     order = np.lexsort((random.random(len(element)), element))
     ends = np.searchsorted(element[order], np.arange(count + 1))
-    step = np.arange(POINTS)[None] % np.maximum(np.diff(ends), 1)[:, None]
+    step = np.arange(points)[None] % np.maximum(np.diff(ends), 1)[:, None]
     return order[(ends[:-1, None] + step).ravel()]

@@ -70,6 +70,7 @@ def indirect_rows(
         hit,
         dr.gather(mi.Point3f, position, hit),
         dr.gather(mi.Vector3f, face, hit),
+        later=dr.opaque(mi.UInt32, 0),
         beta=dr.opaque(mi.Float, 1 / paths),
         sample=path - hit * count,
         stream=mi.sample_tea_32(hit, key ^ mi.UInt32(0x3C6EF372))[0],

@@ -65,6 +65,7 @@ class ReflectingPlaces:
     path: NDArray[np.int64]  # [q] number of the path
     weight: NDArray[np.float64]  # [q] product of reflectances, that of the place itself the last
     places: Places  # [q]
+    first: int  # of these, how many the paths meet first; the others come after them
 
 
 def reflecting_places(tracer: TracedScene, start: Places, seed: int) -> ReflectingPlaces:
@@ -84,7 +85,9 @@ def reflecting_places(tracer: TracedScene, start: Places, seed: int) -> Reflecti
         survival = np.minimum(weight / ROULETTE, 1.0)
         on = luck < survival
         path, places, weight = path[on], places.some(on), weight[on] / survival[on]
-    return ReflectingPlaces(np.concatenate(paths), np.concatenate(weights), Places.joined(met))
+    first = met[0].size if met else 0
+    path, weight = np.concatenate(paths), np.concatenate(weights)
+    return ReflectingPlaces(path, weight, Places.joined(met), first)
 
 
 def _next(

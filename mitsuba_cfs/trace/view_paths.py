@@ -21,6 +21,7 @@ def add_view_paths(
     position: mi.Point3f,  # where the path starts
     normal: mi.Vector3f,  # direction that the irradiance is measured about
     *,
+    later: mi.UInt32,  # rows further on that what comes after the first bounce is added to
     beta: mi.Float,  # weight of the irradiance at the start
     sample: mi.UInt32,  # number of the path in its stream
     stream: mi.UInt32,  # key of the stratified stream
@@ -43,6 +44,7 @@ def add_view_paths(
     depth = mi.UInt32(0)  # bounces so far
     early = carried is not None
     carried = mi.Float(1.0 if carried is None else carried)  # product of reflectances so far
+    row, later = mi.UInt32(row), mi.UInt32(later)  # copies: the loop changes them
     while active:
         u_window = mi.Point2f(generator.next_float32(), generator.next_float32())
         u_bounce = mi.Point2f(generator.next_float32(), generator.next_float32())
@@ -92,6 +94,8 @@ def add_view_paths(
         beta *= rho
         carried *= rho
         depth += 1
+        row += later
+        later = mi.UInt32(0)
         if dr.hint(early, mode="scalar"):
             survival = dr.minimum(carried * ROULETTE, 1.0)
         else:

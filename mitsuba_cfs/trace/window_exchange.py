@@ -55,6 +55,7 @@ def window_exchange(
             mi.Vector3f(inward),
             mi.Bool(True),
             row=paths.patch,
+            apart=dr.opaque(mi.UInt32, 0),
             stream=paths.patch,
             sample=path - paths.patch * dr.opaque(mi.UInt32, n),
             generator=paths.generator,
