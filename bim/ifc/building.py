@@ -18,8 +18,9 @@ from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.found_rooms import found_rooms
-from bim.ifc.glass_of_rooms import glass_of_rooms
+from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms
 from bim.ifc.joining import joined_rooms
+from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
@@ -64,7 +65,13 @@ def read_ifc(
     rooms, problems = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
     records = rooms.records
     problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
-    glass = glass_of_rooms(source, records, mesh)
+    apertures, more = apertures_in(source)
+    problems += more
+    glass = glass_of_rooms(source, apertures, records, mesh)
+    records, more = raised_rooms(source, records, glass)
+    problems += more
+    if any(record.raised for record in records):
+        glass = glass_of_rooms(source, apertures, records, mesh)
     elements, reflectances, faults = bounding_elements(
         source.model, source.walls, source.placed.rotation
     )
@@ -182,7 +189,7 @@ def _space(
     space = Space(
         record.solid.guid, record.name, record.storey, volume, area, tuple(faces), tuple(windows),
         record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
-        record.type_name,
+        record.type_name, record.raised,
     )  # fmt: skip
     return space, problems + _assumptions(record, assumed) + _soundness(space)
 
@@ -223,7 +230,7 @@ def _soundness(space: Space) -> list[Problem]:
         problems.append(Problem(space.guid, what, done))
     for what, stated, drawn, unit in (
         ("floor area", space.stated_area, space.area_as_stated, "m2"),
-        ("volume", space.stated_volume, space.room_volume, "m3"),
+        ("volume", space.stated_volume, space.drawn_volume, "m3"),
     ):
         if stated is not None and not _agree(drawn, stated):
             text = (

@@ -279,7 +279,7 @@ def _rooms(building: Building) -> Table:
     for space in building.spaces:
         table.add_row(
             space.label, space.storey, f"{space.floor_area:.2f}", _number(space.stated_area),
-            f"{space.room_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),
+            f"{space.drawn_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),
             str(len(space.windows)), f"{sum(w.area for w in space.windows):.2f}",
         )  # fmt: skip
     return table
