@@ -158,6 +158,7 @@ class Space:
     area_to_middles: float | None = None  # floor to the middle of the walls, if that is stated [m2]
     type_name: str = ""  # of the IfcSpaceType, or the space's ObjectType
     raised: float = 0.0  # of room_volume: above the space as drawn, up to what covers it [m3]
+    furniture: tuple[Element, ...] = ()  # in light and views, not in the heat balance
 
     @property
     def label(self) -> str:
@@ -191,7 +192,7 @@ class Space:
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A building element or object outdoors that shades and reflects."""
+    """An object outdoors, or a piece of furniture, that shades and reflects."""
 
     guid: str
     name: str

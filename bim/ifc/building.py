@@ -18,6 +18,7 @@ from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.found_rooms import found_rooms
+from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms
 from bim.ifc.joining import joined_rooms
 from bim.ifc.raised_rooms import raised_rooms
@@ -45,6 +46,7 @@ def read_ifc(
     *,
     corrections: Corrections | None = None,
     join: Sequence[str] = (),
+    furniture: bool = False,
     progress: Progress | None = None,
 ) -> Building:
     """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
@@ -53,6 +55,7 @@ def read_ifc(
         corrections: what to leave out and repaint; by default those of the file
             `<model>.corrections.toml` beside the model, if there is one.
         join: rooms to make one besides, as "Hall + Living", where `corrections` are not given.
+        furniture: whether what stands in the rooms is in their light and views.
         progress: called with the stage's name and the fraction of it that is done.
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
         the building's `problems`.
@@ -91,6 +94,8 @@ def read_ifc(
             continue
         spaces.append(space)
         problems += more
+    spaces, more = furnished(source, spaces, wanted=furniture)
+    problems += more
     tell("surroundings", 0.0)
     outside, more = _outdoors(source, spaces)
     tell("surroundings", 1.0)
