@@ -42,6 +42,7 @@ class Account:
     leaking: tuple[str, ...] = ()  # rooms with an open edge
     found: bool = False  # rooms found from geometry: the file has none
     cut_off: bool = False  # the file has lost its end
+    raised: tuple[str, ...] = ()  # rooms that end at the roof in place of the top of their space
 
     @property
     def glass_out(self) -> float:
@@ -86,6 +87,7 @@ class Account:
         lists = (
             ("Spaces overlapping", self.overlapping),
             ("Rooms lower than their glass", self.low),
+            ("Rooms raised to what covers them", self.raised),
             ("Spaces that are no rooms", self.missing),
             ("Rooms with open edges", self.leaking),
         )

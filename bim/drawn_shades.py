@@ -1,6 +1,7 @@
 """Shades that are drawn before or behind a window whose BSDF holds them already.
 
-An IfcShadingDevice counts as the drawn shade of a window where it hangs in the window's plane and
+An IfcShadingDevice, or a proxy or covering that its name calls a curtain or a blind, counts as the
+drawn shade of a window where it hangs in the window's plane and
 fills it: all of it lies within `REACH` of the glass, on either side, and its outline, with the
 gaps between slats closed, covers `COVERS` of the glass or more.  An overhang and a fin reach
 further or cover a strip only; neighbours stand further away.  The limits are our own judgement:
@@ -10,6 +11,7 @@ that is a third down is drawn as such.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -18,9 +20,16 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.model import Building, Element, Problem, Window
+from bim.names import plain_text
 from bim.planes import plane_through
 
 SHADES = "IfcShadingDevice"
+NAMED = ("IfcBuildingElementProxy", "IfcCovering")  # shades where their name says so
+SHADE_NAME = re.compile(
+    r"curtain(?! ?wall)|drape|(?<![^\W_])blinds?(?![^\W_])|jalousie|rollo(?![^\W_])|raff?store"
+    r"|rolll?ad|vorhang(?!fassade)|gardin|lamellenvorhang|rideau(?! ?mur)|persian|cortina|venezian"
+    r"|gordijn|zonwering|zaves|zaluzi|roleta|zaslon|verho|カーテン|ブラインド|штор|жалюзи"
+)
 REACH = 0.5  # of the farthest part from the plane of the glass [m]
 GAP = 0.3  # between slats that are closed to an outline [m]
 COVERS = 0.3  # share of the glass
@@ -36,7 +45,7 @@ def without_drawn_shades(
     windows = [window for window in building.windows if window.guid in shaded]
     devices: dict[str, list[Element]] = {}
     for element in building.elements:
-        if element.ifc_class.startswith(SHADES) and not element.is_kept:
+        if _is_shade(element) and not element.is_kept:
             devices.setdefault(element.guid, []).append(element)
     problems = []
     for guid, parts in devices.items():
@@ -59,6 +68,21 @@ def without_drawn_shades(
     kept = tuple(element for element in building.elements if element.guid not in gone)
     found = tuple(problems)
     return replace(building, elements=kept, problems=(*building.problems, *found)), found
+
+
+def is_named_shade(name: str) -> bool:
+    """Whether a name says curtain or blind."""
+    return SHADE_NAME.search(plain_text(name)) is not None
+
+
+def hangs_at(triangles: NDArray[np.float64], window: Window) -> bool:
+    """Whether a body [N, 3, 3] is the drawn shade of a window."""
+    return not _outline(triangles, window).is_empty
+
+
+def _is_shade(element: Element) -> bool:
+    named = element.ifc_class.startswith(NAMED) and is_named_shade(element.name)
+    return named or element.ifc_class.startswith(SHADES)
 
 
 def _outline(triangles: NDArray[np.float64], window: Window) -> shapely.Geometry:

@@ -157,6 +157,8 @@ class Space:
     long_name: str = ""
     area_to_middles: float | None = None  # floor to the middle of the walls, if that is stated [m2]
     type_name: str = ""  # of the IfcSpaceType, or the space's ObjectType
+    raised: float = 0.0  # of room_volume: above the space as drawn, up to what covers it [m3]
+    furniture: tuple[Element, ...] = ()  # in light and views, not in the heat balance
 
     @property
     def label(self) -> str:
@@ -167,6 +169,11 @@ class Space:
     def area_as_stated(self) -> float:
         """Floor area measured as the file measures its own: between or to the middle of walls."""
         return self.floor_area if self.area_to_middles is None else self.area_to_middles
+
+    @property
+    def drawn_volume(self) -> float:
+        """Volume of the space as the file draws it [m3]."""
+        return self.room_volume - self.raised
 
     @property
     def shell(self) -> NDArray[np.float64]:
@@ -185,7 +192,7 @@ class Space:
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A building element or object outdoors that shades and reflects."""
+    """An object outdoors, or a piece of furniture, that shades and reflects."""
 
     guid: str
     name: str

@@ -71,6 +71,7 @@ def sensor_grid(
     A square grid of `spacing`, `height` above the floor, at least `margin` from what bounds the
     room there (EN 17037:2018: 0.85 m and 0.5 m; LM-83: 0.76 m); its rows follow the longest wall
     and its middle is the room's.  Where the margin leaves nothing it is halved until it does.
+    Points within a piece of furniture are left out.
 
     Raises: `RoomError` for a room that is lower than its work plane.
     """
@@ -83,6 +84,7 @@ def sensor_grid(
         margin *= 0.5
         work_plane = section.buffer(-margin, join_style="mitre")
     flat = _grid_inside(work_plane, spacing)
+    flat = _free_of_furniture(flat, space, z)
     points = np.column_stack([flat, np.full(len(flat), z)])
     return points, np.tile([0.0, 0.0, 1.0], (len(points), 1))
 
@@ -97,6 +99,22 @@ def plane_sides(space: Space, height: float, margin: float) -> tuple[float, floa
     plane = inner if inner.area >= SMALLEST_AREA else plane
     x0, y0, x1, y1 = _along_longest_edge(plane)[0].bounds
     return float(x1 - x0), float(y1 - y0)
+
+
+def _free_of_furniture(flat: NDArray[np.float64], space: Space, z: float) -> NDArray[np.float64]:
+    """Points [S, 2] of a height that lie in no piece of furniture; all of them if none does."""
+    taken = _furniture_at(space, z)
+    free = flat[~shapely.contains_xy(taken, flat)] if not taken.is_empty else flat
+    return free if len(free) else flat
+
+
+def _furniture_at(space: Space, z: float) -> shapely.Geometry:
+    """Outline in x, y of the furniture at a height."""
+    bodies: dict[str, list[NDArray[np.float64]]] = {}
+    for part in space.furniture:
+        bodies.setdefault(part.guid, []).append(part.triangles)
+    cuts = [horizontal_section(np.concatenate(body), z) for body in bodies.values()]
+    return shapely.union_all(cuts)
 
 
 def _section(space: Space, height: float) -> shapely.Geometry:
@@ -150,6 +168,8 @@ def view_point(
     """
     section = _section(space, eye_height)
     z = space.floor_level + eye_height
+    free = section.difference(_furniture_at(space, z).buffer(0.05))
+    section = section if free.is_empty else free
     middle = section.centroid
     if not section.buffer(-0.05).contains(middle):
         middle = shapely.point_on_surface(section.buffer(-0.05) or section)

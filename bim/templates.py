@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bim.model import Space, centroid
+from bim.planes import area_vectors
 
 ALIKE = 0.005  # lengths may differ by this between rooms that are alike [m]
 ALIKE_SHARE = 0.005  # and reflectances by this
@@ -36,7 +37,7 @@ def template_rooms(spaces: Sequence[Space]) -> list[tuple[Space, ...]]:
 
 
 def room_features(space: Space) -> NDArray[np.float64]:
-    """One row [N, 11] for each face and window: place, normal, size and optics, in lengths [m].
+    """Rows [N, 11] of faces, windows and furniture: place, normal, size and optics [m].
 
     Places count from the room's lowest corner; normals and reflectances are scaled so that a
     difference of `ALIKE` matters as much as that length.
@@ -52,6 +53,12 @@ def room_features(space: Space) -> NDArray[np.float64]:
         [*(window.centre - corner), *(scale * window.normal), np.sqrt(window.area), 10.0,
          np.sqrt(window.opening_area), window.u_value or 0.0, window.g_value or 0.0]
         for window in space.windows
+    ]  # fmt: skip
+    rows += [
+        [*(centroid(part.triangles) - corner), 0.0, 0.0, 0.0,
+         np.sqrt(np.linalg.norm(area_vectors(part.triangles), axis=1).sum()), 20.0,
+         scale * part.reflectance_visible, scale * part.reflectance_solar, 0.0]
+        for part in space.furniture
     ]  # fmt: skip
     return np.array(rows).reshape(-1, 11)
 

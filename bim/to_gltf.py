@@ -20,6 +20,7 @@ COLOURS = {  # red, green, blue, opacity, 0 to 255
     "window frame": (42, 161, 152, 255),
     "reveal": (133, 153, 0, 255),
     "glass": (38, 139, 210, 130),
+    "furniture": (147, 161, 161, 255),
     "outdoors": (150, 150, 150, 90),
 }
 # glTF has y up, and its front along +z: east, up, south
@@ -36,6 +37,9 @@ def write_gltf(building: Building, path: str | PathLike[str], *, outdoors: bool 
                 parts = [window.triangles for window in space.windows]
             if parts:
                 _add(scene, f"{space.label} {kind}", np.concatenate(parts)[:, ::-1], kind)
+        if space.furniture:
+            pieces = np.concatenate([piece.triangles for piece in space.furniture])
+            _add(scene, f"{space.label} furniture", pieces, "furniture")
     if outdoors and building.elements:
         triangles = np.concatenate([element.triangles for element in building.elements])
         _add(scene, "outdoors", triangles, "outdoors")

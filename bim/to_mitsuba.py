@@ -51,6 +51,9 @@ def write_mitsuba(
     for face in space.faces:
         key = f"room_{face.kind.replace(' ', '_')}", round(face.reflectance(band), 4)
         parts.setdefault(key, []).append(face.triangles[:, ::-1])  # normals into the room
+    for piece in space.furniture:
+        key = "furniture", round(piece.reflectance(band), 4)
+        parts.setdefault(key, []).append(piece.triangles)
     for element in outdoors:
         key = "outdoors", round(element.reflectance(band), 4)
         parts.setdefault(key, []).append(element.triangles)

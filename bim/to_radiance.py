@@ -85,9 +85,11 @@ def write_radiance(
     folder.mkdir(parents=True, exist_ok=True)
     own = {window.guid for window in space.windows}
     outdoors = [element for element in building.elements if element.guid not in own]
-    values = {part.reflectance(band) for part in [*space.faces, *outdoors]}
+    values = {part.reflectance(band) for part in [*space.faces, *space.furniture, *outdoors]}
     materials = _write(folder / "materials.rad", (_plastic(value) for value in sorted(values)))
-    room = _write(folder / "room.rad", _parts(space.faces, band, inwards=True))
+    inside = [*_parts(space.faces, band, inwards=True)]
+    inside += _parts(space.furniture, band, inwards=False, name="furniture")
+    room = _write(folder / "room.rad", inside)
     scene = _write(folder / "outdoors.rad", _parts(outdoors, band, inwards=False))
     windows, bsdfs = {}, {}
     for group, bsdf in [(g, None) for g in window_groups(space)] if filled is None else filled:
@@ -128,14 +130,16 @@ def _plastic(value: float) -> str:
     return f"void plastic {_material(value)}\n0\n0\n5 {value:.6f} {value:.6f} {value:.6f} 0 0\n\n"
 
 
-def _parts(parts: Iterable[Face | Element], band: str, *, inwards: bool) -> Iterable[str]:
+def _parts(
+    parts: Iterable[Face | Element], band: str, *, inwards: bool, name: str = ""
+) -> Iterable[str]:
     """Polygons of faces or elements; faces are turned to look into the room."""
     for number, part in enumerate(parts):
         triangles = part.triangles[:, ::-1] if inwards else part.triangles
         material = _material(part.reflectance(band))
-        name = f"{identifier(part.name)}.{number}"
+        whole = f"{name}{identifier(part.name)}.{number}"
         for index, triangle in enumerate(triangles):
-            yield _polygon(material, f"{name}.{index}", triangle)
+            yield _polygon(material, f"{whole}.{index}", triangle)
 
 
 def _window_group(name: str, windows: list[NDArray[np.float64]]) -> Iterable[str]:

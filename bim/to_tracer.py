@@ -19,6 +19,11 @@ def interior_surfaces(space: Space, band: str = "visible") -> Surfaces:
     return _surfaces(space.faces, band)
 
 
+def furnished_surfaces(space: Space, band: str = "visible") -> Surfaces:
+    """What light meets in a room: `interior_surfaces`, then its furniture."""
+    return _surfaces([*space.faces, *space.furniture], band)
+
+
 def exterior_surfaces(building: Building, space: Space, band: str = "visible") -> Surfaces:
     """What stands outdoors before a room's windows: every element but those windows themselves."""
     own = {window.guid for window in space.windows}

@@ -18,6 +18,7 @@ class PictureOptions:
     at: str  # month, day and clock time, `06-21 12:00`
     space: str | None = None  # name or GUID; None: the first room that has a window
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
+    furniture: bool = False  # whether what stands in the room is in its light and views
     view: str | None = None  # Radiance view options, or a file of them
     eye_height: float = 1.2  # [m] above the floor, where no view is given
     size: int = 800  # [px] of the longer side

@@ -57,8 +57,9 @@ def room_picture(
 
     steps = part(progress, 0.0, 0.4)
     viewed = read_viewed_room(
-        options.building, options.space, options.join, files.given, view_of, steps
-    )
+        options.building, options.space, options.join, files.given, view_of, steps,
+        furniture=options.furniture,
+    )  # fmt: skip
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
     light = PathSystems(viewed.scene, viewed.optics, sampling).light(

@@ -43,7 +43,7 @@ def account_of(
         used[window.guid] += window.area
     panes = [one for one in glass.glass if one.out > 0]
     lost = {one.guid: one.out - one.used for one in panes if one.out - one.used > 0.01}
-    low = {one.guid for one in panes if one.low}
+    low = {one.guid for one in panes if one.low is not None}
     return Account(
         _storeys(source, kept, panes, used, Counter(map(storey_of, drawn)) if not found else None),
         len(panes),
@@ -54,11 +54,12 @@ def account_of(
         sum(p.glass for p in problems if p.kind.startswith(PHANTOM)),
         glass.closed,
         tuple(p.what for p in problems if p.kind == OVERLAPPING),
-        tuple(sorted({one.low for one in panes if one.low})),
+        tuple(sorted({one.low.label for one in panes if one.low is not None})),
         tuple(label_of(s.Name or "", s.LongName or "", s.GlobalId) for s in missing),
         tuple(space.label for space in built if open_edges(space.shell)),
         found,
         any(p.kind == CUT_OFF for p in problems),
+        tuple(space.label for space in built if space.raised),
     )
 
 

@@ -18,8 +18,10 @@ from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.found_rooms import found_rooms
-from bim.ifc.glass_of_rooms import glass_of_rooms
+from bim.ifc.furniture import furnished
+from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms
 from bim.ifc.joining import joined_rooms
+from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
@@ -44,6 +46,7 @@ def read_ifc(
     *,
     corrections: Corrections | None = None,
     join: Sequence[str] = (),
+    furniture: bool = False,
     progress: Progress | None = None,
 ) -> Building:
     """The building in an IFC2X3, IFC4 or IFC4X3 file (.ifc, .ifczip).
@@ -52,6 +55,7 @@ def read_ifc(
         corrections: what to leave out and repaint; by default those of the file
             `<model>.corrections.toml` beside the model, if there is one.
         join: rooms to make one besides, as "Hall + Living", where `corrections` are not given.
+        furniture: whether what stands in the rooms is in their light and views.
         progress: called with the stage's name and the fraction of it that is done.
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
         the building's `problems`.
@@ -64,7 +68,13 @@ def read_ifc(
     rooms, problems = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
     records = rooms.records
     problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
-    glass = glass_of_rooms(source, records, mesh)
+    apertures, more = apertures_in(source)
+    problems += more
+    glass = glass_of_rooms(source, apertures, records, mesh)
+    records, more = raised_rooms(source, records, glass)
+    problems += more
+    if any(record.raised for record in records):
+        glass = glass_of_rooms(source, apertures, records, mesh)
     elements, reflectances, faults = bounding_elements(
         source.model, source.walls, source.placed.rotation
     )
@@ -84,6 +94,8 @@ def read_ifc(
             continue
         spaces.append(space)
         problems += more
+    spaces, more = furnished(source, spaces, wanted=furniture)
+    problems += more
     tell("surroundings", 0.0)
     outside, more = _outdoors(source, spaces)
     tell("surroundings", 1.0)
@@ -182,7 +194,7 @@ def _space(
     space = Space(
         record.solid.guid, record.name, record.storey, volume, area, tuple(faces), tuple(windows),
         record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
-        record.type_name,
+        record.type_name, record.raised,
     )  # fmt: skip
     return space, problems + _assumptions(record, assumed) + _soundness(space)
 
@@ -223,7 +235,7 @@ def _soundness(space: Space) -> list[Problem]:
         problems.append(Problem(space.guid, what, done))
     for what, stated, drawn, unit in (
         ("floor area", space.stated_area, space.area_as_stated, "m2"),
-        ("volume", space.stated_volume, space.room_volume, "m3"),
+        ("volume", space.stated_volume, space.drawn_volume, "m3"),
     ):
         if stated is not None and not _agree(drawn, stated):
             text = (

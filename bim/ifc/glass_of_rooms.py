@@ -48,7 +48,7 @@ class GlassAccount:
     out: float  # area that looks out [m2]
     used: float  # of it: before a room [m2]
     assumed: bool  # its outline is not drawn in the file
-    low: str = ""  # label of the room that ends below it
+    low: SpaceRecord | None = None  # the room that ends below it
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,21 +61,31 @@ class GlassOfRooms:
     problems: tuple[Problem, ...]
 
 
+def apertures_in(source: Source) -> tuple[list[Aperture], list[Problem]]:
+    """The windows, doors and glazed panels of a file, each in its plane."""
+    fillings, problems = read_fillings(source.model, source.shapes)
+    apertures = []
+    for filling in fillings:
+        aperture, more = aperture_of(filling)
+        problems += more
+        apertures += [] if aperture is None else [aperture]
+    return apertures, problems
+
+
 def glass_of_rooms(
-    source: Source, records: Sequence[SpaceRecord], building: RayMesh
+    source: Source,
+    apertures: Sequence[Aperture],
+    records: Sequence[SpaceRecord],
+    building: RayMesh,
 ) -> GlassOfRooms:
     """Which part of which window, door or glazed opening each room has, and the rest's account.
 
     Args: building: everything but the terrain, openings cut.
     """
-    fillings, problems = read_fillings(source.model, source.shapes)
     attachments: list[Attachment] = []
-    glass = []
-    for filling in fillings:
-        aperture, more = aperture_of(filling)
-        problems += more
-        if aperture is None:
-            continue
+    glass: list[GlassAccount] = []
+    problems: list[Problem] = []
+    for aperture in apertures:
         found = _real(attachments_of(aperture, [r.solid for r in records]), problems)
         attachments += found
         if not records or aperture.glass.is_empty:
@@ -119,7 +129,7 @@ def _account(
     used = sum(a.glass.area for a in found if a.neighbour is None)
     inner = sum(a.glass.area for a in found if a.neighbour is not None) / 2  # one of each side
     rest = max(aperture.glass.area - used - inner, 0.0)
-    out, low = used, ""
+    out, low = used, None
     if rest > 0.01 * aperture.glass.area:
         inside = _inner_point(aperture, found, building)
         if inside is not None:
@@ -151,19 +161,19 @@ def _inner_point(
 
 def _room_below(
     point: NDArray[np.float64], records: Sequence[SpaceRecord], building: RayMesh
-) -> str:
-    """Label of the room whose top lies below a point with no slab between; "" if none."""
+) -> SpaceRecord | None:
+    """The room whose top lies below a point with no slab between."""
     below = [
         r for r in records
         if np.all(r.solid.low[:2] < point[:2]) and np.all(r.solid.high[:2] > point[:2])
         and 0 < point[2] - r.solid.high[2] < TALLEST_GAP
     ]  # fmt: skip
     if not below:
-        return ""
+        return None
     room = max(below, key=lambda r: r.solid.high[2])
     down = np.array([[0.0, 0.0, -1.0]])
     _, hit = building.first_hits(point[None], down, point[2] - room.solid.high[2])
-    return room.label if hit[0] < 0 else ""
+    return room if hit[0] < 0 else None
 
 
 def _said(
@@ -178,11 +188,12 @@ def _said(
     names = {record.solid.guid: record.solid.name for record in records}
     problems = []
     lost = one.out - one.used
-    if one.low and lost > 0:
-        what = f"{label}: {lost:.2f} m2 lie above the top of room {one.low}, which is too low"
+    if one.low is not None and lost > 0:
+        room = one.low.label
+        what = f"{label}: {lost:.2f} m2 lie above the top of room {room}, which is too low"
         done = "gives no daylight to any room"
         kept = "window" if one.used == 0 else ""
-        problems.append(Problem(filling.guid, what, done, kept, lost, f"above room {one.low}"))
+        problems.append(Problem(filling.guid, what, done, kept, lost, f"above room {room}"))
     elif not found:
         what = f"{label}: no room behind it"
         done = "gives no daylight to any room"

@@ -75,6 +75,7 @@ def read_shapes(
     *,
     without: Collection[int] = (),
     cut_openings: bool = True,
+    skipped: Sequence[str] = SKIPPED,
 ) -> tuple[dict[int, Shape], list[Problem]]:
     """Shapes by STEP id, in the file's order; products that cannot be meshed are problems.
 
@@ -82,6 +83,7 @@ def read_shapes(
         progress: called with the fraction done, 0 to 1.
         without: STEP ids of products to leave alone.
         cut_openings: whether windows and doors are cut out of their walls.
+        skipped: classes that are not meshed.
     """
     settings = ifcopenshell.geom.settings()
     settings.set("use-world-coords", True)
@@ -94,7 +96,12 @@ def read_shapes(
     shapes: dict[int, Shape] = {}
     styles = _Styles(model)
     try:
-        wanted = [p for p in model.by_type("IfcProduct") if p.id() not in without and _has_body(p)]
+        wanted = [
+            product for product in model.by_type("IfcProduct")
+            if product.id() not in without
+            and not product.is_a().startswith(tuple(skipped))
+            and _has_body(product)
+        ]  # fmt: skip
         if not wanted:
             return {}, []
         iterator = ifcopenshell.geom.iterator(
@@ -122,7 +129,7 @@ def read_shapes(
 
 
 def _has_body(product: ifcopenshell.entity_instance) -> bool:
-    if product.Representation is None or product.is_a().startswith(SKIPPED):
+    if product.Representation is None:
         return False
     kinds = ("Body", "Facetation", "Body-FallBack", "Tessellation", "SurfaceModel", "Surface")
     return any(

@@ -42,6 +42,7 @@ class SpaceRecord:
     stated_area: float | None
     stated_volume: float | None
     type_name: str = ""
+    raised: float = 0.0  # of the volume: above the space as drawn, up to what covers it [m3]
 
     @property
     def guid(self) -> str:

@@ -93,7 +93,7 @@ def _surveyed(path: Path) -> Surveyed:
         sum(_agrees(s.floor_area, s.stated_area) for s in areas),
         sum(s.area_to_middles is not None for s in areas),
         len(volumes),
-        sum(_agrees(s.room_volume, s.stated_volume) for s in volumes),
+        sum(_agrees(s.drawn_volume, s.stated_volume) for s in volumes),
         len(building.problems),
         check_s,
         export_s,

@@ -129,7 +129,9 @@ class ThreePhasePictures:
     reflected: PictureMatrix  # of n pixels
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel
     luminance: NDArray[np.float32]  # [G, K, H] of the windows towards the room, T D s [cd/m2]
-    unlike: NDArray[np.float32] | None = None  # [m, G * K] half of what halves of `reflected` differ
+    unlike: NDArray[np.float32] | None = (
+        None  # [m, G * K] half of what halves of `reflected` differ
+    )
 
     def __post_init__(self) -> None:
         n, N = len(self.pixels), self.reflected.rows.shape[1]

@@ -11,6 +11,7 @@ from scenes.commands.parameters import IFC_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     eye_height_option,
+    furniture_option,
     join_option,
     method_option,
     out_folder_option,
@@ -36,6 +37,7 @@ _DEFAULT = YearOptions(Path(), Path())
 @out_folder_option
 @space_option("space", "default: the first with a window", several=False)
 @join_option
+@furniture_option
 @view_option("views", "or a file of them", several=True)
 @click.option(
     "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."

@@ -15,7 +15,7 @@ from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.parameters import FILE, IFC_FILE
-from scenes.commands.room_options import join_option, space_option, u_option
+from scenes.commands.room_options import furniture_option, join_option, space_option, u_option
 from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ def command() -> None:
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @click.option("--csv", "problems", type=click.Path(path_type=Path), help="Also write the problems.")
 @join_option
-def check(building: Path, join: tuple[str, ...], problems: Path | None) -> None:
+@furniture_option
+def check(building: Path, join: tuple[str, ...], furniture: bool, problems: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
     if problems is not None:
         check_file(problems, field="--csv", inputs=[building])
@@ -51,7 +52,7 @@ def check(building: Path, join: tuple[str, ...], problems: Path | None) -> None:
     from scenes.commands.progress_bar import ProgressBar
 
     with ProgressBar() as progress:
-        read = read_ifc(building, join=join, progress=progress)
+        read = read_ifc(building, join=join, furniture=furniture, progress=progress)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
     for line in read.account.lines if read.account is not None else ():
@@ -139,6 +140,7 @@ def attach(
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
 @space_option("spaces", "default: all")
 @join_option
+@furniture_option
 @click.option(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
     help="Folder of Radiance scenes; one folder inside for each room with a window.",
@@ -154,6 +156,7 @@ def export(
     *,
     spaces: tuple[str, ...],
     join: tuple[str, ...],
+    furniture: bool,
     radiance: Path | None,
     mitsuba: Path | None,
     epjson: Path | None,
@@ -187,7 +190,7 @@ def export(
     from scenes.run.inputs import named_spaces
 
     with ProgressBar() as progress:
-        read = read_ifc(building, join=join, progress=progress)
+        read = read_ifc(building, join=join, furniture=furniture, progress=progress)
     chosen = named_spaces(read, spaces, building)
     known = known_fenestration(chosen, building)
 
@@ -279,7 +282,7 @@ def _rooms(building: Building) -> Table:
     for space in building.spaces:
         table.add_row(
             space.label, space.storey, f"{space.floor_area:.2f}", _number(space.stated_area),
-            f"{space.room_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),
+            f"{space.drawn_volume:.2f}", _number(space.stated_volume), str(len(space.faces)),
             str(len(space.windows)), f"{sum(w.area for w in space.windows):.2f}",
         )  # fmt: skip
     return table

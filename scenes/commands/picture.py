@@ -11,6 +11,7 @@ from mitsuba_cfs.files import check_file
 from scenes.commands.parameters import IFC_FILE
 from scenes.commands.room_options import (
     eye_height_option,
+    furniture_option,
     join_option,
     room_files,
     samples_option,
@@ -33,6 +34,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 )
 @space_option("space", "default: the first with a window", several=False)
 @join_option
+@furniture_option
 @view_option("view", "not parallel", several=False)
 @eye_height_option
 @size_option("size", 800, "as evalglare wants them")

@@ -23,6 +23,9 @@ join_option = click.option(
     "--join", multiple=True, metavar="'ROOM + ROOM'",
     help="Rooms open to each other that are to be one.",
 )  # fmt: skip
+furniture_option = click.option(
+    "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."
+)
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="EPW file, hourly."
 )

@@ -11,6 +11,7 @@ from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    furniture_option,
     join_option,
     method_option,
     needed_weather_option,
@@ -40,6 +41,7 @@ _DEFAULT = RoomOptions()
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @join_option
+@furniture_option
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -76,6 +78,7 @@ def command(
     u_value: float | None,
     g_value: float | None,
     join: tuple[str, ...],
+    furniture: bool,
     operation: Path | None,
     no_cache: bool,
     quick: bool,
@@ -87,7 +90,7 @@ def command(
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
-        building, weather, system, operation, spaces, join, u_value, g_value,
+        building, weather, system, operation, spaces, join, furniture, u_value, g_value,
         cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen),
     )  # fmt: skip
     run_to_folder(options, out)

@@ -17,7 +17,7 @@ from scenes.report.names import quantity
 from scenes.results import RunResult
 
 MOST_TRIANGLES = 24_000  # of what stands outdoors; the smallest are left out beyond
-KINDS = ("floor", "ceiling", "wall", "door", "frame", "glass", "outdoors")
+KINDS = ("floor", "ceiling", "wall", "door", "frame", "glass", "furniture", "outdoors")
 KIND_OF_FACE = {
     "floor": "floor", "ceiling": "ceiling", "roof": "ceiling", "wall": "wall", "door": "door",
     "window frame": "frame", "reveal": "wall",
@@ -101,6 +101,8 @@ def room_batches(space: Space):
         groups.setdefault(KIND_OF_FACE[face.kind], []).append(face.triangles)
     for window in space.windows:
         groups.setdefault("glass", []).append(window.triangles)
+    for piece in space.furniture:
+        groups.setdefault("furniture", []).append(piece.triangles)
     for kind, parts in groups.items():
         edges = np.concatenate([outline_edges(part) for part in parts])
         yield kind, np.concatenate(parts), edges

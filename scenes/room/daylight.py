@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Space
 from bim.sensors import sensor_grid, view_point
-from bim.to_tracer import exterior_surfaces, interior_surfaces
+from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight
@@ -42,7 +42,7 @@ def room_scene(
     points = np.concatenate([grid_points(space, grid) for grid in grids])
     position, direction = view_point(space)
     return DaylightScene(
-        interior_surfaces(space, "visible"),
+        furnished_surfaces(space, "visible"),
         exterior_surfaces(building, space, "visible"),
         windows.groups,
         points,

@@ -8,7 +8,7 @@ import numpy as np
 
 from bim.model import Problem, Space
 from bim.sensors import sensor_grid, view_point
-from bim.to_tracer import interior_surfaces, window_groups
+from bim.to_tracer import furnished_surfaces, window_groups
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -52,7 +52,7 @@ def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None)
     except RoomError:  # too low for a work plane: the eye alone
         points = np.empty((0, 3))
     scene = DaylightScene(
-        interior_surfaces(space, "visible"),
+        furnished_surfaces(space, "visible"),
         Surfaces.none(),
         window_groups(space),
         points,

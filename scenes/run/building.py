@@ -12,13 +12,20 @@ from mitsuba_cfs.progress import Progress, silent, summed
 
 
 def read_building(
-    path: str | PathLike[str], *, join: Sequence[str] = (), progress: Progress = silent
+    path: str | PathLike[str],
+    *,
+    join: Sequence[str] = (),
+    furniture: bool = False,
+    progress: Progress = silent,
 ) -> Building:
     """The building of an IFC file, with the corrections kept beside it.
 
-    Args: join: rooms to make one, as "Hall + Living".
+    Args:
+        join: rooms to make one, as "Hall + Living".
+        furniture: whether what stands in the rooms is in their light and views.
 
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
         `problems`.
     """
-    return read_ifc(Path(path), join=join, progress=summed(progress, "inputs", STAGES))
+    steps = summed(progress, "inputs", STAGES)
+    return read_ifc(Path(path), join=join, furniture=furniture, progress=steps)

@@ -136,7 +136,9 @@ def read_inputs(
     files = files or read_files(options)
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
-    building = read_building(options.building, join=options.join, progress=steps)
+    building = read_building(
+        options.building, join=options.join, furniture=options.furniture, progress=steps
+    )
     inputs = job_inputs(building, options.spaces, files)
     progress("inputs", 1.0)
     return inputs

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bim.model import Space
-from bim.to_tracer import exterior_surfaces, interior_surfaces
+from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
@@ -46,6 +46,8 @@ def read_viewed_room(
     given: Given,
     view_of: Callable[[Space], View],
     progress: Progress,
+    *,
+    furniture: bool = False,
 ) -> ViewedRoom:
     """The room of an IFC file, seen in the visible band.
 
@@ -53,15 +55,16 @@ def read_viewed_room(
         space: its name; None: the first with a window.
         given: what the user gives for all windows.
         view_of: the view of a room; it refuses one that is not in it.
+        furniture: whether what stands in the room is seen.
     """
-    building = read_building(file, join=join, progress=progress)
+    building = read_building(file, join=join, furniture=furniture, progress=progress)
     room = chosen_spaces(building, () if space is None else (space,), file)[0]
     view = view_of(room)
     filled = {guid: states[:1] for guid, states in fill_windows(room.windows, given, file).items()}
     windows = room_windows(room, filled)
     building = traced_building(building, filled)
     scene = DaylightScene(
-        interior_surfaces(room, "visible"),
+        furnished_surfaces(room, "visible"),
         exterior_surfaces(building, room, "visible"),
         windows.groups,
         view=view,

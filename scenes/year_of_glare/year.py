@@ -87,14 +87,15 @@ def read_year(
 
     steps = part(progress, 0.1, 0.6)
     viewed = read_viewed_room(
-        options.building, options.space, options.join, files.given, view_of, steps
-    )
+        options.building, options.space, options.join, files.given, view_of, steps,
+        furniture=options.furniture,
+    )  # fmt: skip
     variants.activate()
     sampling = sampling_of(options)
     sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
     progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
-    chosen.append(options.window_parts)
+    chosen += [options.window_parts, options.furniture]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     corrections = corrections_file(options.building)
     hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]

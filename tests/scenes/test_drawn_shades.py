@@ -39,6 +39,7 @@ DEVICES = {  # name: boxes
     ],
 }
 DRAWN = {"blind outside", "blind inside", "half drawn"}
+NAMED = {"Vorhang 2": True, "Rideau": True, "Curtain Wall": False, "Kasten": False}  # are shades
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,9 @@ def model(tmp_path_factory):
     for name, boxes in DEVICES.items():
         device = small.box("IfcShadingDevice", name, (0, 0, 0), (1, 1, 1))
         small.show(device, boxes)
+    for name in NAMED:
+        proxy = small.box("IfcBuildingElementProxy", name, (0, 0, 0), (1, 1, 1))
+        small.show(proxy, slats(0.02))
     model.write(str(path))
     return path
 
@@ -71,13 +75,18 @@ def test_the_blind_of_the_bsdf_is_left_out_and_named_with_its_area(model, tmp_pa
     building = inputs(model, tmp_path, "u_value = 1.1\n")
     assert devices(building) == set(DEVICES) - DRAWN
     said = {p.what.split(":")[0].removeprefix("IfcShadingDevice "): p for p in building.problems
-            if "left out of the tracing" in p.consequence}  # fmt: skip
+            if "left out of the tracing" in p.consequence and "Proxy" not in p.what}  # fmt: skip
     assert set(said) == DRAWN
     # the outline of the slats: from the lowest to the highest, as wide as the window
     high = SPACING * (len(slats(0)) - 1) + THICK
     assert f"its {W * high:.2f} m2" in said["blind outside"].what
     assert "window W1" in said["blind outside"].what and "keep" in said["blind inside"].consequence
     assert "blind outside" in caplog.text  # which the command line shows
+
+
+def test_a_proxy_is_a_shade_where_its_name_says_so(model, tmp_path):
+    left = {e.name for e in inputs(model, tmp_path, "u_value = 1.1\n").elements} & set(NAMED)
+    assert left == {name for name, shade in NAMED.items() if not shade}
 
 
 def test_the_blind_before_a_glazing_alone_stays(model, tmp_path):

@@ -10,7 +10,7 @@
   const COLOURS = {
     floor: [0.76, 0.73, 0.68, 1], ceiling: [0.88, 0.88, 0.88, 1], wall: [0.86, 0.85, 0.82, 1],
     door: [0.66, 0.54, 0.42, 1], frame: [0.5, 0.52, 0.55, 1], glass: [0.35, 0.65, 0.95, 0.3],
-    outdoors: [0.55, 0.6, 0.66, 0.1],
+    furniture: [0.6, 0.55, 0.48, 1], outdoors: [0.55, 0.6, 0.66, 0.1],
   };
   const see = { azimuth: -2.2, elevation: 0.62, distance: 1, target: [0, 0, 0], room: -1, layer: 0 };
 

@@ -1,0 +1,132 @@
+"""Spaces that end below the glass before them, raised to what really covers them.
+
+A space is raised where glass that looks out lies above its top with no slab between, and slabs,
+roofs or coverings close the air above it (`bim.room_tops`).  It stays as it is where the file
+states a suspended ceiling: a covering that covers the space, or a finished ceiling height below its
+height; and where one is likely though nobody drew it: less than `PLENUM` would be won and less
+than `MOSTLY` of the room's glass.  Both limits are our own judgement: voids above ceilings are 0.3
+to 1 m high.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bim.ifc.glass_of_rooms import GlassOfRooms
+from bim.ifc.project import psets_of
+from bim.ifc.quantities import BASE_SETS
+from bim.ifc.shapes import read_shapes
+from bim.ifc.source import Source
+from bim.ifc.spaces import SpaceRecord
+from bim.model import Problem
+from bim.room_tops import Body, raised_body
+from bim.rooms import room_solid
+from bim.solids import solid_of, triangles_of
+from mitsuba_cfs.processes import ProcessEnded, answer_apart
+
+LIDS = ("IfcSlab", "IfcRoof", "IfcCovering", "IfcPlate", "IfcCurtainWall")
+PLENUM = 1.2  # a void above a ceiling that nobody drew is lower [m]
+MOSTLY = 0.5  # share of a room's glass above its top that no such void has
+LOWEST_GAIN = 0.1  # what is raised by less stays as it is [m]
+LIMIT_S = 60.0  # for one room
+SAME_HEIGHT = 0.05  # heights stated and drawn that agree to this are one [m]
+
+
+def raised_rooms(
+    source: Source, records: Sequence[SpaceRecord], glass: GlassOfRooms
+) -> tuple[list[SpaceRecord], list[Problem]]:
+    """The rooms, those raised that end below their glass, and what was done with each of these."""
+    low = {one.low.guid for one in glass.glass if one.low is not None}
+    if not low:
+        return list(records), []
+    lids = _lids(source)
+    result, problems = list(records), []
+    for index, record in enumerate(records):
+        if record.guid not in low:
+            continue
+        above = sum(
+            g.out - g.used for g in glass.glass if g.low is not None and g.low.guid == record.guid
+        )
+        raised, why = _raised(source, index, result, lids, _share_above(record, above, glass))
+        gain = f"{raised.solid.high[2] - record.solid.high[2]:.2f} m"
+        what = f"room {record.label}: ends at {record.solid.high[2]:.2f} m, below {above:.2f} m2 of"
+        done = f"raised by {gain}, {raised.raised:.1f} m3 more" if not why else f"kept: {why}"
+        problems.append(
+            Problem(record.guid, f"{what} glass with no slab between", done, kind=f"low {why}")
+        )
+        result[index] = raised
+    return result, problems
+
+
+def _share_above(record: SpaceRecord, above: float, glass: GlassOfRooms) -> float:
+    """Share of a room's glass that lies above its top."""
+    own = [a for a in glass.attachments if a.room == record.guid and a.neighbour is None]
+    return above / max(above + sum(a.glass.area for a in own), 1e-9)
+
+
+def _raised(
+    source: Source,
+    index: int,
+    records: Sequence[SpaceRecord],
+    lids: Sequence[Body],
+    share_above: float,
+) -> tuple[SpaceRecord, str]:
+    """The room with the air above it; or as it is, and why."""
+    record = records[index]
+    stated = _stated_ceiling(source, record)
+    if stated:
+        return record, stated
+    others = [r for i, r in enumerate(records) if i != index]
+    bodies = [triangles_of(r.solid.manifold)[0] for r in (record, *others)]
+    try:
+        body = raised_body_apart(bodies, lids)
+    except ProcessEnded as error:
+        return record, str(error)
+    if isinstance(body, str):
+        return record, body
+    solid = solid_of(body)
+    gain = float(body[..., 2].max() - record.solid.high[2])
+    if solid is None or gain < LOWEST_GAIN:
+        return record, "its ceiling is drawn"
+    if gain < PLENUM and share_above < MOSTLY:
+        return record, f"the {gain:.2f} m above it may be the void of a ceiling that is not drawn"
+    whole = room_solid(record.guid, record.solid.name, solid.manifold)
+    more = solid.volume - record.volume
+    return replace(record, solid=whole, volume=solid.volume, raised=more), ""
+
+
+def raised_body_apart(rooms: Sequence[Body], lids: Sequence[Body]) -> Body | str:
+    """`bim.room_tops.raised_body` in a process of its own: roofs may be any mesh."""
+    return answer_apart(raised_body, rooms, lids, limit_s=LIMIT_S)
+
+
+def _stated_ceiling(source: Source, record: SpaceRecord) -> str:
+    """How the file states a suspended ceiling at the top of a space; "" if it does not."""
+    guid = record.guid.partition("-")[0]
+    space = source.model.by_guid(guid) if len(guid) == 22 else None
+    if space is None or not space.is_a("IfcSpace"):
+        return ""
+    for relation in getattr(space, "HasCoverings", None) or ():
+        if any(c.PredefinedType == "CEILING" for c in relation.RelatedCoverings):
+            return "a ceiling covers it in the file"
+    psets = psets_of(space)
+    scale = source.quantity_scales().length
+    drawn = float(np.ptp([record.solid.low[2], record.solid.high[2]]))
+    for name in BASE_SETS:
+        finish, height = (psets.get(name, {}).get(key) for key in ("FinishCeilingHeight", "Height"))
+        if finish is None or height is None or height - finish < SAME_HEIGHT / scale:
+            continue
+        if abs(finish * scale - drawn) < SAME_HEIGHT:
+            return f"FinishCeilingHeight is {finish * scale:.2f} m of {height * scale:.2f} m"
+    return ""
+
+
+def _lids(source: Source) -> list[Body]:
+    """Slabs, roofs and coverings in the world, openings not cut."""
+    wanted = {key for key, shape in source.shapes.items() if shape.ifc_class.startswith(LIDS)}
+    everything = {one.id() for one in source.model.by_type("IfcProduct")}
+    shapes, _ = read_shapes(source.model, without=everything - wanted, cut_openings=False)
+    return [source.placed.to_world(shape.triangles) for shape in shapes.values()]
