@@ -86,7 +86,7 @@ def view_matrices(
     m = len(keys)
     columns = len(groups) * options.get("basis", KLEMS_FULL).size
     indirect, lit = (_storage((m, columns), 8 * m * columns > memory, folder) for _ in range(2))
-    black = Surfaces(surfaces.triangles, np.zeros_like(surfaces.reflectance), surfaces.surface)
+    black = surfaces.without_diffuse()
     depth = options.pop("max_depth", 32)
     traced = (
         picture_matrix_blocks(

@@ -18,7 +18,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.random_walk import PathStarts, diffuse_direction, roulette
+from mitsuba_cfs.trace.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
@@ -46,8 +46,9 @@ def add_daylight_paths(
         dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
 
-        position, face, reflectance = tracer.surface_at(hit, position, direction, active)
-        direction = diffuse_direction(face, generator)
+        position, direction, reflectance = tracer.bounce(
+            hit, position, direction, generator, active
+        )
         depth += 1
         alive, beta = roulette(beta * reflectance, depth, generator)
         active &= alive & (depth < max_depth)

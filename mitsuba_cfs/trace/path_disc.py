@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
+from mitsuba_cfs.trace.path_sun import straight_to_sky
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
     disc_in_view,
@@ -17,7 +18,6 @@ from mitsuba_cfs.trace.picture_disc import (
     disc_rays,
     disc_reach,
 )
-from mitsuba_cfs.trace.point_in_time import straight_to_sky
 
 DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
 

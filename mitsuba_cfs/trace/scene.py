@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
+from mitsuba_cfs.trace.random_walk import diffuse_direction
+from mitsuba_cfs.trace.traced_gloss import TracedGloss
 
 OPAQUE = -1  # window index of a triangle that is not glazed
 
@@ -68,9 +70,7 @@ class TracedScene:
         glazed_reflectance: NDArray[np.float64],
     ) -> None:
         """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
-        opaque = Surfaces(
-            surfaces.triangles[keep], surfaces.reflectance[keep], surfaces.surface[keep]
-        )
+        opaque = surfaces.some(keep)
         if not len(opaque.triangles) + len(glazed):
             opaque = _speck(self.centre)
         triangles = np.concatenate([opaque.triangles, glazed]) - self.centre
@@ -85,6 +85,11 @@ class TracedScene:
         self.reflectance = mi.Float(reflectance.astype(np.float32))
         self.surface = mi.UInt32(surface.astype(np.uint32))
         self.group = mi.Int32(group.astype(np.int32))
+        self.gloss = (
+            TracedGloss(opaque, normals[: len(opaque.triangles)], len(glazed))
+            if (opaque.glossy)
+            else None
+        )
         self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(triangles)})
         # Offset along the normal that keeps a ray clear of the face it starts on [m]
         self.epsilon = 2e-5 * max(1.0, 0.05 * float(np.abs(triangles).max()))
@@ -141,11 +146,39 @@ class TracedScene:
         direction: mi.Vector3f,
         active: mi.Bool,
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance."""
+        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance.
+
+        The reflectance is the diffuse one, where there is a gloss that for the ray's angle.
+        """
         face = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
         face = dr.mulsign(face, -dr.dot(face, direction))
         point = mi.Point3f(origin + direction * hit.t + face * self.epsilon)
-        return point, face, dr.gather(mi.Float, self.reflectance, hit.prim_index, active)
+        return point, face, self.diffuse(hit.prim_index, -dr.dot(face, direction), active)
+
+    def diffuse(self, triangle: mi.UInt32, cosine: mi.Float, active: mi.Bool) -> mi.Float:
+        """Diffuse reflectance of a triangle seen at a cosine to its normal."""
+        rho = dr.gather(mi.Float, self.reflectance, triangle, active)
+        if self.gloss is None:
+            return rho
+        return rho * self.gloss.diffuse_share(triangle, cosine, active)
+
+    def bounce(
+        self,
+        hit: mi.PreliminaryIntersection3f,
+        origin: mi.Point3f,
+        direction: mi.Vector3f,
+        generator: mi.PCG32,
+        active: mi.Bool,
+    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
+        """Where a ray meets a surface, where it goes on to, and its weight."""
+        position, face, weight = self.surface_at(hit, origin, direction, active)
+        away = diffuse_direction(face, generator)
+        if self.gloss is not None:
+            glossy, towards, weight = self.gloss.leave(
+                hit.prim_index, face, direction, weight, generator, active
+            )
+            away = dr.select(glossy, towards, away)
+        return position, away, weight
 
     def to_local(self, group: mi.Int32, v: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
         """World vector in the frame of a window group (z is the exterior normal)."""
