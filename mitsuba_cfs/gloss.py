@@ -110,6 +110,23 @@ def radiance_gloss(kind: str, values: Sequence[float]) -> tuple[float, Gloss | N
     return diffuse, gloss
 
 
+def radiance_material(name: str, reflectance: float, gloss: Gloss | None = None) -> str:
+    """A Radiance material of a diffuse reflectance at normal incidence and a gloss.
+
+    `mirror` for a smooth one of one reflectance, which alone sends the sun on; else `plastic`,
+    whose rise with the angle is its own: of a smooth `dielectric` or `pane` it is near, not equal.
+    """
+    if gloss is not None and not reflectance and not gloss.roughness and len(gloss.specular) == 1:
+        return f"void mirror {name}\n0\n0\n3{3 * f' {gloss.at_normal:.6g}'}\n"
+    specular, roughness = (gloss.at_normal, gloss.roughness) if gloss else (0.0, 0.0)
+    colour = reflectance / (1 - specular) if specular < 1 else 0.0
+    if gloss is not None and lacquer(specular, roughness) != mirror(specular, roughness):
+        end = float(_rise(np.ones(1))[0])
+        specular = max((specular - end) / (1 - end), 0.0)
+    numbers = f"{3 * f'{colour:.6g} '}{specular:.6g} {roughness:.6g}"
+    return f"void plastic {name}\n0\n0\n5 {numbers}\n"
+
+
 def pane_shares(
     cosine: ArrayLike, index: float, transmissivity: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -117,7 +117,7 @@ def sun_images(
     """
     for tracer in () if isinstance(sky, PatchSky) else (room.inside, room.outside):
         gloss = tracer.gloss
-        if gloss is None or not (rough or gloss.smooth):
+        if gloss is None or not (rough or len(gloss.mirrors)):
             continue
         draws = min(gloss.plane_count, MOST_IMAGES)
         for draw in range(draws):
@@ -143,7 +143,7 @@ def _image(
     active: mi.Bool,
 ) -> SunImage:
     """The image of one mirror plane."""
-    gloss, outside = tracer.gloss, tracer is room.outside
+    gloss = tracer.gloss
     sun = on_disc(sky, u[0])
     normal, alpha = gloss.plane(number)
     normal = dr.mulsign(normal, dr.dot(normal, sun))
@@ -155,28 +155,47 @@ def _image(
     active = active & (cosine > 0) & (along > 0) & (sun_cosine > 0) & (seen_cosine > 0)
     active &= sky.sun_radiance > 0
 
-    # ----- From the vertex to the plane -----
-    tau, origin = mi.Float(1), vertex.position
-    if outside:
-        tau, origin = through_window(room, origin, towards, vertex.outdoors, active)
-        active &= tau > 0
-    else:
-        active &= ~vertex.outdoors
-    ray = mi.Ray3f(origin, towards)
-    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-    active &= hit.is_valid()
-    active &= gloss.plane_of(hit.prim_index, active) == mi.Int32(number)
-    place = mi.Point3f(origin + towards * hit.t + normal * tracer.epsilon)
-
-    # ----- And on to the sun -----
-    tau *= straight_to_sky(room, place, sun, mi.Bool(outside), active)
-    rho = gloss.specular(hit.prim_index, seen_cosine, active)
+    shown = by_plane(
+        room, tracer, mi.Int32(number), vertex.position, towards,
+        onwards=sun, outdoors=vertex.outdoors, active=active,
+    )  # fmt: skip
     density = _image_density(gloss, slope, along, alpha)
     own = cosine * dr.inv_pi  # of a path from the vertex, about
     weight = dr.select(sharp, 1.0, density / dr.maximum(density + own, 1e-12))
-    value = rho * sun_cosine / (dr.maximum(along, 1e-6) * slope) * weight * _drawn(gloss)
-    strength = value * tau * sky.sun_radiance * float(SUN_SOLID_ANGLE)
-    return SunImage(towards, dr.select(active & (tau > 0), strength, 0.0), sharp)
+    value = shown * sun_cosine / (dr.maximum(along, 1e-6) * slope) * weight * _drawn(gloss)
+    strength = value * sky.sun_radiance * float(SUN_SOLID_ANGLE)
+    return SunImage(towards, dr.select(active & (shown > 0), strength, 0.0), sharp)
+
+
+def by_plane(
+    room: LitRoom,
+    tracer: TracedScene,  # the room's inside or outside
+    number: mi.Int32,
+    position: mi.Point3f,
+    towards: mi.Vector3f,
+    *,
+    onwards: mi.Vector3f,
+    outdoors: mi.Bool,
+    active: mi.Bool,
+) -> mi.Float:
+    """Transmittance of the way by a mirror plane to the sky, its reflectance included."""
+    gloss, outside = tracer.gloss, tracer is room.outside
+    active, tau, origin = mi.Bool(active), mi.Float(1), position
+    if outside:
+        tau, origin = through_window(room, origin, towards, outdoors, active)
+        active &= tau > 0
+    else:
+        active &= ~outdoors
+    ray = mi.Ray3f(origin, towards)
+    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+    active &= hit.is_valid()
+    active &= gloss.plane_of(hit.prim_index, active) == number
+    normal, _ = gloss.plane(mi.UInt32(number))
+    normal = dr.mulsign(normal, -dr.dot(normal, towards))
+    rho = gloss.specular(hit.prim_index, -dr.dot(normal, towards), active)
+    place = mi.Point3f(origin + towards * hit.t + normal * tracer.epsilon)
+    beyond = straight_to_sky(room, place, onwards, mi.Bool(outside), active)
+    return dr.select(beyond > 0, rho * tau * beyond, 0.0)
 
 
 def _drawn(gloss: TracedGloss) -> float:

@@ -24,7 +24,7 @@ from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
-from mitsuba_cfs.trace.path_disc import add_disc, eye_of
+from mitsuba_cfs.trace.path_disc import add_disc, add_mirrored_discs, eye_of
 from mitsuba_cfs.trace.path_sun import Vertex, on_disc
 from mitsuba_cfs.trace.picture_gloss import shown_sharp
 from mitsuba_cfs.trace.picture_sharing import (
@@ -83,6 +83,7 @@ def point_in_time_picture(
             rows.append(light.by_tile(pixels, samples, tiles))
         progress("picture", (start + len(pixels)) / len(shown))
     _add_shared(picture, tiles, pairs, rows, numbers.windows)
+    add_mirrored_discs(picture, room, sky, view)
     if disc:
         add_disc(picture, room, sky, view)
     return picture.astype(np.float32).reshape(view.height, view.width)

@@ -39,7 +39,8 @@ class TracedGloss:
         self._roughness = mi.Float(roughness.astype(np.float32))
         self._plane = mi.Int32(plane.astype(np.int32))
         self.plane_count = len(planes)
-        self.smooth = bool(np.any(roughness[planes[:, 3].astype(int)] == 0))
+        self.mirrors = np.flatnonzero(roughness[planes[:, 3].astype(int)] == 0)  # smooth planes
+        self.normals = planes[:, :3]  # [J, 3] of the planes
         self._plane_normal = mi.Vector3f(planes[:, :3].T.astype(np.float32))
         self._plane_roughness = mi.Float(roughness[planes[:, 3].astype(int)].astype(np.float32))
 
