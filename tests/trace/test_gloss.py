@@ -218,3 +218,38 @@ def test_the_sun_by_a_glossy_floor_is_a_spot_on_the_ceiling():
         points=points[1:], normals=[[0.0, 0.0, -1.0]],
     )  # fmt: skip
     assert none.values[0] == 0
+
+
+def test_a_view_matrix_sees_the_window_in_the_floor():
+    """V of a sensor that looks down on a mirror floor is V_d of its image that looks up."""
+    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    _, floor = black_room(mirror(0.5))
+    _, groups = rooms.test_room()
+    options = {"samples": 16384, "stopping": Stopping(batches=4)}
+    point, down, up = [[1.8, 1.5, 1.0]], [[0.0, 0.0, -1.0]], [[0.0, 0.0, 1.0]]
+    seen = view_matrix(floor, groups, point, down, **options)
+    image = view_matrix(rooms.NOTHING, groups, [[1.8, 1.5, -1.0]], up, **options)
+    assert seen.values.sum() == pytest.approx(
+        direct_down(groups, point) + 0.5 * image.values.sum(), rel=0.01
+    )
+
+
+def direct_down(groups, point) -> float:
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    return view_matrix(rooms.NOTHING, groups, point, [[0.0, 0.0, -1.0]], max_depth=1).values.sum()
+
+
+@pytest.mark.parametrize("gloss", [lacquer(0.06), mirror(0.3, 0.1)])
+def test_a_glossy_room_is_the_same_to_matrices_and_to_paths(gloss):
+    """E behind a clear opening under an even sky: row sums of V and paths, which share no walk."""
+    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.view_matrix import view_matrix
+
+    room, groups = rooms.test_room()
+    room = replace(room, gloss=(gloss, None, gloss, *(None,) * 6))
+    view = view_matrix(room, groups, POINTS, UP, samples=16384, stopping=Stopping(batches=4))
+    found = traced(rooms.NOTHING, lit_by(np.ones(146)), interior=room)
+    agree(found, view.values.sum(axis=(1, 2)), view.sum_error.sum(axis=-1))
