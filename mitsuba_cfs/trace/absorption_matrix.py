@@ -39,7 +39,7 @@ def _absorption_kernel(
         active &= hit.is_valid()
         group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
         surface = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, active)
-        position, away, reflectance = tracer.bounce(hit, position, direction, generator, active)
+        position, away, reflectance, _ = tracer.bounce(hit, position, direction, generator, active)
         last = depth + 1 >= max_depth
         slot = row * width + dr.select(group == OPAQUE, surface, F + mi.UInt32(group))
         absorbed = dr.select(last, 1.0, 1 - reflectance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -32,7 +33,10 @@ def add_daylight_paths(
     starts: PathStarts,  # on the window or the sensor, outdoors
     weight: mi.Float | None = None,  # of each path, 1 by default
 ) -> None:
-    """Follow each path to the sky, where the patch it meets gains the product of reflectances."""
+    """Follow each path to the sky, where the patch it meets gains the product of reflectances.
+
+    A path of one segment may have one more by a smooth mirror, which shows the sky and the sun.
+    """
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     weight = mi.Float(1.0 if weight is None else weight)
@@ -46,12 +50,15 @@ def add_daylight_paths(
         dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
 
-        position, direction, reflectance = tracer.bounce(
+        position, direction, reflectance, mirrored = tracer.bounce(
             hit, position, direction, generator, active
         )
         depth += 1
         alive, beta = roulette(beta * reflectance, depth, generator)
-        active &= alive & (depth < max_depth)
+        within = depth < max_depth
+        if dr.hint(tracer.gloss is not None, mode="scalar"):
+            within |= mirrored & (depth == 1) & (max_depth == 1)
+        active &= alive & within
 
 
 def daylight_matrix(
@@ -157,6 +164,8 @@ def sky_irradiance_matrix(
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    if max_depth == 1:  # what the sensor sees itself, mirrors are left to the rest
+        surfaces = replace(surfaces, gloss=())
     tracer = TracedScene(surfaces, centre=points.mean(axis=0))
     sky = SkyBins(ReinhartSky(subdivision))
     accepted = AcceptedDirections(acceptance)

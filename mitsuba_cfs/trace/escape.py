@@ -151,7 +151,7 @@ def _add_escapes(
         active &= hit.is_valid()
         group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
         active &= group == OPAQUE
-        position, direction, reflectance = tracer.bounce(
+        position, direction, reflectance, _ = tracer.bounce(
             hit, position, direction, generator, active
         )
         depth += 1

@@ -162,6 +162,15 @@ class TracedScene:
             return rho
         return rho * self.gloss.diffuse_share(triangle, cosine, active)
 
+    def whole(self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool) -> mi.Float:
+        """Reflectance of a triangle for a ray along a direction, diffuse and by its gloss."""
+        if self.gloss is None:
+            return dr.gather(mi.Float, self.reflectance, triangle, active)
+        normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
+        cosine = dr.abs(dr.dot(normal, direction))
+        gloss = self.gloss.specular(triangle, cosine, active)
+        return self.diffuse(triangle, cosine, active) + gloss
+
     def bounce(
         self,
         hit: mi.PreliminaryIntersection3f,
@@ -169,16 +178,17 @@ class TracedScene:
         direction: mi.Vector3f,
         generator: mi.PCG32,
         active: mi.Bool,
-    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-        """Where a ray meets a surface, where it goes on to, and its weight."""
+    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
+        """Where a ray meets a surface, where it goes on to, its weight, if by a mirror."""
         position, face, weight = self.surface_at(hit, origin, direction, active)
-        away = diffuse_direction(face, generator)
+        away, mirrored = diffuse_direction(face, generator), mi.Bool(False)
         if self.gloss is not None:
             glossy, towards, weight = self.gloss.leave(
                 hit.prim_index, face, direction, weight, generator, active
             )
             away = dr.select(glossy, towards, away)
-        return position, away, weight
+            mirrored = glossy & (self.gloss.roughness(hit.prim_index, glossy) <= 0)
+        return position, away, weight, mirrored
 
     def to_local(self, group: mi.Int32, v: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
         """World vector in the frame of a window group (z is the exterior normal)."""

@@ -253,3 +253,53 @@ def test_a_glossy_room_is_the_same_to_matrices_and_to_paths(gloss):
     view = view_matrix(room, groups, POINTS, UP, samples=16384, stopping=Stopping(batches=4))
     found = traced(rooms.NOTHING, lit_by(np.ones(146)), interior=room)
     agree(found, view.values.sum(axis=(1, 2)), view.sum_error.sum(axis=-1))
+
+
+def test_the_sun_in_a_mirror_is_a_sun_to_the_direct_matrix():
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
+
+    room, groups = black_room(None)[0], rooms.test_room()[1]
+    scattered = np.full((145, 145), 0.1)
+    beam = [KlemsScattering(KLEMS_FULL, scattered, np.full(145, 0.5))]
+
+    def matrix(outdoors, sun):
+        return direct_sun_matrix(room, outdoors, groups, beam, POINTS, UP, suns=sun[None]).values
+
+    seen, alone = matrix(facade(mirror(0.8)), SUN), matrix(rooms.NOTHING, SUN * [1, -1, 1])
+    assert alone.min() > 0
+    np.testing.assert_allclose(seen, 0.8 * alone, rtol=2e-3)
+    assert not matrix(rooms.NOTHING, SUN).any()
+
+
+@pytest.mark.slow
+def test_five_phases_have_the_sun_of_a_mirror_facade():
+    """E in a room behind clear glass by five phases against paths, an even sky and the sun."""
+    import mitsuba_cfs as cfs
+    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+
+    room, groups = rooms.test_room()
+    outdoors = facade(mirror(0.8))
+    scene = cfs.DaylightScene(room, outdoors, groups, POINTS, UP)
+    sky = np.tile(np.where(np.arange(2306) == 0, 200.0, 2000.0)[:, None], (1, 1))
+    system = cfs.AngularOptics(np.ones(64))
+    traced_scene = cfs.PhaseScene(scene, cfs.Sampling(patch_samples=2**14, sensor_samples=2**15))
+    annual = one_hour(sky, SUN, 50_000.0)
+    found = cfs.PhaseSystems(traced_scene, [[system]]).light(annual).illuminance()[:, 0]
+    paths = traced(outdoors, lit_by(sky[:, 0], SUN, 50_000.0 / SUN_SOLID_ANGLE), samples=2**16)
+    error = 4 * paths.standard_error / paths.values
+    assert np.all(np.abs(found / paths.values - 1) < 0.02 + error), (found, paths.values)
+
+
+def one_hour(sky, sun, illuminance: float):
+    """A sky of one hour; the sun lies on the patch that it stands in."""
+    import mitsuba_cfs as cfs
+    from mitsuba_cfs.sky.patches import ReinhartSky
+
+    reinhart = ReinhartSky(4)
+    patch = int(reinhart.index(sun[None])[0])
+    alone = np.zeros_like(sky)
+    alone[patch] = illuminance / reinhart.solid_angles[patch]
+    return cfs.AnnualSky(
+        sky + alone, sun[None], np.array([illuminance]), np.array([12]), 8760, sun=alone
+    )

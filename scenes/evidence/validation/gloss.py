@@ -2,11 +2,12 @@ r"""Rooms with surfaces that reflect like a mirror, by Radiance and by this proj
 
     python -m scenes.evidence.validation.gloss [--cases mirror floor metal] [--json FILE]
 
-The room of the dissertation's Table 1 with its window to the north, seen from 2 m behind the glass,
-under a clear sky with the sun behind the house.  "mirror": a facade of reflectance 0.8 stands 10 m before it and sends the
-sun back; "metal": the same of rough metal, alpha 0.15; "floor": a floor of smooth lacquer, Radiance's
-`plastic` of specularity 0.05, the sky alone.  Ev by `rtrace` of a point, DGP of `rpict`'s picture
-with this Ev (`evalglare -i`); ours by paths and by the five-phase method.
+The room of the dissertation's Table 1 with its window to the north, seen from 2 m behind the
+opening under a clear sky, the sun behind the house.  "mirror": a facade of reflectance 0.8 stands
+10 m before it and sends the sun back; "metal": the same of rough metal, alpha 0.15; "floor": a
+floor of smooth lacquer, Radiance's `plastic` of specularity 0.05, the sky alone.  Ev by `rtrace`
+of a point, DGP of `rpict`'s picture with this Ev (`evalglare -i`); ours by paths and, of the
+pictures, by the five-phase method.
 """
 
 from __future__ import annotations
