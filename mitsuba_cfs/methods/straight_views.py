@@ -25,7 +25,8 @@ class StraightViews:
         B s - V_d diag(tau) D s
 
     is added to V T D s: behind an edge that not all points of the windows see alike, patches and
-    means blur what a beam shows.  A group that is not cut has nothing of it.
+    means blur what a beam shows, and the lobe of a glossy facade.  A group that is not cut and sees
+    no gloss has nothing of it.
     """
 
     def __init__(self, traced: PhaseScene, systems: Sequence[States]) -> None:
@@ -45,7 +46,8 @@ class StraightViews:
         Args: direct: without what the outdoors reflects.
         """
         traced = self._traced
-        if len(traced.parts.of(g)) < 2 or not self.beam(g, j).any():
+        sharp = len(traced.parts.of(g)) > 1 or traced.scene.exterior.glossy
+        if not sharp or not self.beam(g, j).any():
             return None
         if (g, j, direct) not in self._found:
             scene, chosen = traced.scene, traced.sampling

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+import mitsuba_cfs as cfs
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.gloss import Gloss, lacquer, mirror
@@ -41,7 +42,7 @@ TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
 FACADE = 10.0  # before the window [m]
 SIZE, FINER = 200, 4  # [px]; rpict's are finer, and averaged
 SUN = np.array([0.25, -1.0, 0.8]) / np.linalg.norm([0.25, -1.0, 0.8])
-SUN_ILLUMINANCE = 80_000.0  # normal to it [lx]
+SUN_ILLUMINANCE = {"mirror": 80_000.0, "metal": 15_000.0, "floor": 0.0}  # normal to it [lx]
 SKY_ILLUMINANCE = 12_000.0  # on the ground [lx]
 QUALITY = "-dc 1 -dt 0 -dj 0 -ds 0.1 -st 0"
 CACHED = "-ps 1 -pa 0 -ss 16 -ab 5 -ad 512 -as 0 -aa 0.2 -ar 32 -lr 8 -lw 1e-3"  # of the pictures
@@ -84,8 +85,10 @@ class Outcome:
     ev: float  # ours, of the point
     ev_error: float
     ev_picture: float
+    ev_five_phase: float  # of its picture
     dgp_rpict: float
     dgp: float
+    dgp_five_phase: float
     without: float  # our Ev with the specular part of no surface
 
 
@@ -96,13 +99,13 @@ def case(name: str) -> Case:
     interior = replace(interior, triangles=interior.triangles * TURN)
     glass = room.window_groups()[0].windows[0].triangles * TURN
     groups = [WindowGroup("north", (WindowSurface("north", glass),))]
-    exterior, luminance = interior, 0.0  # the room as it stands outdoors
+    exterior = interior  # the room as it stands outdoors
     if name == "floor":
         interior = replace(interior, gloss=(gloss, *(None,) * 8))
     else:
-        exterior, luminance = _with_facade(exterior, gloss), SUN_ILLUMINANCE / SUN_SOLID_ANGLE
+        exterior = _with_facade(exterior, gloss)
     patches = cie_patches("clear", ReinhartSky(4), SKY_ILLUMINANCE, sun=SUN)
-    return Case(name, interior, exterior, groups, patches, luminance)
+    return Case(name, interior, exterior, groups, patches, SUN_ILLUMINANCE[name] / SUN_SOLID_ANGLE)
 
 
 def _with_facade(body: Surfaces, gloss: Gloss) -> Surfaces:
@@ -173,12 +176,35 @@ def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Ou
     found, plain = (_eye(one, view) for one in (given, _without_gloss(given)))
     picture = point_in_time_picture(given.lit, given.sky, view, samples=64)
     rendered = theirs.picture(view)
-    np.savez(folder / "pictures.npz", ours=picture, theirs=rendered)
+    phases = _five_phase(given, view)
+    np.savez(folder / "pictures.npz", ours=picture, theirs=rendered, five_phase=phases)
     ours, rated = evaluate(picture, view), evaluate(rendered, view, illuminance=ev)
+    third = evaluate(phases, view)
     return Outcome(
         name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]), ours.Ev,
-        rated.dgp, ours.dgp, float(plain.values[0]),
+        third.Ev, rated.dgp, ours.dgp, third.dgp, float(plain.values[0]),
     )  # fmt: skip
+
+
+def _five_phase(given: Case, view: View) -> np.ndarray:
+    """The picture by five phases; the sun lies on the sky patch that it stands in."""
+    reinhart = ReinhartSky(4)
+    strength, sun = given.sun_luminance * SUN_SOLID_ANGLE, np.zeros((reinhart.size, 1))
+    patch = int(reinhart.index(SUN[None])[0])
+    sun[patch] = strength / reinhart.solid_angles[patch]
+    hour = np.array([12])
+    sky = cfs.AnnualSky(
+        given.patches[:, None] + sun, SUN[None], np.array([strength]), hour, 8760, sun=sun
+    )
+    points, normals = np.array([view.position]), np.array([view.direction])
+    around = given.interior, given.exterior, given.groups
+    scene = cfs.DaylightScene(*around, points, normals, view=view)
+    traced = cfs.PhaseScene(scene, cfs.Sampling(outdoor_samples=16, view_samples=16))
+    clear = cfs.AngularOptics(np.ones(64))
+    shown = cfs.PhaseSystems(traced, [[clear]]).light(sky).pictures(np.array([0]), [0])
+    picture = np.zeros(view.width * view.height, dtype=np.float32)
+    picture[shown.pixels] = shown.values(np.array([0]))[0]
+    return picture.reshape(view.height, view.width)
 
 
 def _eye(given: Case, view: View):
