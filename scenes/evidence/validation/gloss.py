@@ -46,7 +46,7 @@ SUN_ILLUMINANCE = {"mirror": 80_000.0, "metal": 15_000.0, "floor": 0.0}  # norma
 SKY_ILLUMINANCE = 12_000.0  # on the ground [lx]
 QUALITY = "-dc 1 -dt 0 -dj 0 -ds 0.1 -st 0"
 CACHED = "-ps 1 -pa 0 -ss 16 -ab 5 -ad 512 -as 0 -aa 0.2 -ar 32 -lr 8 -lw 1e-3"  # of the pictures
-POINT = "-u+ -ss 1 -ab 8 -ad 16384 -aa 0 -lr 20 -lw 1e-9"  # of Ev
+POINT = "-u+ -ss 1e5 -ab 8 -ad 16384 -aa 0 -lr 20 -lw 1e-9"  # of Ev; several rays to each lobe
 MATERIALS: dict[str, Gloss] = {
     "mirror": mirror(0.8), "metal": mirror(0.6, 0.15), "floor": lacquer(0.05),
 }  # fmt: skip
