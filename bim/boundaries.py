@@ -20,6 +20,7 @@ from bim.planes import area_vectors
 from bim.rooms import Piece
 from bim.shell import conforming_triangles
 from bim.surroundings import Beyond, Span
+from mitsuba_cfs.gloss import Gloss
 
 SHALLOWEST_GAP = 0.01  # air between two elements from this on is a layer [m]
 GAP_RESISTANCE = 0.18  # of an unventilated air layer of 25 mm and more: EN ISO 6946:2017 [m2 K/W]
@@ -40,16 +41,28 @@ class ElementRecord:
     stated: bool = False  # whether the thermal properties come from the file
 
 
+@dataclass(frozen=True, slots=True)
+class Finishes:
+    """What the triangles of the elements' mesh reflect."""
+
+    reflectance: NDArray[np.float64]  # [N, 2] visible and solar, negative where none is stated
+    gloss: NDArray[np.object_]  # [N] `Gloss` or None
+
+    def of(self, triangle: int) -> tuple[float, float, Gloss | None]:
+        """Visible and solar reflectance and gloss of a triangle."""
+        visible, solar = self.reflectance[triangle].tolist()
+        return visible, solar, self.gloss[triangle]
+
+
 def faces_and_windows(
     pieces: Sequence[Piece],
     beyond: Sequence[Beyond],
     records: Sequence[ElementRecord],
-    reflectances: NDArray[np.float64],
+    finishes: Finishes,
 ) -> tuple[list[Face], list[Window], Counter]:
     """Faces, windows, and how often something had to be assumed.
 
-    Args: beyond: for each piece (ignored for glass); reflectances: [N, 2] visible and solar
-        of each triangle of the elements' mesh, negative where the file has no colour.
+    Args: beyond: for each piece (ignored for glass); finishes: of the elements' mesh.
     """
     assumed: Counter = Counter()
     meshes = conforming_triangles([piece.facet for piece in pieces])
@@ -70,7 +83,7 @@ def faces_and_windows(
         faces.append(
             _face(
                 f"{kind} {counts[kind]}", kind, piece, triangles, behind,
-                records=records, reflectances=reflectances, assumed=assumed,
+                records=records, finishes=finishes, assumed=assumed,
             )
         )  # fmt: skip
     return faces, [_window(parts) for parts in glass.values()], assumed
@@ -99,7 +112,7 @@ def _face(
     behind: Beyond,
     *,
     records: Sequence[ElementRecord],
-    reflectances: NDArray[np.float64],
+    finishes: Finishes,
     assumed: Counter,
 ) -> Face:
     """One opaque face with what the file says of it, defaults where it says nothing."""
@@ -107,8 +120,9 @@ def _face(
     own = filling is not None and piece.role in ("frame", "door", "inner glass")
     spans = behind.spans
     record = records[spans[0].element] if spans else None
-    visible, solar = reflectances[spans[0].triangle].tolist() if spans else (-1.0, -1.0)
+    visible, solar, gloss = finishes.of(spans[0].triangle) if spans else (-1.0, -1.0, None)
     if own:
+        gloss = None
         visible = solar = -1.0 if filling.frame_reflectance is None else filling.frame_reflectance
     if piece.role == "inner glass":
         visible = solar = GLASS_REFLECTANCE
@@ -127,7 +141,7 @@ def _face(
     guid = filling.guid if own else (record.guid if record is not None else None)
     return Face(
         name, kind, triangles, behind.adjacency, construction, visible, solar, EMISSIVITY,
-        behind.neighbour, guid,
+        behind.neighbour, guid, gloss,
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bim.account import Account
 from bim.names import found_by_name, label_of
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import Gloss
 
 FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "reveal")
 # Sides of a box-shaped room as seen from outdoors in front of it, and the other kinds of its faces
@@ -85,11 +86,12 @@ class Face:
     triangles: NDArray[np.float64]  # [T, 3, 3] vertices [m], counter-clockwise seen from outside
     adjacency: str  # one of ADJACENCIES: what lies beyond
     construction: Construction
-    reflectance_visible: float
+    reflectance_visible: float  # diffuse
     reflectance_solar: float
     emissivity: float = 0.9
     neighbour: str | None = None  # GUID of the other space where adjacency is "space"
     element: str | None = None  # GUID of the building element
+    gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, out of the room
     area: float = field(init=False)  # [m2]
 
@@ -101,11 +103,17 @@ class Face:
         for value in (self.reflectance_visible, self.reflectance_solar, self.emissivity):
             if not 0 <= value <= 1:
                 raise ValueError(f"face {self.name}: reflectance or emissivity {value} not in 0..1")
+        if max(self.total_reflectance("visible"), self.total_reflectance("solar")) > 1 + 1e-6:
+            raise ValueError(f"face {self.name}: reflects more than it gets")
         set_normal_and_area(self)
 
     def reflectance(self, band: str) -> float:
         """Diffuse reflectance in the band "visible" or "solar"."""
         return {"visible": self.reflectance_visible, "solar": self.reflectance_solar}[band]
+
+    def total_reflectance(self, band: str) -> float:
+        """Reflectance in a band at normal incidence, diffuse and like a mirror."""
+        return self.reflectance(band) + (0.0 if self.gloss is None else self.gloss.at_normal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,6 +212,7 @@ class Element:
     storey: str = ""
     material: str = ""
     is_kept: bool = False  # the corrections say so, whatever stands behind it
+    gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
 
     def reflectance(self, band: str) -> float:
         """Diffuse reflectance in the band "visible" or "solar"."""

@@ -15,6 +15,7 @@ from bim.model import BOX_SIDES, Building, Construction, Element, Face, Space, W
 from bim.planes import Facet, Plane, plane_through, polygons_of
 from bim.shell import conforming_triangles
 from mitsuba_cfs.errors import RoomError
+from mitsuba_cfs.gloss import Gloss
 
 T = TypeVar("T")
 
@@ -53,6 +54,7 @@ def shoebox(
     reflectance_solar: Mapping[str, float] | None = None,
     adjacency: Mapping[str, str] | None = None,
     constructions: Mapping[str, Construction] | None = None,
+    gloss: Mapping[str, Gloss] | None = None,
     emissivity: float = 0.9,
     latitude_deg: float | None = None,
     longitude_deg: float | None = None,
@@ -69,6 +71,7 @@ def shoebox(
     Args:
         recess: depth of the openings from the inner wall surface to the glass [m].
         reflectance: visible diffuse reflectances; `reflectance_solar`: solar ones, else the same.
+        gloss: what parts reflect like a mirror besides, `mitsuba_cfs.gloss`.
         adjacency: what lies beyond a side, one of `bim.model.ADJACENCIES`.
         elements: what stands outdoors.
     """
@@ -108,6 +111,7 @@ def shoebox(
                 solar,
                 emissivity,
                 element=f"{name}-{side}",
+                gloss=_pick(gloss, side, kind, None),
             )
         )
     volume = width * depth * height

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bim.model import Space, centroid
+from bim.model import Face, Space, centroid
 from bim.planes import area_vectors
 
 ALIKE = 0.005  # lengths may differ by this between rooms that are alike [m]
@@ -37,7 +37,7 @@ def template_rooms(spaces: Sequence[Space]) -> list[tuple[Space, ...]]:
 
 
 def room_features(space: Space) -> NDArray[np.float64]:
-    """Rows [N, 11] of faces, windows and furniture: place, normal, size and optics [m].
+    """Rows [N, 13] of faces, windows and furniture: place, normal, size and optics [m].
 
     Places count from the room's lowest corner; normals and reflectances are scaled so that a
     difference of `ALIKE` matters as much as that length.
@@ -46,21 +46,27 @@ def room_features(space: Space) -> NDArray[np.float64]:
     scale = ALIKE / ALIKE_SHARE
     rows = [
         [*(centroid(face.triangles) - corner), *(scale * face.normal), np.sqrt(face.area), 0.0,
-         scale * face.reflectance_visible, scale * face.reflectance_solar, scale * face.emissivity]
+         scale * face.reflectance_visible, scale * face.reflectance_solar, scale * face.emissivity,
+         *(scale * value for value in _gloss(face))]
         for face in space.faces
     ]  # fmt: skip
     rows += [
         [*(window.centre - corner), *(scale * window.normal), np.sqrt(window.area), 10.0,
-         np.sqrt(window.opening_area), window.u_value or 0.0, window.g_value or 0.0]
+         np.sqrt(window.opening_area), window.u_value or 0.0, window.g_value or 0.0, 0.0, 0.0]
         for window in space.windows
     ]  # fmt: skip
     rows += [
         [*(centroid(part.triangles) - corner), 0.0, 0.0, 0.0,
          np.sqrt(np.linalg.norm(area_vectors(part.triangles), axis=1).sum()), 20.0,
-         scale * part.reflectance_visible, scale * part.reflectance_solar, 0.0]
+         scale * part.reflectance_visible, scale * part.reflectance_solar, 0.0, 0.0, 0.0]
         for part in space.furniture
     ]  # fmt: skip
-    return np.array(rows).reshape(-1, 11)
+    return np.array(rows).reshape(-1, 13)
+
+
+def _gloss(face: Face) -> tuple[float, float]:
+    """Reflectance at normal incidence and roughness of a face's gloss."""
+    return (0.0, 0.0) if face.gloss is None else (face.gloss.at_normal, face.gloss.roughness)
 
 
 def _same(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:

@@ -190,7 +190,7 @@ def _rectangle(window: Window, area: float) -> NDArray[np.float64]:
 
 def _construction(model: dict, construction: Construction, face: Face | None) -> str:
     """Name of the construction with the face's absorptance, its materials written."""
-    absorptance = 0.5 if face is None else 1 - face.reflectance_solar
+    absorptance = 0.5 if face is None else 1 - face.total_reflectance("solar")
     layers = []
     for layer in construction.layers:
         thermal = f"{layer.thickness:.4f} {layer.conductivity:.4g} {layer.density:.4g}"

@@ -17,6 +17,7 @@ from bim.to_tracer import window_groups
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.files import write_text
+from mitsuba_cfs.gloss import Gloss, radiance_material
 from mitsuba_cfs.surfaces import WindowGroup
 
 SKY = """# receivers of daylight: the ground, then the sky in Reinhart's patches
@@ -85,12 +86,12 @@ def write_radiance(
     folder.mkdir(parents=True, exist_ok=True)
     own = {window.guid for window in space.windows}
     outdoors = [element for element in building.elements if element.guid not in own]
-    values = {part.reflectance(band) for part in [*space.faces, *space.furniture, *outdoors]}
-    materials = _write(folder / "materials.rad", (_plastic(value) for value in sorted(values)))
-    inside = [*_parts(space.faces, band, inwards=True)]
-    inside += _parts(space.furniture, band, inwards=False, name="furniture")
+    materials = _Materials(band)
+    inside = [*_parts(space.faces, materials, inwards=True)]
+    inside += _parts(space.furniture, materials, inwards=False, name="furniture")
     room = _write(folder / "room.rad", inside)
-    scene = _write(folder / "outdoors.rad", _parts(outdoors, band, inwards=False))
+    scene = _write(folder / "outdoors.rad", _parts(outdoors, materials, inwards=False))
+    written = _write(folder / "materials.rad", materials.lines())
     windows, bsdfs = {}, {}
     for group, bsdf in [(g, None) for g in window_groups(space)] if filled is None else filled:
         name = identifier(group.name)
@@ -108,7 +109,7 @@ def write_radiance(
         f"rvu -vta -vp {_numbers(position)} -vd {_numbers(direction)} -vu 0 0 1 -vh 180 -vv 180"
     )
     view = _write(folder / "view.vf", [fisheye + "\n"])
-    return RadianceFiles(materials, room, scene, windows, bsdfs, sky, sensors, view)
+    return RadianceFiles(written, room, scene, windows, bsdfs, sky, sensors, view)
 
 
 def identifier(name: str) -> str:
@@ -121,22 +122,32 @@ def _write(path: Path, parts: Iterable[str]) -> Path:
     return path
 
 
-def _material(value: float) -> str:
-    return f"diffuse_{value:.6f}"
+class _Materials:
+    """Grey materials of a band by what they reflect, diffusely and like a mirror."""
 
+    def __init__(self, band: str) -> None:
+        self._band = band
+        self._names: dict[tuple[float, Gloss | None], str] = {}
 
-def _plastic(value: float) -> str:
-    """A grey diffuse material."""
-    return f"void plastic {_material(value)}\n0\n0\n5 {value:.6f} {value:.6f} {value:.6f} 0 0\n\n"
+    def of(self, part: Face | Element) -> str:
+        """Name of a part's material."""
+        key = part.reflectance(self._band), part.gloss
+        glossy = "" if part.gloss is None else f"_gloss_{len(self._names)}"
+        return self._names.setdefault(key, f"diffuse_{key[0]:.6f}{glossy}")
+
+    def lines(self) -> Iterable[str]:
+        """The materials that have been asked for."""
+        for (value, gloss), name in sorted(self._names.items(), key=lambda item: item[1]):
+            yield radiance_material(name, value, gloss) + "\n"
 
 
 def _parts(
-    parts: Iterable[Face | Element], band: str, *, inwards: bool, name: str = ""
+    parts: Iterable[Face | Element], materials: _Materials, *, inwards: bool, name: str = ""
 ) -> Iterable[str]:
     """Polygons of faces or elements; faces are turned to look into the room."""
     for number, part in enumerate(parts):
         triangles = part.triangles[:, ::-1] if inwards else part.triangles
-        material = _material(part.reflectance(band))
+        material = materials.of(part)
         whole = f"{name}{identifier(part.name)}.{number}"
         for index, triangle in enumerate(triangles):
             yield _polygon(material, f"{whole}.{index}", triangle)

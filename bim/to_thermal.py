@@ -212,7 +212,7 @@ def _surface(name: str, faces: list[Face], ground_level: float) -> OpaqueSurface
         faces[0].normal,
         OUTSIDE[faces[0].adjacency],
         emissivity_in=mean([face.emissivity for face in faces]),
-        absorptance_in=1.0 - mean([face.reflectance_solar for face in faces]),
+        absorptance_in=1.0 - mean([face.total_reflectance("solar") for face in faces]),
         height=max(height, 0.5),
     )
 

@@ -45,6 +45,7 @@ def _surfaces(parts: Iterable[Face | Element], band: str) -> Surfaces:
         np.repeat([part.reflectance(band) for part in parts], counts),
         np.repeat(np.arange(len(parts)), counts),
         tuple(part.name for part in parts),
+        tuple(part.gloss for part in parts) if any(part.gloss for part in parts) else (),
     )
 
 

@@ -1,23 +1,29 @@
-"""What the tracer knows of a building: opaque diffuse triangles, and windows in their groups."""
+"""What the tracer knows of a building: opaque triangles, and windows in their groups."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.directions import window_frame
+from mitsuba_cfs.gloss import Gloss
 
 
 @dataclass(frozen=True, slots=True)
 class Surfaces:
-    """Opaque triangles that reflect diffusely, the same on both sides, in one spectral band."""
+    """Opaque triangles that reflect alike on both sides, in one spectral band.
+
+    They reflect diffusely; a surface with a `Gloss` has that besides, and its diffuse reflectance
+    falls with what the gloss takes more towards grazing incidence.
+    """
 
     triangles: NDArray[np.float64]  # [N, 3, 3] vertices [m]
-    reflectance: NDArray[np.float64]  # [N] diffuse reflectance, 0 to 1
+    reflectance: NDArray[np.float64]  # [N] diffuse reflectance at normal incidence, 0 to 1
     surface: NDArray[np.int64]  # [N] index of the surface (axis F) that each triangle belongs to
     names: tuple[str, ...] = ()  # [F] name of each surface
+    gloss: tuple[Gloss | None, ...] = ()  # [F] of each surface; none of any where empty
 
     def __post_init__(self) -> None:
         n = len(self.triangles)
@@ -29,6 +35,12 @@ class Surfaces:
             )
         if n and not (np.min(self.reflectance) >= 0 and np.max(self.reflectance) <= 1):
             raise ValueError("reflectance: expected values from 0 to 1")
+        if self.gloss and n and len(self.gloss) <= np.max(self.surface):
+            raise ValueError(f"gloss: {len(self.gloss)} entries, one for each surface is expected")
+        for number, gloss in enumerate(self.gloss):
+            diffuse = np.max(self.reflectance[self.surface == number], initial=0.0)
+            if gloss is not None and diffuse + gloss.at_normal > 1 + 1e-6:
+                raise ValueError(f"surface {number}: reflects more than it gets")
 
     @classmethod
     def none(cls) -> Surfaces:
@@ -39,6 +51,24 @@ class Surfaces:
     def areas(self) -> NDArray[np.float64]:
         """Area of each triangle [N] [m2]."""
         return triangle_areas(self.triangles)
+
+    @property
+    def glossy(self) -> list[int]:
+        """Numbers of the surfaces that have a gloss."""
+        return [i for i, gloss in enumerate(self.gloss) if gloss and max(gloss.specular) > 0]
+
+    def without_diffuse(self) -> Surfaces:
+        """The same surfaces, of which only the gloss reflects."""
+        return replace(self, reflectance=np.zeros_like(self.reflectance))
+
+    def some(self, chosen: NDArray[np.bool_]) -> Surfaces:
+        """Some of the triangles; the surfaces keep their numbers."""
+        return replace(
+            self,
+            triangles=self.triangles[chosen],
+            reflectance=self.reflectance[chosen],
+            surface=self.surface[chosen],
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from bim.boundaries import ElementRecord, faces_and_windows, floor_area
+from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
@@ -75,7 +74,7 @@ def read_ifc(
     problems += more
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
-    elements, reflectances, faults = bounding_elements(
+    elements, finishes, faults = bounding_elements(
         source.model, source.walls, source.placed.rotation
     )
     problems += [*glass.problems, *faults]
@@ -85,9 +84,7 @@ def read_ifc(
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
         own = [a for a in glass.attachments if a.room == record.solid.guid]
         try:
-            space, more = _space(
-                index, own, records, around, elements=elements, reflectances=reflectances
-            )
+            space, more = _space(index, own, records, around, elements=elements, finishes=finishes)
         except (shapely.errors.ShapelyError, ValueError, RuntimeError) as error:
             what = f"room {record.solid.name}: its boundary cannot be built"
             problems.append(Problem(record.solid.guid, what, f"left out: {error}", "room"))
@@ -174,7 +171,7 @@ def _space(
     around: Surroundings,
     *,
     elements: Sequence[ElementRecord],
-    reflectances: NDArray[np.float64],
+    finishes: Finishes,
 ) -> tuple[Space, list[Problem]]:
     """The room of a record with its faces and windows, checked to be closed."""
     record = records[index]
@@ -184,7 +181,7 @@ def _space(
         Beyond((), "outside") if piece.role == "glass" else what_lies_beyond(piece, around, index)
         for piece in pieces
     ]
-    faces, windows, assumed = faces_and_windows(pieces, beyond, elements, reflectances)
+    faces, windows, assumed = faces_and_windows(pieces, beyond, elements, finishes)
     area = floor_area(faces)
     middles = None
     if record.stated_area is not None and not _agree(area, record.stated_area):

@@ -12,6 +12,8 @@
     select = 'IfcWall, material="Brick"'
     visible = 0.3
     solar = 0.35                # the visible one if left out
+    specular = 0.04             # like a mirror besides, at normal incidence; 0 if left out
+    roughness = 0.05            # of that, Radiance's (Ward's alpha); 0, a mirror, if left out
 
 Selectors choose by GUID, class, name, type, material, storey (location), property and more:
 https://docs.ifcopenshell.org/ifcopenshell-python/selector_syntax.html; and by CAD layer, which is
@@ -29,6 +31,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import ROUGHEST, Gloss, lacquer
 
 if TYPE_CHECKING:
     import ifcopenshell
@@ -44,6 +47,7 @@ class Paint:
     select: str
     visible: float
     solar: float
+    gloss: Gloss | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +79,12 @@ class Corrections:
         """STEP ids of the products that `keep` chooses."""
         return set().union(*(chosen(model, query, self.file) for query in self.keep))
 
-    def painted(self, model: ifcopenshell.file) -> dict[int, tuple[float, float]]:
-        """Visible and solar reflectance by STEP id; later entries win."""
-        result: dict[int, tuple[float, float]] = {}
+    def painted(self, model: ifcopenshell.file) -> dict[int, Paint]:
+        """The paint by STEP id; later entries win."""
+        result: dict[int, Paint] = {}
         for paint in self.paints:
             for step_id in chosen(model, paint.select, self.file):
-                result[step_id] = (paint.visible, paint.solar)
+                result[step_id] = paint
         return result
 
 
@@ -155,7 +159,19 @@ def _paint(entry: dict, path: Path) -> Paint:
     if "visible" not in entry:
         raise DataError("expected visible = 0 to 1", file=path, field="reflectance")
     visible = _share(entry["visible"], path, "visible")
-    return Paint(entry["select"], visible, _share(entry.get("solar", visible), path, "solar"))
+    solar = _share(entry.get("solar", visible), path, "solar")
+    specular = _share(entry.get("specular", 0.0), path, "specular")
+    roughness = _share(entry.get("roughness", 0.0), path, "roughness")
+    if roughness > ROUGHEST:
+        raise DataError(
+            f"expected 0 to {ROUGHEST:g}, got {roughness:g}", file=path, field="roughness"
+        )
+    if max(visible, solar) + specular > 1:
+        message = "expected at most 1 together with visible and with solar"
+        raise DataError(message, file=path, field="specular")
+    return Paint(
+        entry["select"], visible, solar, lacquer(specular, roughness) if specular else None
+    )
 
 
 def _share(value: object, path: Path, field: str) -> float:

@@ -10,7 +10,7 @@ import ifcopenshell
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.boundaries import ElementRecord
+from bim.boundaries import ElementRecord, Finishes
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE, SITE_REFLECTANCE
 from bim.ifc.materials import MaterialReader
 from bim.ifc.project import storey_of
@@ -22,18 +22,17 @@ SITE = ("IfcSite", "IfcGeographicElement")
 
 def bounding_elements(
     model: ifcopenshell.file, shapes: Sequence[Shape], rotation: NDArray[np.float64]
-) -> tuple[list[ElementRecord], NDArray[np.float64], list[Problem]]:
-    """Record of each shape, visible and solar reflectance [N, 2] of their triangles, problems.
-
-    A reflectance of -1 stands for none stated.
+) -> tuple[list[ElementRecord], Finishes, list[Problem]]:
+    """Record of each shape, what their triangles reflect, problems.
 
     Args: shapes: in world axes; rotation: [3, 3] from model axes to the world.
     """
     reader = MaterialReader(model)
     records = [_record(model.by_id(shape.step_id), reader, rotation) for shape in shapes]
     faults: dict[str, Problem] = {}
-    values = []
+    values, gloss = [], []
     for shape in shapes:
+        glosses = np.array([*(look.gloss for look in shape.looks), None], dtype=object)
         by_look = np.full((len(shape.looks) + 1, 2), -1.0)
         for i, look in enumerate(shape.looks):
             by_look[i] = GLASS_REFLECTANCE if look.is_glass else look.reflectances
@@ -41,10 +40,13 @@ def bounding_elements(
                 faults.setdefault(look.name, Problem(look.name, "surface style", look.fault))
         stated = reader.reflectances_of(model.by_id(shape.step_id))
         if stated is not None and not shape.transparent.any() and not shape.is_painted:
-            by_look[:] = stated
+            mirrored = np.array([0.0 if g is None else g.at_normal for g in glosses])
+            by_look[:] = np.maximum(np.array(stated) - mirrored[:, None], 0.0)
         values.append(by_look[shape.look])
+        gloss.append(glosses[shape.look])
     problems = [*reader.problems.values(), *faults.values()]
-    return records, np.concatenate(values or [np.empty((0, 2))]), problems
+    reflectances = np.concatenate(values or [np.empty((0, 2))])
+    return records, Finishes(reflectances, np.concatenate([np.empty(0, object), *gloss])), problems
 
 
 def _record(
@@ -93,19 +95,21 @@ def outdoor_elements(
         )  # fmt: skip
         for index in np.unique(shape.look):
             visible = solar = default
+            gloss = None
             if index >= 0:
                 look = shape.looks[index]
-                visible, solar = look.reflectances
-                if look.is_glass:
-                    visible = solar = GLASS_REFLECTANCE
+                (visible, solar), gloss = look.reflectances, look.gloss
+                if look.is_glass:  # what a pane mirrors is no diffuse light
+                    visible = solar = GLASS_REFLECTANCE if gloss is None else 0.0
             if reflectance is not None:
-                visible = solar = reflectance
+                visible, solar, gloss = reflectance, reflectance, None
             result.append(
                 replace(
                     base,
                     triangles=shape.triangles[shape.look == index],
                     reflectance_visible=visible,
                     reflectance_solar=solar,
+                    gloss=gloss,
                 )
             )
     return result

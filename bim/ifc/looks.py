@@ -1,4 +1,4 @@
-"""Reflectance and transparency of surfaces: measured values first, then the colours on screen."""
+"""Reflectance, gloss and transparency of surfaces: measured values first, then screen colours."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from dataclasses import dataclass
 import ifcopenshell
 
 from bim.defaults import HIGHEST_REFLECTANCE, LOWEST_REFLECTANCE
+from mitsuba_cfs.gloss import ROUGHEST, Gloss, dielectric, mirror, pane
 
 CLEAR = 0.25  # transparency from which a surface is glass
+SATIN = 0.1  # alpha of metal and plastic whose style states no highlight
+GLASS_INDEX = 1.52
 Colour = tuple[float, float, float]
 BLACK: Colour = (0.0, 0.0, 0.0)
 
@@ -24,6 +27,7 @@ class Look:
     transparency: float  # 0 opaque to 1 clear
     fault: str = ""  # what is wrong with the file's value, "" if nothing
     solar: float | None = None  # diffuse, solar; None: as visible
+    gloss: Gloss | None = None  # what it reflects like a mirror besides
 
     @property
     def reflectances(self) -> tuple[float, float]:
@@ -60,7 +64,46 @@ def look_of(
         transparency = transparency if given is None else float(given)
     bounded = min(max(value, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE)
     fault = "" if bounded == value else f"reflects {value:.2f}: taken as {bounded:.2f}"
-    return Look(label, bounded, min(max(float(transparency), 0.0), 1.0), fault)
+    transparency = min(max(float(transparency), 0.0), 1.0)
+    diffuse, gloss = _gloss(shading, bounded, transparency > CLEAR)
+    return Look(label, diffuse, transparency, fault, None, gloss)
+
+
+def _gloss(shading, reflectance: float, clear: bool) -> tuple[float, Gloss | None]:
+    """Diffuse reflectance and gloss of a shading that reflects so much in all.
+
+    ReflectanceMethod says what it is: a MIRROR or METAL has no diffuse part, GLASS and PLASTIC have
+    Fresnel's above it.  The other methods are ways to draw a highlight on a screen, which authoring
+    tools write for brick and plaster too: no gloss.
+    """
+    method = getattr(shading, "ReflectanceMethod", None)
+    if method not in ("MIRROR", "METAL", "GLASS", "PLASTIC"):
+        return reflectance, None
+    if method == "GLASS" and clear:
+        return reflectance, pane()
+    alpha = _roughness(shading, 0.0 if method in ("MIRROR", "GLASS") else SATIN)
+    if method in ("MIRROR", "METAL"):
+        specular = getattr(shading, "SpecularColour", None)
+        if specular is not None and specular.is_a("IfcColourRgb"):
+            reflectance = _luminance(_rgb(specular))
+        return 0.0, mirror(min(reflectance, 1.0), alpha)
+    gloss = dielectric(GLASS_INDEX, alpha)
+    return reflectance * (1 - gloss.at_normal), gloss
+
+
+def _roughness(shading: ifcopenshell.entity_instance, missing: float) -> float:
+    """Ward's alpha of a SpecularHighlight: a roughness as it is, an exponent n as (2 n)^-0.5.
+
+    Phong's cos^n about the mirror's direction falls as Ward's lobe does about the normal where
+    alpha^2 = 1 / (2 n).
+    """
+    highlight = getattr(shading, "SpecularHighlight", None)
+    if highlight is None:
+        return missing
+    value = float(highlight.wrappedValue)
+    if highlight.is_a("IfcSpecularExponent"):
+        value = (2 * value) ** -0.5 if value > 0 else missing
+    return min(max(value, 0.0), ROUGHEST)
 
 
 def _style_of(model: ifcopenshell.file, shading: ifcopenshell.entity_instance):

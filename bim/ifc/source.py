@@ -9,7 +9,7 @@ from pathlib import Path
 import ifcopenshell
 import numpy as np
 
-from bim.ifc.corrections import Corrections
+from bim.ifc.corrections import Corrections, Paint
 from bim.ifc.looks import Look
 from bim.ifc.placing import Placed, ground_level, in_world
 from bim.ifc.project import (
@@ -92,9 +92,9 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     )
     shapes, phantoms = judged_transparent(model, shapes)
     problems += more + site + faults + phantoms
-    for step_id, (visible, solar) in corrections.painted(model).items():
+    for step_id, paint in corrections.painted(model).items():
         if step_id in shapes:
-            shapes[step_id] = painted(shapes[step_id], visible, solar)
+            shapes[step_id] = painted(shapes[step_id], paint)
     if corrections.file:
         what = f"{len(removed)} products left out, {len(corrections.painted(model))} repainted"
         problems.append(Problem(corrections.file, "corrections are used", what))
@@ -105,12 +105,15 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     )  # fmt: skip
 
 
-def painted(shape: Shape, visible: float, solar: float) -> Shape:
-    """The shape with all that is not glass in one reflectance."""
+def painted(shape: Shape, paint: Paint) -> Shape:
+    """The shape with all that is not glass in one paint; of glass a gloss alone is taken."""
+    values = {"reflectance": paint.visible, "solar": paint.solar, "fault": "", "gloss": paint.gloss}
     looks = tuple(
-        look if look.is_glass else replace(look, reflectance=visible, solar=solar, fault="")
+        (replace(look, gloss=paint.gloss) if paint.gloss else look)
+        if look.is_glass
+        else replace(look, **values)
         for look in shape.looks
     )
-    plain = Look("correction", visible, 0.0, "", solar)
+    plain = Look("correction", paint.visible, 0.0, "", paint.solar, paint.gloss)
     index = np.where(shape.look < 0, len(looks), shape.look)
     return replace(shape, looks=(*looks, plain), look=index, is_painted=True)

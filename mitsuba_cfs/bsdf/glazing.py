@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
+from mitsuba_cfs.gloss import pane_shares
 
 # coefficients in cos(theta) of the transmittance of clear and bronze glass relative to normal
 # incidence, and of transmittance + reflectance: the shape that coated panes are given
@@ -52,26 +53,13 @@ def uncoated_values(
     """Transmittance and reflectance [..] of a plain pane of glass at `theta` [rad].
 
     Refractive index and absorption are those that give the two values at normal incidence; then
-    Fresnel's equations for either polarisation and all inner reflections, with
-    t = (1 - r)2 a / (1 - r2 a2), rho = r + r t a.
+    `mitsuba_cfs.gloss.pane_shares`.
     """
     surface = _normal_surface_reflectance(transmittance, reflectance)
     root = np.sqrt(surface)
     index = (1 + root) / (1 - root)
     passed = (reflectance / surface - 1) / transmittance if surface > 0 else transmittance
-    theta = np.asarray(theta, dtype=float)
-    cosine = np.cos(theta)
-    inner = np.sqrt(1 - (np.sin(theta) / index) ** 2)
-    absorbed = np.clip(passed, 1e-12, 1.0) ** (1 / inner)
-    taus, rhos = [], []
-    for r in (
-        ((cosine - index * inner) / (cosine + index * inner)) ** 2,
-        ((index * cosine - inner) / (index * cosine + inner)) ** 2,
-    ):
-        tau = (1 - r) ** 2 * absorbed / (1 - (r * absorbed) ** 2)
-        taus.append(tau)
-        rhos.append(r + r * absorbed * tau)
-    return np.mean(taus, axis=0), np.mean(rhos, axis=0)
+    return pane_shares(np.cos(np.asarray(theta, dtype=float)), index, passed)
 
 
 def _normal_surface_reflectance(transmittance: float, reflectance: float) -> float:

@@ -25,6 +25,8 @@ from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients, outdoors
 from mitsuba_cfs.trace.picture_sun import PictureSun
+from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sun_ways import shining
 
 SUN_BATCHES = 4  # of C_ds
 State = NDArray[np.int64]  # [G, L] state of each window group in each hour, or [L] of all groups
@@ -151,7 +153,7 @@ class PhaseLight:
         if not patches.any():
             return None, None
         at_sun = through_beams(self._traced.parts.groups[q : q + 1], ways, sky.direction)
-        daylight = self._traced.direct_daylight[q : q + 1]
+        daylight = self._traced.straight_daylight[q : q + 1]
         found = phases.sun_beams([optics.transmission], patches, at_sun, daylight, sky.sun)
         by_patch, by_angle = (beam[0].astype(np.float32) for beam in found)
         return by_patch, by_angle
@@ -315,9 +317,12 @@ class PhaseLight:
 
     def _shining(self) -> NDArray[np.int64]:
         """The hours L in which the sun stands before a window."""
-        groups = self._traced.scene.groups
-        facing = np.any([self.sky.direction @ g.frame[2] > 0 for g in groups], axis=0)
-        return np.flatnonzero(facing & (self.sky.illuminance > 0))
+        scene, lit = self._traced.scene, self.sky.illuminance > 0
+        facing = np.stack([g.frame[2] for g in scene.groups])
+        if scene.exterior.glossy:
+            outside = TracedScene(scene.exterior, scene.groups)
+            return np.flatnonzero(shining(outside, facing, self.sky.direction) & lit)
+        return np.flatnonzero(np.any(self.sky.direction @ facing.T > 0, axis=1) & lit)
 
     def _of_all(self, state: State | None) -> NDArray[np.float64]:
         """Illuminance of sensors and eye [S + 1, L] by all groups."""

@@ -17,6 +17,7 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, subdivided
 from mitsuba_cfs.methods.view_cache import kept_view
 from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
 from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.cell_daylight import cell_daylight
@@ -64,7 +65,7 @@ class PhaseScene:
             cache=self.cache,
             progress=self.progress if progress is None else progress,
         )
-        for name in ("parts", "daylight", "direct_daylight"):
+        for name in ("parts", "daylight", "direct_daylight", "straight_daylight"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
         return other
@@ -107,10 +108,17 @@ class PhaseScene:
 
     @cached_property
     def direct_daylight(self) -> NDArray[np.float64]:
-        """D_d [Q, K, P]: what comes straight from the sky; a part of D."""
+        """D_d [Q, K, P]: what comes straight from the sky, or by a smooth mirror; a part of D."""
         if not len(self.scene.exterior.triangles):  # nothing outdoors reflects
             return self.daylight.values
         return self._daylight(1, 0.2, 0.3).values
+
+    @cached_property
+    def straight_daylight(self) -> NDArray[np.float64]:
+        """D_d without what mirrors show."""
+        if not self.scene.exterior.glossy:
+            return self.direct_daylight
+        return self._daylight(1, 0.2, 0.3, replace(self.scene.exterior, gloss=())).values
 
     @cached_property
     def sensors(self) -> Estimate:
@@ -151,14 +159,16 @@ class PhaseScene:
         """What glare needs of the view."""
         return GlareView(self.scene.view)
 
-    def _daylight(self, depth: int, start: float, end: float) -> Estimate:
+    def _daylight(
+        self, depth: int, start: float, end: float, exterior: Surfaces | None = None
+    ) -> Estimate:
         chosen, parts = self.sampling, self.parts.groups
         samples, batches = chosen.patch_samples, BATCHES
         if len(parts) > len(self.scene.groups):  # at about the cost of the whole groups
             samples = samples * len(self.scene.groups) // len(parts)
             batches = PART_BATCHES
         return daylight_matrix(
-            self.scene.exterior,
+            self.scene.exterior if exterior is None else exterior,
             parts,
             subdivision=chosen.subdivision,
             samples=max(samples // batches, 1),

@@ -26,8 +26,8 @@ class StraightViews:
 
     is added to V T D s: patches of 10 to 15 degrees blur the sky that a sensor sees through a
     beam (11 % of a sensor's light beside a small opening), and means over a group the edges that
-    not all of its points see alike.  The three-phase method has it of cut groups alone: the
-    patches of the others are what it is.
+    not all of its points see alike, and the lobe of a glossy facade.  The three-phase method has it
+    of cut groups, and where there is gloss: the patches of the others are what it is.
     """
 
     def __init__(self, traced: PhaseScene, systems: Sequence[States]) -> None:
@@ -47,7 +47,7 @@ class StraightViews:
         Args: direct: without what the outdoors reflects.
         """
         traced = self._traced
-        sharp = traced.five_phase or len(traced.parts.of(g)) > 1
+        sharp = traced.five_phase or len(traced.parts.of(g)) > 1 or traced.scene.exterior.glossy
         if not sharp or not self.beam(g, j).any():
             return None
         direct = direct and len(traced.scene.exterior.triangles) > 0  # else nothing reflects

@@ -15,7 +15,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.random_walk import PathStarts, diffuse_direction
+from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
@@ -39,7 +39,7 @@ def _absorption_kernel(
         active &= hit.is_valid()
         group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
         surface = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, active)
-        position, face, reflectance = tracer.surface_at(hit, position, direction, active)
+        position, away, reflectance, _ = tracer.bounce(hit, position, direction, generator, active)
         last = depth + 1 >= max_depth
         slot = row * width + dr.select(group == OPAQUE, surface, F + mi.UInt32(group))
         absorbed = dr.select(last, 1.0, 1 - reflectance)
@@ -47,7 +47,7 @@ def _absorption_kernel(
         active &= ~last
 
         beta *= reflectance
-        direction = diffuse_direction(face, generator)
+        direction = away
         depth += 1
         survival = dr.select(depth > 3, dr.minimum(beta * 4.0, 1.0), 1.0)
         active &= (generator.next_float32() < survival) & (beta > 0)

@@ -323,6 +323,8 @@ class FivePhasePictures:
         values = np.ascontiguousarray(windows.T, dtype=np.float32)
         if seen is not None:
             seen.sun.add_to(values, suns, strength, seen.reflected @ sky)
+            if seen.rough is not None:
+                seen.rough.add_to(values, suns, strength)
         more = None
         if self._elements is not None:
             more = self._sun.on_elements(self._elements, suns, strength)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -18,7 +19,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.random_walk import PathStarts, diffuse_direction, roulette
+from mitsuba_cfs.trace.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
@@ -35,7 +36,8 @@ def add_daylight_paths(
     """Follow each path to the sky, where the patch it meets gains the product of reflectances.
 
     Panes before its own window (a screen behind them) a path passes, as it meets them from the
-    room's side; to what comes back from outdoors windows are black.
+    room's side; to what comes back from outdoors windows are black.  A path of one segment may have
+    one more by a smooth mirror, which shows the sky and the sun.
     """
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
@@ -51,13 +53,20 @@ def add_daylight_paths(
         active &= hit.is_valid()
         if active:
             passed = tracer.leaves(hit, direction, active)
-            position, face, reflectance = tracer.surface_at(hit, position, direction, active)
-            position = mi.Point3f(position - dr.select(passed, 2 * tracer.epsilon, 0.0) * face)
-            direction = dr.select(passed, direction, diffuse_direction(face, generator))
+            before, face, _ = tracer.surface_at(hit, position, direction, active)
+            beyond = mi.Point3f(before - 2 * tracer.epsilon * face)
+            after, away, reflectance, mirrored = tracer.bounce(
+                hit, position, direction, generator, active
+            )
+            position = dr.select(passed, beyond, after)
+            direction = dr.select(passed, direction, away)
             depth += dr.select(passed, mi.UInt32(0), mi.UInt32(1))
             alive, onwards = roulette(beta * reflectance, depth, generator)
             beta = dr.select(passed, beta, onwards)
-            active &= passed | (alive & (depth < max_depth))
+            within = depth < max_depth
+            if dr.hint(tracer.gloss is not None, mode="scalar"):
+                within |= mirrored & (depth == 1) & (max_depth == 1)
+            active &= passed | (alive & within)
 
 
 def daylight_matrix(
@@ -146,6 +155,8 @@ def sky_irradiance_matrix(
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    if max_depth == 1:  # what the sensor sees itself, mirrors are left to the rest
+        surfaces = replace(surfaces, gloss=())
     tracer = TracedScene(surfaces, centre=points.mean(axis=0))
     sky = SkyBins(ReinhartSky(subdivision))
     accepted = AcceptedDirections(acceptance)

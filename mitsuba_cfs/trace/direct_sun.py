@@ -22,6 +22,7 @@ from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_ent
 from mitsuba_cfs.trace.lit_room import PatchBeam
 from mitsuba_cfs.trace.sampling import lattice, lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
 BEAM_PLACES = 16  # polar angles in a patch, for the mean of a beam; a quarter as many azimuths
 DISC_STRATA = 16  # directions on the disc for each pair of sensor and sun, in each batch
@@ -101,10 +102,10 @@ class PluginScattering:
 
 @dataclass(frozen=True)
 class _SunScene:
-    """Both sides of the windows, the sensors and the suns."""
+    """The room, the way outdoors to the suns, the sensors and where the suns' light comes from."""
 
     inside: TracedScene
-    outside: TracedScene
+    way: SunWay
     place: mi.Point3f  # [S]
     normal: mi.Vector3f  # [S]
     towards: mi.Vector3f  # [Q]
@@ -142,7 +143,8 @@ def direct_sun_matrix(
 
     The sun is a disc of 0.533 degrees; where a slat, a wall or the window's edge hides part of it,
     that part is missing.  Light is scattered once, in the window; the room reflects nothing (the
-    five-phase method takes that from its other terms).
+    five-phase method takes that from its other terms).  A smooth mirror outdoors shows the sun a
+    second time.
 
     Args:
         interior: what can hide the windows from the sensors; exterior: the sun from the windows.
@@ -165,36 +167,37 @@ def direct_sun_matrix(
         raise ValueError("a BSDF plugin needs a `key` before its matrix can be kept in a cache")
     inside = TracedScene(interior, groups)
     outside = TracedScene(exterior, groups, windows_block=False)
-    around = _SunScene(
-        inside,
-        outside,
-        mi.Point3f((points - inside.centre).T.astype(np.float32)),
-        mi.Vector3f(directions.T.astype(np.float32)),
-        mi.Vector3f(suns.T.astype(np.float32)),
-    )
+    place = mi.Point3f((points - inside.centre).T.astype(np.float32))
+    normal = mi.Vector3f(directions.T.astype(np.float32))
+    ways = [
+        _SunScene(inside, way, place, normal, mi.Vector3f(way.turned(suns).T.astype(np.float32)))
+        for way in sun_ways(outside)
+    ]
 
     def batch(number: int) -> NDArray[np.float64]:
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
-        found = _through(around, scattering, key)
-        for g, way in enumerate(scattering):
-            if way is None:
-                continue
-            shared = _window_points(around, g, window_points, key)
-            found[g] += _scattered(inside, g, way, shared, around.towards, len(points))
+        found = [dr.zeros(mi.Float, len(points) * len(suns)) for _ in groups]
+        for around in ways:
+            found = [a + b for a, b in zip(found, _through(around, scattering, key), strict=True)]
+            for g, system in enumerate(scattering):
+                if system is None:
+                    continue
+                shared = _window_points(around, g, window_points, key)
+                found[g] += _scattered(inside, g, system, shared, around.towards, len(points))
         if not by_group:
             found = [sum(found)]
         values = np.stack([mi.Float(part * SUN_SOLID_ANGLE).numpy() for part in found])
         values = values.astype(float).reshape(len(found), len(points), len(suns))
         return values if by_group else values[0]
 
-    ways = [None if way is None else way.key for way in scattering]
+    keys = [None if system is None else system.key for system in scattering]
     return accumulate(
         batch,
         stopping=stopping,
         label="direct sun",
         progress=progress,
         entry=cache_entry(
-            cache, "direct sun", interior, exterior, groups, ways, points, directions, suns,
+            cache, "direct sun", interior, exterior, groups, keys, points, directions, suns,
             window_points, seed, by_group, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
@@ -265,8 +268,7 @@ def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) ->
         on_disc(dr.gather(mi.Vector3f, towards, sun), point, stream),
     )
     before = dr.dot(ray.d, mi.Vector3f(*map(float, inside.groups[group].frame[2]))) > 0
-    lit = before & ~around.outside.scene.ray_test(ray, coherent=False, active=before)
-    result = _Points(position, weight, outward, dr.select(lit, mi.Float(1), mi.Float(0)))
+    result = _Points(position, weight, outward, around.way.reaching(ray, before))
     dr.eval(result.position, result.weight, result.outward, result.sunlit)
     return result
 
@@ -317,7 +319,7 @@ def _through(
         group = dr.gather(mi.Int32, inside.group, hit.prim_index, active)
         active &= group != OPAQUE
         beyond = mi.Ray3f(mi.Point3f(start + direction * hit.t), direction)
-        active &= ~around.outside.scene.ray_test(beyond, coherent=False, active=active)
+        cosine *= around.way.reaching(beyond, active)
         local = inside.to_local(group, direction, active)
         active &= local.z > 0
         for g, system in enumerate(scattering):

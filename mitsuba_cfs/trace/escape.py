@@ -15,7 +15,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.random_walk import PathStarts, diffuse_direction, roulette
+from mitsuba_cfs.trace.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
@@ -151,8 +151,9 @@ def _add_escapes(
         active &= hit.is_valid()
         group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
         active &= group == OPAQUE
-        position, face, reflectance = tracer.surface_at(hit, position, direction, active)
-        direction = diffuse_direction(face, generator)
+        position, direction, reflectance, _ = tracer.bounce(
+            hit, position, direction, generator, active
+        )
         depth += 1
         alive, beta = roulette(beta * reflectance, depth, generator)
         active &= alive & (depth < max_depth)

@@ -17,7 +17,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.sampling import path_generator, pixel_places
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
-from mitsuba_cfs.trace.view_paths import add_view_paths
+from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
 PARTS = 3  # of a pixel's row: windows seen, their light on what is seen, the rest
@@ -168,6 +168,7 @@ def add_picture_paths(
     dr.scatter_add(matrix, mi.Float64(1.0), slot, glazed)
 
     position, face, reflectance = tracer.surface_at(hit, eye, direction, active)
+    mirrors = mi.PCG32(generator)  # a copy: the loop changes what it is given
     add_view_paths(
         tracer,
         bins,
@@ -181,6 +182,13 @@ def add_picture_paths(
         stream=mi.sample_tea_32(stream, mi.UInt32(0x1F123BB5))[0],
         generator=generator,
         max_depth=max_depth,
-        active=active,
+        active=mi.Bool(active),
         carried=None,
+        mirrored=None,
     )
+    if tracer.gloss is not None:
+        add_mirrored(
+            tracer, bins, matrix, hit, eye, direction,
+            row=row, later=2 * apart, beta=mi.Float(1), sample=sample, stream=stream,
+            generator=mirrors, max_depth=max_depth, active=active,
+        )  # fmt: skip

@@ -150,3 +150,4 @@ class LitRoom:
         self.inside = TracedScene(interior, groups)
         self.outside = TracedScene(exterior, groups)
         self.systems = tuple(systems)
+        self.glossy = self.inside.gloss is not None or self.outside.gloss is not None

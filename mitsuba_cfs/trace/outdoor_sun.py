@@ -19,6 +19,7 @@ from scipy import sparse
 from mitsuba_cfs.trace.picture_sun import LANES
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, place_and_hour, reflecting_places
+from mitsuba_cfs.trace.sun_ways import sun_ways
 
 GATHERED = 16  # places at most in each tile that what other surfaces reflect is taken from
 
@@ -87,12 +88,14 @@ class OutdoorSun:
             hour[self._shown] += luminance
 
     def _sunlight(self, places: Places, suns: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Cosine of the sun at places where it shines, else 0 [m, h]."""
-        point, normal, to_sun = place_and_hour(places, suns)
-        cosine = dr.dot(normal, to_sun)
-        lit = cosine > 0
-        lit &= ~self._outside.met_outdoors(point, to_sun, lit)[0].is_valid()
-        return dr.select(lit, cosine, 0.0).numpy().reshape(places.size, len(suns))
+        """Cosine of the sun at places where it shines, also out of mirrors, else 0 [m, h]."""
+        light = mi.Float(0)
+        for way in sun_ways(self._outside):
+            point, normal, to_sun = place_and_hour(places, way.turned(suns))
+            cosine = dr.dot(normal, to_sun)
+            share = way.reaching(mi.Ray3f(point, to_sun), cosine > 0)
+            light += dr.select(cosine > 0, cosine * share, 0.0)
+        return light.numpy().reshape(places.size, len(suns))
 
 
 def _reflecting(

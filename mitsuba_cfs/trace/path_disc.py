@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
+from mitsuba_cfs.trace.path_sun import by_plane, straight_to_sky
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
     disc_in_view,
@@ -17,7 +20,7 @@ from mitsuba_cfs.trace.picture_disc import (
     disc_rays,
     disc_reach,
 )
-from mitsuba_cfs.trace.point_in_time import straight_to_sky
+from mitsuba_cfs.trace.scene import TracedScene
 
 DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
 
@@ -44,14 +47,53 @@ def with_disc(
 
 def add_disc(picture: NDArray[np.float64], room: LitRoom, sky: Sky, view: View) -> None:
     """Add the disc seen through the straight beam to pixels [ny * nx], by its share of each."""
-    sun, size = sky.sun.numpy().ravel(), pixel_size(view)
+    sun = sky.sun.numpy().ravel()
+    _add(picture, sky, view, sun, lambda ways: _straight(room, view, ways))
+
+
+def add_mirrored_discs(picture: NDArray[np.float64], room: LitRoom, sky: Sky, view: View) -> None:
+    """Add the discs that smooth mirrors show to pixels [ny * nx]."""
+    sun = sky.sun.numpy().ravel()
+    for tracer in (room.inside, room.outside):
+        for plane in [] if tracer.gloss is None else tracer.gloss.mirrors:
+            normal = tracer.gloss.normals[plane]
+            turned = sun - 2 * (sun @ normal) * normal
+            _add(picture, sky, view, turned, _by_plane(room, view, tracer, int(plane)))
+
+
+def _by_plane(
+    room: LitRoom, view: View, tracer: TracedScene, plane: int
+) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
+    """Transmittance [n] of ways [n, 3] from the eye by a mirror plane to the sky."""
+    normal = tracer.gloss.normals[plane]
+
+    def shown(ways: NDArray[np.float64]) -> NDArray[np.float32]:
+        onwards = ways - 2 * (ways @ normal)[:, None] * normal
+        towards, beyond = (mi.Vector3f(v.T.astype(np.float32)) for v in (ways, onwards))
+        return by_plane(
+            room, tracer, mi.Int32(plane), eye_of(room, view), towards, onwards=beyond,
+            outdoors=mi.Bool(False), active=dr.full(mi.Bool, True, len(ways)),
+        ).numpy()  # fmt: skip
+
+    return shown
+
+
+def _add(
+    picture: NDArray[np.float64],
+    sky: Sky,
+    view: View,
+    sun: NDArray[np.float64],
+    passed: Callable[[NDArray[np.float64]], NDArray[np.float32]],
+) -> None:
+    """Add a disc round `sun`; `passed`: what of its radiance comes from each direction."""
+    size = pixel_size(view)
     directions, counts = pixel_directions(view)
     shown = np.flatnonzero(counts.reshape(-1))
     near = shown[directions.reshape(-1, 3)[shown] @ sun > np.cos(disc_reach(size))]
     pixel, way, share = disc_rays(view, near, np.tile(sun, (len(near), 1)), size, step=DISC_STEP)
     if not len(pixel) or not sky.sun_radiance.numpy()[0]:
         return
-    seen = np.bincount(pixel, _straight(room, view, way), minlength=len(near))
+    seen = np.bincount(pixel, passed(way), minlength=len(near))
     picture[near] += seen * share * sky.sun_radiance.numpy()[0]
 
 

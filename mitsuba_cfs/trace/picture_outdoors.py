@@ -22,6 +22,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, RoughSun, mirrored
 from mitsuba_cfs.trace.outdoor_sun import OutdoorSun, ShownFaces
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.random_walk import PathStarts
@@ -33,6 +34,7 @@ BLOCK_BYTES = 128 * 2**20
 PATCH_POINTS = 16  # directions in each window patch, for its mean transmittance
 MAX_DEPTH = 16
 RAYS = 2**20  # at once
+_Met = tuple[Lanes, NDArray[np.int64], NDArray[np.float32], Places]  # and triangle, reflectance
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class OutdoorCoefficients:
     reflected: sparse.csr_array  # [C, P] irradiance of the faces in each tile
     beam: NDArray[np.float64]  # [G, K] transmittance of the beam, mean over each window patch
     sun: OutdoorSun
+    rough: RoughSun | None = None  # the sun on rough gloss
 
 
 def outdoors(
@@ -75,16 +78,22 @@ def outdoors(
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     faces = face_numbers(outside.surface.numpy(), outside.normal.numpy().T)
     rays_at_once = max(256, RAYS // samples)
-    free, shown = [], []
+    free, shown, rough = [], [], []
     for start in range(0, len(pixels), rays_at_once):
         block = pixels[start : start + rays_at_once]
         lanes = _through_windows(inside, scattering, view, block, samples)
         if not len(lanes.row):
             free.append(sparse.csr_array((len(block), sky.size), dtype=np.float32))
             continue
-        rows, met = _looked_at(outside, sky, lanes, len(block))
+        rows = sparse.csr_array((len(block), sky.size), dtype=np.float32)
+        for bounce in range(MOST_MIRRORS + 1):
+            if not len(lanes.row):
+                break
+            seen, met, lanes = _looked_at(outside, sky, lanes, len(block), bounce)
+            rows = rows + seen
+            shown.append(_with_faces(met, block, start, faces, Tiles(tile, view.width)))
+            rough += _rough_faces(outside, met, start)
         free.append(rows)
-        shown.append(_with_faces(met, block, start, faces, Tiles(tile, view.width)))
     found, keys = _joined(shown)
     count = np.bincount(found.tile, minlength=len(keys))
     smooth = smoothing(Tiles(tile, view.width), keys, count)
@@ -95,23 +104,8 @@ def outdoors(
         sparse.csr_array(reflected.astype(np.float32)),
         _beams(scattering, basis),
         sun,
+        RoughSun(outside, RoughFaces.joined(rough)) if rough else None,
     )
-
-
-@dataclass(frozen=True)
-class _Lanes:
-    """Rays of a block's pixels through windows."""
-
-    row: NDArray[np.int64]  # [r] of the pixel in its block
-    origin: NDArray[np.float32]  # [3, r]
-    way: NDArray[np.float32]  # [3, r]
-    weight: NDArray[np.float64]  # [r] transmittance over the number of the pixel's rays
-
-    def some(self, chosen: NDArray) -> _Lanes:
-        """Some of them."""
-        return _Lanes(
-            self.row[chosen], self.origin[:, chosen], self.way[:, chosen], self.weight[chosen]
-        )
 
 
 def _through_windows(
@@ -120,19 +114,33 @@ def _through_windows(
     view: View,
     pixels: NDArray[np.int64],
     samples: int,
-) -> _Lanes:
+) -> Lanes:
     """Rays of a block's pixels that meet a window and go straight on."""
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - inside.centre))
+    eye = np.asarray(view.position) - inside.centre
     row = np.repeat(np.arange(len(pixels)), samples)
     number = pixels[row]
     dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
     x = (number % view.width + dx) / view.width
     y = 1.0 - (number // view.width + dy) / view.height
     directions, exists = rays(view, x, y)
-    way = mi.Vector3f(directions.T.astype(np.float32))
-    hit = inside.scene.ray_intersect_preliminary(
-        mi.Ray3f(eye, way), coherent=True, active=mi.Bool(exists)
-    )
+    start = np.tile(eye[:, None], len(row)).astype(np.float32)
+    share = np.full(len(row), 1.0 / samples)
+    lanes = Lanes(row, start, directions.T.astype(np.float32), share).some(np.flatnonzero(exists))
+    found = []
+    for bounce in range(MOST_MIRRORS + 1):
+        if not len(lanes.row):
+            break
+        passed, lanes = _passed(inside, scattering, lanes, bounce)
+        found.append(passed)
+    return Lanes.joined(found)
+
+
+def _passed(
+    inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes, bounce: int
+) -> tuple[Lanes, Lanes]:
+    """Rays that go straight on through windows, and those that go on by glossy surfaces."""
+    origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
+    hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=not bounce)
     active = hit.is_valid()
     group = dr.gather(mi.Int32, inside.group, hit.prim_index, active)
     active &= group != OPAQUE
@@ -141,29 +149,43 @@ def _through_windows(
     for g, system in enumerate(scattering):
         seen = active & (group == g) & (local.z > 0)
         weight = dr.select(seen, system.through(local), weight)
-    weight = weight.numpy() / samples
-    lit = np.flatnonzero(weight > 0)
-    place = mi.Point3f(eye + way * hit.t).numpy()[:, lit].astype(np.float32)
-    return _Lanes(row[lit], place, directions[lit].T.astype(np.float32), weight[lit].astype(float))
+    tau = np.broadcast_to(weight.numpy(), len(lanes.row)).astype(float)
+    lit = np.flatnonzero(tau > 0)
+    place = mi.Point3f(origin + way * hit.t).numpy()[:, lit].astype(np.float32)
+    passed = Lanes(lanes.row[lit], place, lanes.way[:, lit], (lanes.weight * tau)[lit])
+    return passed, mirrored(inside, lanes, hit, bounce)
 
 
 def _looked_at(
-    outside: TracedScene, sky: SkyBins, lanes: _Lanes, count: int
-) -> tuple[sparse.csr_array, tuple[_Lanes, NDArray[np.int64], NDArray[np.float32], Places]]:
-    """Rows [count, P] of what is sky; the other lanes, their triangles, reflectances and places."""
+    outside: TracedScene, sky: SkyBins, lanes: Lanes, count: int, bounce: int
+) -> tuple[sparse.csr_array, _Met, Lanes]:
+    """Rows [count, P] of what is sky; what the other lanes met; lanes that go on by its gloss."""
     origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
     hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
     found = hit.is_valid()
-    rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, found).numpy()
+    face = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, found)
+    rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found).numpy()
     places = face_places(outside, origin, way, hit, found)
     met, patch = found.numpy(), sky.index(way).numpy().astype(np.int64)
     entries = lanes.weight[~met].astype(np.float32), (lanes.row[~met], patch[~met])
     rows = sparse.csr_array(sparse.coo_array(entries, shape=(count, sky.size)))
     prim = hit.prim_index.numpy().astype(np.int64)[met]
-    return rows, (lanes.some(met), prim, rho[met], places.some(met))
+    onwards = mirrored(outside, lanes, hit, bounce)
+    return rows, (lanes.some(met), prim, rho[met], places.some(met)), onwards
 
 
-def _with_faces(met, block: NDArray, start: int, faces: NDArray, tiles: Tiles) -> ShownFaces:
+def _rough_faces(outside: TracedScene, met: _Met, start: int) -> list[RoughFaces]:
+    """Those of the faces that rays met whose gloss is rough."""
+    lanes, prim, _, places = met
+    if outside.gloss is None or not len(prim):
+        return []
+    alpha = outside.gloss.roughness(mi.UInt32(prim.astype(np.uint32)), mi.Bool(True)).numpy()
+    chosen = np.flatnonzero(alpha > 0)
+    some = lanes.some(chosen)
+    return [RoughFaces(start + some.row, some.weight, prim[chosen], some.way, places.some(chosen))]
+
+
+def _with_faces(met: _Met, block: NDArray, start: int, faces: NDArray, tiles: Tiles) -> ShownFaces:
     """What a block's rays met, by face and tile."""
     lanes, prim, rho, places = met
     tile = tiles.of_pixels(block[lanes.row], faces[prim])

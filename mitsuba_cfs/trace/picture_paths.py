@@ -24,7 +24,9 @@ from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
-from mitsuba_cfs.trace.path_disc import add_disc, eye_of
+from mitsuba_cfs.trace.path_disc import add_disc, add_mirrored_discs, eye_of
+from mitsuba_cfs.trace.path_sun import Vertex, on_disc
+from mitsuba_cfs.trace.picture_gloss import shown_sharp
 from mitsuba_cfs.trace.picture_sharing import (
     STEPS,
     SharedLight,
@@ -32,14 +34,7 @@ from mitsuba_cfs.trace.picture_sharing import (
     face_numbers,
     tile_size,
 )
-from mitsuba_cfs.trace.point_in_time import (
-    Vertex,
-    add_paths,
-    leave,
-    on_disc,
-    sun_at,
-    window_parts,
-)
+from mitsuba_cfs.trace.point_in_time import add_paths, leave, window_parts, window_sun
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixel_places
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
@@ -88,6 +83,7 @@ def point_in_time_picture(
             rows.append(light.by_tile(pixels, samples, tiles))
         progress("picture", (start + len(pixels)) / len(shown))
     _add_shared(picture, tiles, pairs, rows, numbers.windows)
+    add_mirrored_discs(picture, room, sky, view)
     if disc:
         add_disc(picture, room, sky, view)
     return picture.astype(np.float32).reshape(view.height, view.width)
@@ -260,10 +256,12 @@ class _Kernel:
         normal = dr.gather(mi.Vector3f, inside.normal, hit.prim_index, opaque)
         behind = dr.dot(normal, direction) > 0
         normal = dr.select(behind, -normal, normal)
-        rho = dr.gather(mi.Float, inside.reflectance, hit.prim_index, opaque) * dr.inv_pi
+        rho = inside.diffuse(hit.prim_index, -dr.dot(normal, direction), opaque)
         vertex = Vertex(mi.Point3f(point + normal * inside.epsilon), normal, indoors)
-        sharp = mi.Float64(rho * sun_at(room, sky, vertex, u_sun, opaque))
-        sharp = dr.select(opaque, sharp, 0.0)
+        sharp = shown_sharp(
+            room, sky, vertex, hit.prim_index, direction,
+            rho=rho, u_sun=u_sun, generator=generator, depth=self._depth, active=opaque,
+        )  # fmt: skip
         away, aimed = leave(room, sky, vertex, u, choice, opaque)
         cosine = dr.select(opaque, dr.dot(away, normal), 0.0)
 
@@ -278,6 +276,11 @@ class _Kernel:
         sunlit &= ~room.outside.scene.ray_test(mi.Ray3f(outer, towards), False, sunlit)
         sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
         sharp += dr.select(sunlit, mi.Float64(sun), 0.0)
+        if room.glossy:
+            more = window_sun(
+                room, sky, outer, group, direction, generator=generator, glazed=glazed
+            )
+            sharp += dr.select(glazed, mi.Float64(more), 0.0)
         outward = glazed & (dr.dot(step, onwards) > 0)
 
         # ----- The paths whose light is shared -----
@@ -289,12 +292,13 @@ class _Kernel:
         )  # fmt: skip
         add_paths(
             room, sky, found, starts,
-            cosine=cosine, aimed=aimed & opaque, beta=dr.select(opaque, 1.0, rest),
-            outdoors=outward,
+            cosine=cosine, came=cosine * dr.inv_pi, aimed=aimed & opaque,
+            beta=dr.select(opaque, 1.0, rest), outdoors=outward,
         )  # fmt: skip
         face = self._faces.inside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(group))
-        weight = dr.select(opaque, rho, dr.select(glazed & self._scatters(group), 1.0, 0.0))
+        scattering = dr.select(glazed & self._scatters(group), 1.0, 0.0)
+        weight = dr.select(opaque, rho * dr.inv_pi, scattering)
         shared = [(face, weight, found)]
 
         # ----- Straight on, and back by the mirror -----
@@ -309,7 +313,8 @@ class _Kernel:
             )
             add_paths(
                 room, sky, seen, starts,
-                cosine=mi.Float(0), aimed=mi.Bool(False), beta=mirrored, outdoors=mi.Bool(False),
+                cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Bool(False), beta=mirrored,
+                outdoors=mi.Bool(False),
             )  # fmt: skip
             sharp += seen
         return sharp, shared
@@ -348,10 +353,12 @@ class _Kernel:
         normal = dr.select(behind, -normal, normal)
         place = mi.Point3f(origin + direction * hit.t + normal * room.inside.epsilon)
         vertex = Vertex(place, normal, outdoors)
-        rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, opaque) * dr.inv_pi
+        rho = outside.diffuse(hit.prim_index, -dr.dot(normal, direction), opaque)
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
-        sun = sun_at(room, sky, vertex, u_sun, opaque)
-        sharp += dr.select(opaque, mi.Float64(straight * rho * sun), 0.0)
+        sharp += straight * shown_sharp(
+            room, sky, vertex, hit.prim_index, direction,
+            rho=rho, u_sun=u_sun, generator=generator, depth=self._depth, active=opaque,
+        )  # fmt: skip
         away, _ = leave(room, sky, vertex, u, mi.Float(1), opaque)
         # a surface's irradiance is pi times the mean by cosine; another window is looked into
         found = dr.zeros(mi.Float64, dr.width(lane))
@@ -362,10 +369,10 @@ class _Kernel:
         )  # fmt: skip
         add_paths(
             room, sky, found, starts,
-            cosine=mi.Float(0), aimed=mi.Bool(False), beta=dr.select(opaque, dr.pi, 1.0),
-            outdoors=outdoors,
+            cosine=mi.Float(0), came=dr.select(opaque, dr.dot(away, normal) * dr.inv_pi, 0.0),
+            aimed=mi.Bool(False), beta=dr.select(opaque, dr.pi, 1.0), outdoors=outdoors,
         )  # fmt: skip
         face = self._faces.outside(hit.prim_index, behind, opaque)
         face = dr.select(opaque, face, mi.UInt32(self._faces.windows - 1))
-        weight = dr.select(active, straight * dr.select(opaque, rho, 1.0), 0.0)
+        weight = dr.select(active, straight * dr.select(opaque, rho * dr.inv_pi, 1.0), 0.0)
         return sharp, (face, weight, found)

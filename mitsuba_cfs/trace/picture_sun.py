@@ -28,6 +28,7 @@ from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.sun_paths import on_disc_of, place_and_hour
+from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
 WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
@@ -50,13 +51,21 @@ class PictureSun:
         view: View,
         *,
         basis: KlemsBasis = KLEMS_FULL,
+        way: SunWay | None = None,
     ) -> None:
-        """Find what each pixel shows; arguments as for `direct_sun_matrix`."""
+        """Find what each pixel shows; arguments as for `direct_sun_matrix`.
+
+        Args: way: to the sun; by default the straight one, and then all mirrors outdoors besides.
+        """
         if len(scattering) != len(groups):
             raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
         self._inside = TracedScene(interior, groups)
         self._outside = TracedScene(exterior, groups, windows_block=False)
-        self._free = len(exterior.triangles) == 0  # nothing stands before the windows
+        self._way = SunWay(self._outside) if way is None else way
+        self._free = self._way.free
+        around = interior, exterior, groups, scattering, view
+        mirrors = sun_ways(self._outside)[1:] if way is None else []
+        self._mirrors = [PictureSun(*around, basis=basis, way=mirror) for mirror in mirrors]
         self._scattering, self._bins = tuple(scattering), DirectionBins(basis)
         self._view = view
         directions, counts = pixel_directions(view)
@@ -78,7 +87,7 @@ class PictureSun:
         face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid)
         face = dr.mulsign(face, -dr.dot(face, direction))
         place = self._eye + direction * hit.t + face * tracer.epsilon
-        reflectance = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, valid)
+        reflectance = tracer.diffuse(hit.prim_index, -dr.dot(face, direction), valid)
         dull = valid & (group == OPAQUE) & (reflectance > 0)
         self._surface = np.flatnonzero(dull.numpy())
         chosen = mi.UInt32(self._surface.astype(np.uint32))
@@ -104,6 +113,14 @@ class PictureSun:
 
         Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
         """
+        for mirror in self._mirrors:
+            mirror.add_to(values, suns, illuminance)
+            mirror.add_disc(values, suns, illuminance)
+        suns, illuminance = self._turned(suns, illuminance)
+        for plane in [] if self._inside.gloss is None else self._inside.gloss.mirrors:
+            normal = self._inside.gloss.normals[plane]
+            shown = suns - 2 * (suns @ normal)[:, None] * normal
+            self._add_disc(values, shown, illuminance, int(plane))
         lit = self._shining(suns, illuminance)
         if not len(lit):
             return
@@ -117,6 +134,7 @@ class PictureSun:
     ) -> NDArray[np.float32]:
         """Luminance [m, h] of a picture's rows by the sun that parts of the room reflect."""
         found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
+        suns, illuminance = self._turned(suns, illuminance)
         lit, places = self._shining(suns, illuminance), elements.places
         if not places.size or not len(lit):
             return found
@@ -130,14 +148,19 @@ class PictureSun:
             found[:, hours] = elements.rows(light * illuminance[hours].astype(np.float32))
         return found
 
+    def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:
+        """Where the light of suns comes from, and its illuminance: 0 with the sun down."""
+        return self._way.turned(suns), np.where(suns[:, 2] > 0, illuminance, 0.0)
+
     def _shining(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.int64]:
         """The hours in which the sun stands before a window."""
         facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
-        return np.flatnonzero(facing & (illuminance > 0) & (suns[:, 2] > 0))
+        return np.flatnonzero(facing & (illuminance > 0))
 
     def discs(self, suns: NDArray, illuminance: NDArray) -> list[SunDisc | None]:
         """The sun's disc [h] as the eye sees it through the straight beam, None where hidden."""
         found: list[SunDisc | None] = [None] * len(suns)
+        suns, illuminance = self._turned(suns, illuminance)
         lit = self._shining(suns, illuminance)
         lit = lit[self._tree.query(suns[lit])[0] < self._size] if len(lit) else lit
         if not len(lit):
@@ -224,8 +247,7 @@ class PictureSun:
         if not self._free:
             beyond = mi.Ray3f(mi.Point3f(place + to_sun * hit.t), to_sun)
             active &= tau > 0
-            hidden = self._outside.scene.ray_test(beyond, coherent=True, active=active)
-            tau = dr.select(hidden, 0.0, tau)
+            tau *= self._way.reaching(beyond, active, coherent=True)
         return tau
 
     def _scattered_in_panes(self, pixel, hour, suns, light, g: int) -> mi.Float:
@@ -233,11 +255,11 @@ class PictureSun:
         _, place, towards = self._panes[g]
         to_sun = on_disc_of(dr.gather(mi.Vector3f, suns, hour), pixel)
         local = self._inside.to_group(g, to_sun)
-        lit = local.z > 0
+        lit, share = local.z > 0, mi.Float(1)
         if not self._free:
             ray = mi.Ray3f(dr.gather(mi.Point3f, place, pixel), to_sun)
-            lit &= ~self._outside.scene.ray_test(ray, coherent=True, active=lit)
-        f = self._scattering[g].scattered(local, dr.gather(mi.Vector3f, towards, pixel))
+            share = self._way.reaching(ray, lit, coherent=True)
+        f = share * self._scattering[g].scattered(local, dr.gather(mi.Vector3f, towards, pixel))
         return dr.select(lit, f * local.z * dr.gather(mi.Float, light, hour), 0.0)
 
     def scattered_luminance(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.float32]:
@@ -247,7 +269,10 @@ class PictureSun:
         """
         K, h, G = self._bins.size, len(suns), len(self._panes)
         result = np.zeros((G, K, h), dtype=np.float32)
-        strength = np.where((suns[:, 2] > 0) & (illuminance > 0), illuminance, 0.0)
+        for mirror in self._mirrors:
+            result += mirror.scattered_luminance(suns, illuminance)
+        suns, illuminance = self._turned(suns, illuminance)
+        strength = np.maximum(illuminance, 0.0)
         if not strength.any():
             return result
         towards = mi.Vector3f(suns.T.astype(np.float32))
@@ -262,7 +287,7 @@ class PictureSun:
             local = self._inside.to_group(g, to_sun)
             f = dr.select(local.z > 0, system.scattered(local, outward) * local.z, 0.0)
             mean = f.numpy().reshape(K, PATCH_POINTS, h).mean(axis=1)
-            result[g] = mean * (strength * self._sunlit_share(g, towards))
+            result[g] += mean * (strength * self._sunlit_share(g, towards))
         return result
 
     def _sunlit_share(self, g: int, suns: mi.Vector3f) -> NDArray[np.float64] | float:
@@ -276,12 +301,18 @@ class PictureSun:
         )
         step = mi.Vector3f(*map(float, self._inside.groups[g].frame[2])) * self._inside.epsilon
         ray = mi.Ray3f(place + step, dr.gather(mi.Vector3f, suns, hour))
-        hidden = self._outside.scene.ray_test(ray, coherent=False)
-        return 1.0 - hidden.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
+        seen = self._way.reaching(ray, dr.full(mi.Bool, True, dr.width(lane)))
+        return seen.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
 
     def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
         """Add the disc as the eye sees it, by its share of each pixel; arguments of `add_to`."""
-        lit = self._shining(suns, illuminance)
+        self._add_disc(values, *self._turned(suns, illuminance), None)
+
+    def _add_disc(
+        self, values: NDArray, suns: NDArray, illuminance: NDArray, mirror: int | None
+    ) -> None:
+        """Add the disc that stands at `suns`, or that a mirror plane of the room shows there."""
+        lit = self._shining(suns, illuminance) if mirror is None else np.flatnonzero(illuminance)
         suns, strength = suns[lit], illuminance[lit]
         reach = 2 * np.sin(disc_reach(self._size) / 2)
         near = self._tree.query_ball_point(suns, reach)
@@ -292,7 +323,23 @@ class PictureSun:
         pair, way, share = disc_rays(self._view, self.pixels[pixel], suns[hour], self._size)
         if not len(pair):
             return
-        way = mi.Vector3f(way.T.astype(np.float32))
-        tau = self._straight(mi.Point3f(self._eye), way, mi.Bool(True)).numpy()
+        towards = mi.Vector3f(way.T.astype(np.float32))
+        if mirror is None:
+            tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
+        else:
+            tau = self._by_mirror(towards, mirror).numpy()
         seen = np.bincount(pair, tau, minlength=len(hour)) * share
         np.add.at(values, (lit[hour], pixel), seen * strength[hour] / SUN_SOLID_ANGLE)
+
+    def _by_mirror(self, towards: mi.Vector3f, plane: int) -> mi.Float:
+        """Share of the sun that comes to the eye by a mirror plane of the room."""
+        gloss, normal = self._inside.gloss, mi.Vector3f(*self._inside.gloss.normals[plane])
+        ray = mi.Ray3f(mi.Point3f(self._eye), towards)
+        hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True)
+        met = hit.is_valid()
+        met &= gloss.plane_of(hit.prim_index, met) == plane
+        normal = dr.mulsign(normal, -dr.dot(normal, towards))
+        cosine = -dr.dot(normal, towards)
+        place = mi.Point3f(ray.o + towards * hit.t + normal * self._inside.epsilon)
+        tau = self._straight(place, mi.Vector3f(towards + normal * (2 * cosine)), met)
+        return tau * gloss.specular(hit.prim_index, cosine, met)

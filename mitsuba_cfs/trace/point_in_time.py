@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -12,9 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.lit_room import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.path_sun import (
+    Vertex,
+    leave_by_gloss,
+    on_disc,
+    sun_at,
+    sun_images,
+    surface_sun,
+)
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import path_generator
 from mitsuba_cfs.trace.scene import OPAQUE
@@ -26,14 +33,6 @@ CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that pa
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
 
-class Vertex(NamedTuple):
-    """A point of a diffuse surface that a path goes on from."""
-
-    position: mi.Point3f
-    normal: mi.Vector3f  # towards where the path came from
-    outdoors: mi.Bool
-
-
 def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
     """What a plugin needs to know of a ray along `direction` that meets a window from the room."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
@@ -42,50 +41,6 @@ def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.Surfac
     si.sh_frame = mi.Frame3f(normal)
     si.wi = si.to_local(-direction)
     return si
-
-
-def on_disc(sky: Sky, u: mi.Point2f) -> mi.Vector3f:
-    """A direction uniform on the sun's disc."""
-    local = mi.warp.square_to_uniform_cone(u, float(np.cos(SUN_RADIUS)))
-    return mi.Frame3f(sky.sun).to_world(local)
-
-
-def straight_to_sky(
-    room: LitRoom,
-    position: mi.Point3f,
-    towards: mi.Vector3f,
-    outdoors: mi.Bool,
-    active: mi.Bool,
-) -> mi.Float:
-    """Transmittance of the straight way to the sky: 1 outdoors, a window's beam; 0 if hidden."""
-    ray = mi.Ray3f(position, towards)
-    tau = mi.Float(1)
-    if any(system.beam is not None for system in room.systems):
-        indoors = active & ~outdoors
-        hit = room.inside.scene.ray_intersect_preliminary(ray, coherent=False, active=indoors)
-        group = dr.gather(mi.Int32, room.inside.group, hit.prim_index, indoors & hit.is_valid())
-        glazed = indoors & hit.is_valid() & (group != OPAQUE)
-        straight = mi.Float(0)
-        for g, system in enumerate(room.systems):
-            beam = system.straight(room.inside.to_group(g, towards))
-            straight = dr.select(glazed & (group == g), beam, straight)
-        tau = dr.select(outdoors, 1.0, straight)
-        beyond = position + towards * hit.t + room.inside.outward(group, glazed)
-        ray.o = dr.select(outdoors, position, mi.Point3f(beyond))
-        active &= tau > 0
-    else:
-        active &= outdoors
-    free = active & ~room.outside.scene.ray_test(ray, coherent=False, active=active)
-    return dr.select(free, tau, 0.0)
-
-
-def sun_at(room: LitRoom, sky: Sky, vertex: Vertex, u: mi.Point2f, active: mi.Bool) -> mi.Float:
-    """Irradiance straight from the sun: outdoors, or in the room through a window's beam."""
-    towards = on_disc(sky, u)
-    cosine = dr.dot(vertex.normal, towards)
-    active = active & (cosine > 0) & (sky.sun_radiance > 0)
-    tau = straight_to_sky(room, vertex.position, towards, vertex.outdoors, active)
-    return dr.select(active, cosine * tau * sky.sun_radiance * float(SUN_SOLID_ANGLE), 0.0)
 
 
 def leave(
@@ -158,8 +113,9 @@ def window_parts(
     Returns: light scattered from the sun `towards` [1/sr, cosine included]; the straight beam's
     transmittance; the mirror's reflectance and direction; weight and direction of what scatters.
     """
-    scattered, straight, mirrored, rest = (mi.Float(0) for _ in range(4))
+    straight, mirrored, rest = (mi.Float(0) for _ in range(3))
     mirror, away = mi.Vector3f(direction), mi.Vector3f(direction)
+    scattered = scattered_at(room, group, direction, towards, glazed)
     for g, system in enumerate(room.systems):
         mine = glazed & (group == g)
         local = room.inside.to_group(g, direction)
@@ -169,13 +125,50 @@ def window_parts(
         mirror = dr.select(mine, back, mirror)
         if system.bsdf is not None:
             si, context = _interaction(room, g, direction), mi.BSDFContext()
-            value = system.bsdf.eval(context, si, si.to_local(towards), mine)
-            sunny = mine & (room.inside.to_group(g, towards).z > 0)
-            scattered = dr.select(sunny, value[0], scattered)
             sample, weight = system.bsdf.sample(context, si, choice, u, mine)
             rest = dr.select(mine, weight[0], rest)
             away = dr.select(mine, si.to_world(sample.wo), away)
     return scattered, straight, mirrored, mirror, rest, away
+
+
+def scattered_at(
+    room: LitRoom,
+    group: mi.Int32,
+    direction: mi.Vector3f,
+    towards: mi.Vector3f,
+    glazed: mi.Bool,
+) -> mi.Float:
+    """Light that windows scatter from the sun `towards` against `direction`, cosine included."""
+    scattered = mi.Float(0)
+    for g, system in enumerate(room.systems):
+        if system.bsdf is not None:
+            sunny = glazed & (group == g) & (room.inside.to_group(g, towards).z > 0)
+            si = _interaction(room, g, direction)
+            value = system.bsdf.eval(mi.BSDFContext(), si, si.to_local(towards), sunny)
+            scattered = dr.select(sunny, value[0], scattered)
+    return scattered
+
+
+def window_sun(
+    room: LitRoom,
+    sky: Sky | PatchSky,
+    place: mi.Point3f,  # outdoors of the window
+    group: mi.Int32,
+    direction: mi.Vector3f,
+    *,
+    generator: mi.PCG32,
+    glazed: mi.Bool,
+) -> mi.Float:
+    """Radiance that windows scatter of the sun in smooth mirrors outdoors."""
+    found = mi.Float(0)
+    if all(system.bsdf is None for system in room.systems) or room.outside.gloss is None:
+        return found
+    outward = room.inside.outward(group, glazed) / room.inside.epsilon
+    vertex = Vertex(place, outward, glazed)
+    for image in sun_images(room, sky, vertex, generator, glazed, rough=False):
+        seen = glazed & (image.strength > 0)
+        found += scattered_at(room, group, direction, image.towards, seen) * image.strength
+    return found
 
 
 def _at_window(
@@ -185,10 +178,11 @@ def _at_window(
     towards: mi.Vector3f,
     generator: mi.PCG32,
     glazed: mi.Bool,
-) -> tuple[mi.Float, mi.Vector3f, mi.Float]:
+) -> tuple[mi.Float, mi.Vector3f, mi.Float, mi.Bool]:
     """Light scattered from the sun, see `window_parts`; where a path goes on, and its weight.
 
-    It takes the beam, the mirror or the rest in proportion to what each carries.
+    It takes the beam, the mirror or the rest in proportion to what each carries; the last value
+    is whether it takes the beam.
     """
     u = mi.Point2f(generator.next_float32(), generator.next_float32())
     scattered, straight, mirrored, mirror, rest, away = window_parts(
@@ -198,7 +192,7 @@ def _at_window(
     mark = generator.next_float32() * whole
     away = dr.select(mark < straight + mirrored, mirror, away)
     away = dr.select(mark < straight, direction, away)
-    return scattered, away, whole
+    return scattered, away, whole, mark < straight
 
 
 @dr.syntax
@@ -209,6 +203,7 @@ def add_paths(
     starts: PathStarts,
     *,
     cosine: mi.Float,  # at the room's diffuse vertex that the path starts on; 0 where it is none
+    came: mi.Float,  # cosine over pi at a diffuse vertex anywhere; 0 where it is none
     aimed: mi.Bool,  # whether the first direction aims at a window
     beta: mi.Float,  # what the path carries when it starts
     outdoors: mi.Bool,  # where the path starts
@@ -252,7 +247,7 @@ def add_paths(
         # ----- Windows: the sun scattered in them, and where the path goes on -----
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
         towards = on_disc(sky, u_sun)
-        scattered, next_direction, next_beta = _at_window(
+        scattered, next_direction, next_beta, straight = _at_window(
             room, group, direction, towards, generator, glazed
         )
         sunlit = glazed & (scattered > 0) & (sky.sun_radiance > 0)
@@ -261,6 +256,11 @@ def add_paths(
         sunlit &= ~room.outside.scene.ray_test(sun_ray, coherent=False, active=sunlit)
         from_sun = scattered * float(SUN_SOLID_ANGLE) * sky.sun_radiance
         dr.scatter_add(result, mi.Float64(beta * from_sun), row, sunlit)
+        if dr.hint(room.glossy, mode="scalar"):
+            by_mirrors = window_sun(
+                room, sky, before, group, direction, generator=generator, glazed=glazed
+            )
+            dr.scatter_add(result, mi.Float64(beta * by_mirrors), row, glazed)
 
         # ----- Surfaces: the sun on them, and a new direction -----
         opaque = active & ~glazed
@@ -269,16 +269,29 @@ def add_paths(
         normal_out = dr.gather(mi.Vector3f, room.outside.normal, prim, opaque & outdoors)
         face = dr.select(outdoors, normal_out, normal_in)
         face = dr.mulsign(face, -dr.dot(face, direction))
-        rho_in = dr.gather(mi.Float, room.inside.reflectance, prim, opaque & ~outdoors)
-        rho_out = dr.gather(mi.Float, room.outside.reflectance, prim, opaque & outdoors)
-        beta_face = beta * dr.select(outdoors, rho_out, rho_in) * dr.inv_pi
+        slant = -dr.dot(face, direction)
+        rho_in = room.inside.diffuse(prim, slant, opaque & ~outdoors)
+        rho_out = room.outside.diffuse(prim, slant, opaque & outdoors)
+        rho = dr.select(outdoors, rho_out, rho_in)
         vertex = Vertex(mi.Point3f(point + face * room.inside.epsilon), face, outdoors)
-        sun = sun_at(room, sky, vertex, u_sun, opaque)
-        dr.scatter_add(result, mi.Float64(beta_face * sun), row, opaque)
+        sun = surface_sun(
+            room, sky, vertex, prim, direction,
+            rho=rho, came=came, u=u_sun, generator=generator, active=opaque,
+        )  # fmt: skip
+        dr.scatter_add(result, mi.Float64(beta * sun), row, opaque)
         u_away = mi.Point2f(generator.next_float32(), generator.next_float32())
         away, aimed = leave(room, sky, vertex, u_away, generator.next_float32(), opaque, later=True)
+        glossy, beta_face = mi.Bool(False), beta * rho
+        if dr.hint(room.glossy, mode="scalar"):
+            glossy, mirrored, weight = leave_by_gloss(
+                room, vertex, prim, direction, rho, generator, opaque
+            )
+            away, beta_face = dr.select(glossy, mirrored, away), beta * weight
+            aimed &= ~glossy
         cosine = dr.select(opaque, dr.dot(away, face), 0.0)
-        beta_face *= dr.select(outdoors, dr.pi, 1.0)  # outdoors the cosine cancels at once
+        came = dr.select(opaque & ~glossy, cosine * dr.inv_pi, dr.select(straight, came, 0.0))
+        # outdoors the cosine of a diffuse vertex cancels at once
+        beta_face *= dr.select(outdoors | glossy, 1.0, dr.inv_pi)
 
         # ----- Next ray -----
         crossing = room.inside.to_local(group, next_direction, glazed).z
@@ -288,7 +301,7 @@ def add_paths(
         origin = dr.select(opaque, vertex.position, leaving)
         direction = dr.select(opaque, away, next_direction)
         beta = dr.select(opaque, beta_face, beta * next_beta)
-        diffuse = opaque & ~outdoors
+        diffuse = opaque & ~outdoors & ~glossy
         active &= ~opaque | (cosine > 0)
         outdoors = dr.select(glazed, outward, outdoors)
         depth += 1
@@ -358,6 +371,8 @@ def sensor_batches(
         vertex = Vertex(origin, normal, mi.Bool(False))
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
         sun = sun_at(room, sky, vertex, u, mi.Bool(True))
+        for image in sun_images(room, sky, vertex, generator, mi.Bool(True)):
+            sun += dr.maximum(dr.dot(normal, image.towards), 0.0) * image.strength
         dr.scatter_add(result, mi.Float64(sun), sensor)
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
         away, aimed = leave(room, sky, vertex, u, generator.next_float32(), mi.Bool(True))
@@ -366,7 +381,8 @@ def sensor_batches(
         starts = PathStarts(sensor, origin, away, generator, depth, cosine > 0)
         add_paths(
             room, sky, result, starts,
-            cosine=cosine, aimed=aimed, beta=mi.Float(1), outdoors=vertex.outdoors,
+            cosine=cosine, came=dr.maximum(cosine, 0) * dr.inv_pi, aimed=aimed, beta=mi.Float(1),
+            outdoors=vertex.outdoors,
         )  # fmt: skip
         return result.numpy().reshape(S, sky.columns) / n
 

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
+from mitsuba_cfs.trace.random_walk import diffuse_direction
+from mitsuba_cfs.trace.traced_gloss import TracedGloss
 
 OPAQUE = -1  # window index of a triangle that is not glazed
 
@@ -47,6 +49,7 @@ class TracedScene:
         keep = triangle_areas(surfaces.triangles) > 1e-10  # [m2] slivers have no normal
 
         self.groups = tuple(groups)
+        self._panes = windows_block and bool(windows)
         self.centre = glazed.mean(axis=(0, 1)) if centre is None else np.asarray(centre, float)
         self.surface_count = int(surfaces.surface.max()) + 1 if len(surfaces.surface) else 0
         if window_reflectance is None:
@@ -68,9 +71,7 @@ class TracedScene:
         glazed_reflectance: NDArray[np.float64],
     ) -> None:
         """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
-        opaque = Surfaces(
-            surfaces.triangles[keep], surfaces.reflectance[keep], surfaces.surface[keep]
-        )
+        opaque = surfaces.some(keep)
         if not len(opaque.triangles) + len(glazed):
             opaque = _speck(self.centre)
         triangles = np.concatenate([opaque.triangles, glazed]) - self.centre
@@ -85,6 +86,11 @@ class TracedScene:
         self.reflectance = mi.Float(reflectance.astype(np.float32))
         self.surface = mi.UInt32(surface.astype(np.uint32))
         self.group = mi.Int32(group.astype(np.int32))
+        self.gloss = (
+            TracedGloss(opaque, normals[: len(opaque.triangles)], len(glazed))
+            if (opaque.glossy)
+            else None
+        )
         self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(triangles)})
         # Offset along the normal that keeps a ray clear of the face it starts on [m]
         self.epsilon = 2e-5 * max(1.0, 0.05 * float(np.abs(triangles).max()))
@@ -141,11 +147,49 @@ class TracedScene:
         direction: mi.Vector3f,
         active: mi.Bool,
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance."""
+        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance.
+
+        The reflectance is the diffuse one, where there is a gloss that for the ray's angle.
+        """
         face = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
         face = dr.mulsign(face, -dr.dot(face, direction))
         point = mi.Point3f(origin + direction * hit.t + face * self.epsilon)
-        return point, face, dr.gather(mi.Float, self.reflectance, hit.prim_index, active)
+        return point, face, self.diffuse(hit.prim_index, -dr.dot(face, direction), active)
+
+    def diffuse(self, triangle: mi.UInt32, cosine: mi.Float, active: mi.Bool) -> mi.Float:
+        """Diffuse reflectance of a triangle seen at a cosine to its normal."""
+        rho = dr.gather(mi.Float, self.reflectance, triangle, active)
+        if self.gloss is None:
+            return rho
+        return rho * self.gloss.diffuse_share(triangle, cosine, active)
+
+    def whole(self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool) -> mi.Float:
+        """Reflectance of a triangle for a ray along a direction, diffuse and by its gloss."""
+        if self.gloss is None:
+            return dr.gather(mi.Float, self.reflectance, triangle, active)
+        normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
+        cosine = dr.abs(dr.dot(normal, direction))
+        gloss = self.gloss.specular(triangle, cosine, active)
+        return self.diffuse(triangle, cosine, active) + gloss
+
+    def bounce(
+        self,
+        hit: mi.PreliminaryIntersection3f,
+        origin: mi.Point3f,
+        direction: mi.Vector3f,
+        generator: mi.PCG32,
+        active: mi.Bool,
+    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
+        """Where a ray meets a surface, where it goes on to, its weight, if by a mirror."""
+        position, face, weight = self.surface_at(hit, origin, direction, active)
+        away, mirrored = diffuse_direction(face, generator), mi.Bool(False)
+        if self.gloss is not None:
+            glossy, towards, weight = self.gloss.leave(
+                hit.prim_index, face, direction, weight, generator, active
+            )
+            away = dr.select(glossy, towards, away)
+            mirrored = glossy & (self.gloss.roughness(hit.prim_index, glossy) <= 0)
+        return position, away, weight, mirrored
 
     def leaves(
         self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f, active: mi.Bool
@@ -173,6 +217,12 @@ class TracedScene:
             hit = self._met(origin, direction, passed)
             passed = self.leaves(hit, direction, passed)
         return hit, origin
+
+    def hides(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Bool:
+        """Whether anything stands in the way out of rays; panes as of `met_outdoors`."""
+        if self._panes:
+            return self.met_outdoors(ray.o, ray.d, active)[0].is_valid()
+        return self.scene.ray_test(ray, coherent=coherent, active=active)
 
     def _met(
         self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool

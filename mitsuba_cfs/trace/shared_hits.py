@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
-from mitsuba_cfs.trace.view_paths import add_view_paths
+from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
 MOST_SENSORS = 64  # that share their hits; more would cost more than they help
 RAYS_OF_PATH = 4  # shadow rays and bounces, on average
@@ -53,11 +53,16 @@ def indirect_rows(
     tracing by re-using paths" (the same among pixels).
     """
     C = dr.width(place)
-    position, face, weight = _hits(tracer, place, normal, hits, key)
+    position, face, weight, triangle = _hits(tracer, place, normal, hits, key)
     M = dr.width(weight)
-    exchange = _exchange(tracer, place, normal, position, face, hits).reshape(C, M)
+    exchange, slant = _exchange(tracer, place, normal, position, face, hits)
+    exchange = exchange.numpy().reshape(C, M)
     total = exchange.sum(axis=0)
     share = weight.numpy() / (hits * np.where(total > 0, total, 1.0))
+    if tracer.gloss is not None:  # of the diffuse reflectance, by the angle that a sensor sees
+        point = dr.arange(mi.UInt32, C * M) % dr.opaque(mi.UInt32, M)
+        left = tracer.gloss.diffuse_share(dr.gather(mi.UInt32, triangle, point), slant, True)
+        exchange = exchange * left.numpy().reshape(C, M)
 
     rows = dr.zeros(mi.Float64, M * len(tracer.groups) * bins.size)
     count = dr.opaque(mi.UInt32, paths)
@@ -78,14 +83,18 @@ def indirect_rows(
         max_depth=dr.opaque(mi.UInt32, max_depth - 1),
         active=dr.gather(mi.Float, weight, hit) > 0,
         carried=dr.gather(mi.Float, weight, hit),
+        mirrored=None,
     )
     return (exchange * share) @ rows.numpy().reshape(M, -1)
 
 
 def _hits(
     tracer: TracedScene, place: mi.Point3f, normal: mi.Vector3f, hits: int, key: mi.UInt32
-) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-    """Points [M], their normals, and their reflectance: 0 where a ray met a window or nothing."""
+) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.UInt32]:
+    """Points [M], their normals, diffuse reflectances and triangles.
+
+    The reflectance, that at normal incidence, is 0 where a ray met a window or nothing.
+    """
     count = dr.opaque(mi.UInt32, hits)
     ray_number = dr.arange(mi.UInt32, dr.width(place) * hits)
     sensor = ray_number // count
@@ -98,8 +107,11 @@ def _hits(
     opaque = hit.is_valid()
     opaque &= dr.gather(mi.Int32, tracer.group, hit.prim_index, opaque) == OPAQUE
     position, face, weight = tracer.surface_at(hit, start, direction, opaque)
-    dr.eval(position, face, weight)
-    return position, face, weight
+    if tracer.gloss is not None:
+        weight = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, opaque)
+    triangle = dr.select(opaque, hit.prim_index, 0)
+    dr.eval(position, face, weight, triangle)
+    return position, face, weight, triangle
 
 
 def _exchange(
@@ -109,8 +121,8 @@ def _exchange(
     position: mi.Point3f,
     face: mi.Vector3f,
     hits: int,
-) -> NDArray[np.float32]:
-    """G [C * M]: cosines over squared distance where a sensor sees a point."""
+) -> tuple[mi.Float, mi.Float]:
+    """G [C * M]: cosines over squared distance where a sensor sees a point; the point's cosine."""
     C, M = dr.width(place), dr.width(position)
     pair = dr.arange(mi.UInt32, C * M)
     sensor = pair // dr.opaque(mi.UInt32, M)
@@ -121,9 +133,43 @@ def _exchange(
     distance = dr.sqrt(distance2)
     omega = to_point / distance
     cosines = dr.maximum(dr.dot(dr.gather(mi.Vector3f, normal, sensor), omega), 0)
-    cosines *= dr.maximum(-dr.dot(dr.gather(mi.Vector3f, face, point), omega), 0)
+    slant = -dr.dot(dr.gather(mi.Vector3f, face, point), omega)
+    cosines *= dr.maximum(slant, 0)
     shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
     own = point // dr.opaque(mi.UInt32, hits) == sensor  # seen, whatever rounding says
     seen = cosines > 0  # false for a ray that has left through a seam: its point is nowhere
     seen &= ~tracer.scene.ray_test(shadow, coherent=False, active=seen & ~own)
-    return dr.select(seen, cosines / distance2, 0.0).numpy()
+    return dr.select(seen, cosines / distance2, 0.0), slant
+
+
+def mirrored_rows(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    place: mi.Point3f,  # [C]
+    normal: mi.Vector3f,  # [C]
+    *,
+    samples: int,
+    max_depth: int,
+    key: mi.UInt32,
+) -> NDArray[np.float64]:
+    """What sensors see by the gloss of what their rays meet first [C, G * K], each for itself."""
+    C = dr.width(place)
+    rows = dr.zeros(mi.Float64, C * len(tracer.groups) * bins.size)
+    count = dr.opaque(mi.UInt32, samples)
+    path = dr.arange(mi.UInt32, C * samples)
+    sensor = path // count
+    sample = path - sensor * count
+    stream = mi.sample_tea_32(sensor, key ^ mi.UInt32(0x510E527F))[0]
+    local = mi.warp.square_to_cosine_hemisphere(lattice_2d(sample, stream, 0))
+    start = dr.gather(mi.Point3f, place, sensor)
+    away = mi.Frame3f(dr.gather(mi.Vector3f, normal, sensor)).to_world(local)
+    ray = mi.Ray3f(start, away)
+    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=True)
+    generator = path_generator(path, key ^ mi.UInt32(0x9B05688C))
+    add_mirrored(
+        tracer, bins, rows, hit, start, away,
+        row=sensor, later=dr.opaque(mi.UInt32, 0), beta=dr.opaque(mi.Float, np.pi / samples),
+        sample=sample, stream=stream, generator=generator,
+        max_depth=dr.opaque(mi.UInt32, max_depth - 1), active=hit.is_valid(),
+    )  # fmt: skip
+    return rows.numpy().reshape(C, -1)

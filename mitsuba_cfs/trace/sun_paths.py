@@ -4,6 +4,8 @@ What reaches a place x by reflection is the mean over cosine-sampled paths from 
 
     E(x) = mean of sum over the surfaces y that a path meets, product of rho up to y, E_sun(y)
 
+A gloss counts here as if it were diffuse: no light is lost, its direction is.
+
 Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun.
 """
 
@@ -100,7 +102,7 @@ def _next(
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
     found, luck = hit.is_valid(), generator.next_float32()
     after = face_places(tracer, point, way, hit, found)
-    rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found).numpy()
+    rho = tracer.whole(hit.prim_index, way, found).numpy()
     kept = found.numpy() & (rho > 0)
     return kept, after.some(kept), rho[kept], luck.numpy()[kept]
 

@@ -18,7 +18,7 @@ from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.sampling import path_generator
 from mitsuba_cfs.trace.scene import TracedScene
-from mitsuba_cfs.trace.shared_hits import MOST_SENSORS, indirect_rows, shares
+from mitsuba_cfs.trace.shared_hits import MOST_SENSORS, indirect_rows, mirrored_rows, shares
 from mitsuba_cfs.trace.window_integral import add_window_light
 
 DIRECT_SHARE = 2  # strata of the direct part for each path of a sensor
@@ -44,7 +44,7 @@ def view_matrix(
 
         E[s] = sum over g, k of V[s, g, k] L[g, k],   L = T D s
 
-    Interreflection in the room is included (diffuse, windows black), so a row sum is pi times the
+    Interreflection in the room is included (windows black), so a row sum is pi times the
     share of the sensor's view, direct and reflected, that ends on the windows.
 
     Args:
@@ -93,6 +93,16 @@ def view_matrix(
                 key=mi.sample_tea_32(key, mi.UInt32(block))[0],
             )
             values[sensors] += rows
+            if tracer.gloss is not None:
+                values[sensors] += mirrored_rows(
+                    tracer,
+                    bins,
+                    dr.gather(mi.Point3f, place, mi.UInt32(sensors)),
+                    dr.gather(mi.Vector3f, normal, mi.UInt32(sensors)),
+                    samples=n,
+                    max_depth=max_depth,
+                    key=mi.sample_tea_32(key, mi.UInt32(block))[0],
+                )
         return values.reshape(shape)
 
     return accumulate(

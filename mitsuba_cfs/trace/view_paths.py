@@ -29,12 +29,14 @@ def add_view_paths(
     max_depth: mi.UInt32,
     active: mi.Bool,
     carried: mi.Float | None,  # no default: `dr.syntax` loses those of keywords
+    mirrored: mi.Vector3f | None,  # where paths go that start by a surface's gloss
 ) -> None:
     """Add beta * d(irradiance at the start) / d(radiance of each patch) to the matrix.
 
     E(x) = integral of the windows' cosine + sum over the first hits of rho E(hit).  The windows
     are sampled by area and by cosine, joined with the balance heuristic.  A hit may be a window,
-    which reflects to the room what its triangle's reflectance says.
+    which reflects to the room what its triangle's reflectance says.  A path that goes on by the
+    gloss of a hit carries radiance instead, and meets windows by itself alone.
 
     Args:
         carried: share of light that Russian roulette starts with; None: roulette starts late.
@@ -45,6 +47,9 @@ def add_view_paths(
     early = carried is not None
     carried = mi.Float(1.0 if carried is None else carried)  # product of reflectances so far
     row, later = mi.UInt32(row), mi.UInt32(later)  # copies: the loop changes them
+    shiny = tracer.gloss is not None
+    by_gloss = mi.Bool(mirrored is not None)  # the path goes on as a mirror sends it
+    onwards = mi.Vector3f(normal if mirrored is None else mirrored)
     while active:
         u_window = mi.Point2f(generator.next_float32(), generator.next_float32())
         u_bounce = mi.Point2f(generator.next_float32(), generator.next_float32())
@@ -63,6 +68,8 @@ def add_view_paths(
         local = tracer.to_local(group, omega, active)
         cos_start = dr.dot(normal, omega)
         visible = active & (cos_start > 0) & (local.z > 1e-4)
+        if dr.hint(shiny, mode="scalar"):
+            visible &= ~by_gloss
         shadow = mi.Ray3f(position, omega, distance * (1 - 1e-4), 0.0, [])
         visible &= ~tracer.scene.ray_test(shadow, coherent=False, active=visible)
         density_area = distance2 / (tracer.window_area * local.z)
@@ -74,6 +81,8 @@ def add_view_paths(
         frame = mi.Frame3f(normal)
         local_out = mi.warp.square_to_cosine_hemisphere(u_bounce)
         direction = frame.to_world(local_out)
+        if dr.hint(shiny, mode="scalar"):
+            direction = dr.select(by_gloss, onwards, direction)
         ray = mi.Ray3f(position, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         active &= hit.is_valid()
@@ -86,11 +95,19 @@ def add_view_paths(
         cos_start = local_out.z
         density_area = hit.t * hit.t / (tracer.window_area * local.z)
         value = cos_start / (density_area + cos_start * dr.inv_pi)
+        if dr.hint(shiny, mode="scalar"):
+            value = dr.select(by_gloss, 1.0, value)
         slot = row * width + mi.UInt32(group_hit) * K + bins.index(local)
         dr.scatter_add(matrix, mi.Float64(beta * value), slot, glazed)
 
         # ----- Bounce: E(x) gains rho E(hit); Russian roulette -----
         position, normal, rho = tracer.surface_at(hit, position, direction, active)
+        if dr.hint(shiny, mode="scalar"):
+            glossy, onwards, rho = tracer.gloss.leave(
+                hit.prim_index, normal, direction, rho, generator, active
+            )
+            beta *= dr.select(by_gloss, 1.0, dr.pi) * dr.select(glossy, 1.0, dr.inv_pi)
+            by_gloss = mi.Bool(glossy)
         beta *= rho
         carried *= rho
         depth += 1
@@ -103,3 +120,33 @@ def add_view_paths(
         active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
         beta /= dr.maximum(survival, 1e-6)
         carried /= dr.maximum(survival, 1e-6)
+
+
+def add_mirrored(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    matrix: mi.Float64,
+    hit: mi.PreliminaryIntersection3f,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    *,
+    row: mi.UInt32,
+    later: mi.UInt32,  # rows further on that what comes after the first bounce is added to
+    beta: mi.Float,  # weight of the radiance of what the rays meet
+    sample: mi.UInt32,
+    stream: mi.UInt32,
+    generator: mi.PCG32,
+    max_depth: mi.UInt32,
+    active: mi.Bool,
+) -> None:
+    """Add what the gloss of surfaces shows that rays meet; they are traced to `hit` already."""
+    position, face, _ = tracer.surface_at(hit, origin, direction, active)
+    glossy, onwards, weight = tracer.gloss.leave(
+        hit.prim_index, face, direction, mi.Float(0), generator, active
+    )
+    add_view_paths(
+        tracer, bins, matrix, row, position, face, later=later,
+        beta=dr.select(glossy, beta * weight, 0.0), sample=sample,
+        stream=mi.sample_tea_32(stream, mi.UInt32(0x6A09E667))[0], generator=generator,
+        max_depth=max_depth, active=glossy & (weight > 0), carried=None, mirrored=onwards,
+    )  # fmt: skip

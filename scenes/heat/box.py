@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from bim.model import Building, Construction, MaterialLayer
 from bim.shoebox import WindowRectangle, shoebox
-from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import lacquer
 from scenes.heat.study_file import BoxTable
 
 
@@ -18,6 +19,12 @@ def box_building(box: BoxTable) -> Building:
         )
         for side, layers in box.construction.items()
     }
+    for part in box.roughness:
+        if part not in box.specular:
+            raise DataError("has no `specular` beside it", field=f"box.roughness.{part}")
+    gloss = {
+        part: lacquer(value, box.roughness.get(part, 0.0)) for part, value in box.specular.items()
+    }
     try:
         return shoebox(
             box.width,
@@ -29,6 +36,7 @@ def box_building(box: BoxTable) -> Building:
             reflectance=box.reflectance or None,
             adjacency=box.adjacency or None,
             constructions=constructions or None,
+            gloss=gloss or None,
         )
-    except RoomError as error:
+    except ValueError as error:
         raise DataError(str(error), field="box") from error

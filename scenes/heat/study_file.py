@@ -11,6 +11,7 @@ from bim.ifc.corrections import corrections_beside
 from bim.ifc.head import check_head
 from bim.model import BOX_PARTS
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import ROUGHEST
 from mitsuba_cfs.methods import METHODS
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
@@ -56,6 +57,8 @@ class BoxTable(TomlTable):
     recess: Annotated[float, Field(ge=0)] = 0.0
     window: tuple[WindowTable, ...]
     reflectance: dict[Part, Share] = Field(default_factory=dict)
+    specular: dict[Part, Share] = Field(default_factory=dict)  # of a lacquer at normal incidence
+    roughness: dict[Part, Annotated[float, Field(ge=0, le=ROUGHEST)]] = Field(default_factory=dict)
     adjacency: dict[Part, Literal["outside", "ground", "space", "adiabatic"]] = Field(
         default_factory=dict
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.gloss import Gloss
 from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -25,6 +26,17 @@ from thermal.control import switched
 
 FloatArray = NDArray[np.float64]
 Gains = dict[str, FloatArray]  # [H] [W] by name: incident_w, transmitted_w, absorbed_..._w
+
+
+def _of_zone(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss | None, ...]:
+    """The gloss of the zone's surfaces; none where one is made of faces that differ in it."""
+    found: dict[int, set[Gloss | None]] = {}
+    for number, face in zip(numbers, interior.surface, strict=True):
+        found.setdefault(int(number), set()).add(interior.gloss[face] if interior.gloss else None)
+    if not interior.glossy:
+        return ()
+    alike = {number: kinds.pop() for number, kinds in found.items() if len(kinds) == 1}
+    return tuple(alike.get(number) for number in range(int(numbers.max()) + 1))
 
 
 class RoomSun:
@@ -45,7 +57,9 @@ class RoomSun:
         self.outdoors, self.room, self.skies, self.progress = outdoors, room, skies, progress
         # the room's triangles, numbered by the surfaces of the zone
         numbers = room.surface_of_face[interior.surface]
-        self.interior = Surfaces(interior.triangles, interior.reflectance, numbers)
+        self.interior = Surfaces(
+            interior.triangles, interior.reflectance, numbers, gloss=_of_zone(interior, numbers)
+        )
         self._absorbed: dict[bytes, FloatArray] = {}
         self._tracing = {
             "samples": max(outdoors.sampling.patch_samples // BATCHES, 1),

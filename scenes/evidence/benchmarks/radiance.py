@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.gloss import radiance_material
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.evidence.benchmarks.harness import PeerFailed, PeerMissing
 
@@ -40,13 +41,13 @@ def run(command: str, folder: Path, stdin: bytes = b"") -> bytes:
 
 
 def write_surfaces(surfaces: Surfaces, path: Path) -> None:
-    """Opaque triangles as grey `plastic` without gloss."""
-    lines = []
-    for reflectance in np.unique(surfaces.reflectance):
-        r = f"{reflectance:.6g}"
-        lines.append(f"void plastic grey_{r}\n0\n0\n5 {r} {r} {r} 0 0\n")
+    """Opaque triangles as grey `plastic`, or what their gloss is in Radiance."""
+    gloss = [surfaces.gloss[i] if surfaces.gloss else None for i in surfaces.surface]
+    kinds = list(dict.fromkeys(zip(surfaces.reflectance.tolist(), gloss, strict=True)))
+    lines = [radiance_material(f"{path.stem}_{i}", *kind) for i, kind in enumerate(kinds)]
     for i, triangle in enumerate(surfaces.triangles):
-        lines.append(polygon(f"grey_{surfaces.reflectance[i]:.6g}", f"t{i}", triangle))
+        number = kinds.index((float(surfaces.reflectance[i]), gloss[i]))
+        lines.append(polygon(f"{path.stem}_{number}", f"{path.stem}{i}", triangle))
     path.write_text("\n".join(lines))
 
 

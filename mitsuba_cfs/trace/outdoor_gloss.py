@@ -1,0 +1,134 @@
+"""What glossy surfaces show in a view's pixels: rays that go on by them, and the sun on rough ones.
+
+L[pixel] = sum over the rough faces it shows, tau f(view, sun) cos E_sun
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.trace.picture_sun import LANES
+from mitsuba_cfs.trace.sampling import path_generator
+from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sun_paths import Places, place_and_hour
+
+MOST_MIRRORS = 4  # that a ray of a pixel goes by, one after the other
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Rays of a block's pixels."""
+
+    row: NDArray[np.int64]  # [r] of the pixel in its block
+    origin: NDArray[np.float32]  # [3, r]
+    way: NDArray[np.float32]  # [3, r]
+    weight: NDArray[np.float64]  # [r] share of what the pixel shows
+
+    def some(self, chosen: NDArray) -> Lanes:
+        """Some of them."""
+        return Lanes(
+            self.row[chosen], self.origin[:, chosen], self.way[:, chosen], self.weight[chosen]
+        )
+
+    @staticmethod
+    def joined(parts: list[Lanes]) -> Lanes:
+        """All of several."""
+        if len(parts) == 1:
+            return parts[0]
+        none, nowhere = np.empty(0, dtype=np.int64), np.empty((3, 0), dtype=np.float32)
+        return Lanes(
+            np.concatenate([none, *(p.row for p in parts)]),
+            np.concatenate([nowhere, *(p.origin for p in parts)], axis=1),
+            np.concatenate([nowhere, *(p.way for p in parts)], axis=1),
+            np.concatenate([none.astype(float), *(p.weight for p in parts)]),
+        )
+
+
+def mirrored(
+    tracer: TracedScene, lanes: Lanes, hit: mi.PreliminaryIntersection3f, bounce: int
+) -> Lanes:
+    """The rays that go on by the gloss of what rays met; none without any gloss."""
+    none = np.empty(0, dtype=np.int64)
+    if tracer.gloss is None or bounce >= MOST_MIRRORS or not len(lanes.row):
+        return lanes.some(none)
+    way, found = mi.Vector3f(lanes.way), hit.is_valid()
+    position, face, _ = tracer.surface_at(hit, mi.Point3f(lanes.origin), way, found)
+    lane = dr.arange(mi.UInt32, len(lanes.row))
+    glossy, towards, weight = tracer.gloss.leave(
+        hit.prim_index, face, way, mi.Float(0), path_generator(lane, mi.UInt32(bounce)), found
+    )
+    kept = np.flatnonzero((glossy & (weight > 0)).numpy())
+    return Lanes(
+        lanes.row[kept],
+        position.numpy()[:, kept],
+        towards.numpy()[:, kept],
+        lanes.weight[kept] * weight.numpy()[kept],
+    )
+
+
+@dataclass(frozen=True)
+class RoughFaces:
+    """The rough faces that rays meet; axis r."""
+
+    pixel: NDArray[np.int64]  # [r] row of the pixel
+    weight: NDArray[np.float64]  # [r] share of the pixel
+    triangle: NDArray[np.int64]  # [r]
+    way: NDArray[np.float32]  # [3, r] of the rays
+    places: Places  # [r]
+
+    @staticmethod
+    def joined(parts: list[RoughFaces]) -> RoughFaces:
+        """All of several."""
+        none = np.empty(0, dtype=np.int64)
+        return RoughFaces(
+            np.concatenate([none, *(p.pixel for p in parts)]),
+            np.concatenate([none.astype(float), *(p.weight for p in parts)]),
+            np.concatenate([none, *(p.triangle for p in parts)]),
+            np.concatenate([np.empty((3, 0), np.float32), *(p.way for p in parts)], axis=1),
+            Places.joined([p.places for p in parts]),
+        )
+
+
+class RoughSun:
+    """The sun in the lobes of rough surfaces outdoors, hour by hour."""
+
+    def __init__(self, outside: TracedScene, faces: RoughFaces) -> None:
+        """Of what the pixels show; each pixel takes one place of each triangle."""
+        self._outside = outside
+        pair = faces.pixel * (int(faces.triangle.max(initial=0)) + 1) + faces.triangle
+        _, first, place = np.unique(pair, return_index=True, return_inverse=True)
+        self._weight = np.bincount(place, faces.weight, minlength=len(first)).astype(np.float32)
+        self._pixel, self._places = faces.pixel[first], faces.places.some(first)
+        self._triangle = mi.UInt32(faces.triangle[first].astype(np.uint32))
+        self._way = mi.Vector3f(faces.way[:, first])
+
+    def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
+        """Add the luminance [cd/m2] to the pixels' values [h, n]."""
+        if not self._places.size:
+            return
+        lit = np.flatnonzero((illuminance > 0) & (suns[:, 2] > 0))
+        step = max(1, LANES // self._places.size)
+        for start in range(0, len(lit), step):
+            hours = lit[start : start + step]
+            found = self._lobes(suns[hours]) * self._weight[:, None]
+            for hour, light in zip(hours, found.T, strict=True):
+                np.add.at(values[hour], self._pixel, light * illuminance[hour])
+
+    def _lobes(self, suns: NDArray[np.float64]) -> NDArray[np.float32]:
+        """f cos of places where the sun shines, else 0 [m, h]."""
+        point, normal, to_sun = place_and_hour(self._places, suns)
+        place = dr.arange(mi.UInt32, self._places.size * len(suns)) // dr.opaque(
+            mi.UInt32, len(suns)
+        )
+        cosine = dr.dot(normal, to_sun)
+        lit = cosine > 0
+        lit &= ~self._outside.scene.ray_test(mi.Ray3f(point, to_sun), coherent=False, active=lit)
+        triangle = dr.gather(mi.UInt32, self._triangle, place)
+        way = dr.gather(mi.Vector3f, self._way, place)
+        value = self._outside.gloss.lobe(triangle, normal, way, to_sun, lit) * cosine
+        return dr.select(lit, value, 0.0).numpy().reshape(self._places.size, len(suns))

@@ -1,0 +1,59 @@
+"""The ways from outdoors to the sun: straight, and by each plane that mirrors it."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.trace.scene import TracedScene
+
+
+class SunWay:
+    """One way: where the sun's light comes from, and what of it reaches a place."""
+
+    def __init__(self, outside: TracedScene, plane: int | None = None) -> None:
+        """Straight, or by a smooth mirror plane of the scene."""
+        self._outside, self._plane = outside, plane
+        self.free = plane is None and not outside.surface_count  # nothing stands before the windows
+
+    def turned(self, suns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Directions [Q, 3] that the light of the suns [Q, 3] comes from."""
+        if self._plane is None:
+            return suns
+        normal = self._outside.gloss.normals[self._plane]
+        return suns - 2 * (suns @ normal)[:, None] * normal
+
+    def reaching(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Float:
+        """Share of the sun along rays towards it, from places outdoors: 0 where it is hidden."""
+        if self._plane is None:
+            hidden = self._outside.hides(ray, active, coherent=coherent)
+            return dr.select(active & ~hidden, mi.Float(1), mi.Float(0))
+        gloss = self._outside.gloss
+        hit = self._outside.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
+        met = active & hit.is_valid()
+        met &= gloss.plane_of(hit.prim_index, met) == self._plane
+        normal = mi.Vector3f(*map(float, gloss.normals[self._plane]))
+        normal = dr.mulsign(normal, -dr.dot(normal, ray.d))
+        cosine = -dr.dot(normal, ray.d)
+        place = mi.Point3f(ray.o + ray.d * hit.t + normal * self._outside.epsilon)
+        beyond = mi.Ray3f(place, mi.Vector3f(ray.d + normal * (2 * cosine)))
+        met &= ~self._outside.hides(beyond, met, coherent=coherent)
+        return dr.select(met, gloss.specular(hit.prim_index, cosine, met), 0.0)
+
+
+def sun_ways(outside: TracedScene) -> list[SunWay]:
+    """All ways, the straight one first."""
+    mirrors = [] if outside.gloss is None else outside.gloss.mirrors
+    return [SunWay(outside), *(SunWay(outside, int(plane)) for plane in mirrors)]
+
+
+def shining(
+    outside: TracedScene, facing: NDArray[np.float64], suns: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Suns [Q, 3] that stand before one of the planes with normals [G, 3], or in a mirror do."""
+    if not len(suns):
+        return np.zeros(0, dtype=bool)
+    ways = [way.turned(suns) @ facing.T > 0 for way in sun_ways(outside)]
+    return np.any(ways, axis=(0, 2))

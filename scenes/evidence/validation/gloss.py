@@ -1,0 +1,244 @@
+r"""Rooms with surfaces that reflect like a mirror, by Radiance and by this project: Ev and DGP.
+
+    python -m scenes.evidence.validation.gloss [--cases mirror floor metal] [--json FILE]
+
+The room of the dissertation's Table 1 with its window to the north, seen from 2 m behind the
+opening under a clear sky, the sun behind the house.  "mirror": a facade of reflectance 0.8 stands
+10 m before it and sends the sun back; "metal": the same of rough metal, alpha 0.15; "floor": a
+floor of smooth lacquer, Radiance's `plastic` of specularity 0.05, the sky alone.  Ev by `rtrace`
+of a point, DGP of `rpict`'s picture with this Ev (`evalglare -i`); ours by paths and, of the
+pictures, by the five-phase method.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import mitsuba_cfs as cfs
+from mitsuba_cfs import variants
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.gloss import Gloss, lacquer, mirror
+from mitsuba_cfs.images.hdr import EFFICACY, read_hdr
+from mitsuba_cfs.images.view import View, fisheye, format_view
+from mitsuba_cfs.sky.cie import cie_patches
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
+from mitsuba_cfs.trace.estimate import Stopping
+from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
+from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+from mitsuba_cfs.trace.point_in_time import point_in_time
+from scenes.cost import room
+from scenes.evidence.benchmarks import radiance
+
+EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
+TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
+FACADE = 10.0  # before the window [m]
+SIZE, FINER = 200, 4  # [px]; rpict's are finer, and averaged
+SUN = np.array([0.25, -1.0, 0.8]) / np.linalg.norm([0.25, -1.0, 0.8])
+SUN_ILLUMINANCE = {"mirror": 80_000.0, "metal": 15_000.0, "floor": 0.0}  # normal to it [lx]
+SKY_ILLUMINANCE = 12_000.0  # on the ground [lx]
+QUALITY = "-dc 1 -dt 0 -dj 0 -ds 0.1 -st 0"
+CACHED = "-ps 1 -pa 0 -ss 16 -ab 5 -ad 512 -as 0 -aa 0.2 -ar 32 -lr 8 -lw 1e-3"  # of the pictures
+POINT = "-u+ -ss 1e5 -ab 8 -ad 16384 -aa 0 -lr 20 -lw 1e-9"  # of Ev; several rays to each lobe
+MATERIALS: dict[str, Gloss] = {
+    "mirror": mirror(0.8), "metal": mirror(0.6, 0.15), "floor": lacquer(0.05),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """A room, what stands before it, and the light of an hour."""
+
+    name: str
+    interior: Surfaces
+    exterior: Surfaces
+    groups: list[WindowGroup]
+    patches: np.ndarray  # [P] [cd/m2]
+    sun_luminance: float  # [cd/m2]
+
+    @property
+    def sky(self) -> Sky:
+        """The sky and the sun."""
+        return Sky(self.patches, SUN, self.sun_luminance)
+
+    @property
+    def lit(self) -> LitRoom:
+        """The room behind a clear opening."""
+        clear = [PathOptics(None, AngularBeam(np.ones(16)))]
+        return LitRoom(self.interior, self.exterior, self.groups, clear)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Both programs' figures of a case."""
+
+    case: str
+    ev_rtrace: float
+    ev_rtrace_error: float
+    ev: float  # ours, of the point
+    ev_error: float
+    ev_picture: float
+    ev_five_phase: float  # of its picture
+    dgp_rpict: float
+    dgp: float
+    dgp_five_phase: float
+    without: float  # our Ev with the specular part of no surface
+
+
+def case(name: str) -> Case:
+    """One of the cases."""
+    gloss = MATERIALS[name]
+    interior = room.room()
+    interior = replace(interior, triangles=interior.triangles * TURN)
+    glass = room.window_groups()[0].windows[0].triangles * TURN
+    groups = [WindowGroup("north", (WindowSurface("north", glass),))]
+    exterior = interior  # the room as it stands outdoors
+    if name == "floor":
+        interior = replace(interior, gloss=(gloss, *(None,) * 8))
+    else:
+        exterior = _with_facade(exterior, gloss)
+    patches = cie_patches("clear", ReinhartSky(4), SKY_ILLUMINANCE, sun=SUN)
+    return Case(name, interior, exterior, groups, patches, SUN_ILLUMINANCE[name] / SUN_SOLID_ANGLE)
+
+
+def _with_facade(body: Surfaces, gloss: Gloss) -> Surfaces:
+    """The facade as one surface more."""
+    x, y, z = 30.0, FACADE, 20.0
+    corners = np.array([(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
+    number = int(body.surface.max()) + 1
+    return Surfaces(
+        np.concatenate([body.triangles, corners[[[0, 1, 2], [0, 2, 3]]]]),
+        np.append(body.reflectance, [0.0, 0.0]),
+        np.append(body.surface, [number, number]),
+        (),
+        (*(None,) * number, gloss),
+    )
+
+
+class Radiance:
+    """A case in a folder, rendered by Radiance."""
+
+    def __init__(self, given: Case, folder: Path) -> None:
+        body = len(given.interior.triangles)
+        radiance.write_surfaces(given.interior, folder / "room.rad")
+        after = np.arange(len(given.exterior.triangles)) >= body
+        radiance.write_surfaces(given.exterior.some(after), folder / "outdoors.rad")
+        library = radiance.environment()["RAYPATH"].split(":")[-1]
+        cal = (Path(library) / "reinhart.cal").read_text()
+        (folder / "sky.cal").write_text(f"MF : 4;\n{cal}")
+        values = " ".join(f"{v / EFFICACY:.8g}" for v in given.patches)
+        last = len(given.patches) - 1
+        (folder / "sky.dat").write_text(f"1\n0 {last} {last + 1}\n{values}\n")
+        angle, strength = 2 * np.degrees(SUN_RADIUS), f" {given.sun_luminance / EFFICACY:.8g}"
+        sun = (
+            f"void light solar\n0\n0\n3{3 * strength}\nsolar source sun\n0\n0\n"
+            f"4 {SUN[0]:.9g} {SUN[1]:.9g} {SUN[2]:.9g} {angle:.6g}\n"
+        )
+        (folder / "sky.rad").write_text(
+            "void brightdata patches\n4 noop sky.dat sky.cal rbin\n0\n0\n"
+            "patches glow sky_glow\n0\n0\n4 1 1 1 0\nsky_glow source sky\n0\n0\n4 0 0 1 360\n"
+            + (sun if given.sun_luminance else "")
+        )
+        radiance.run("oconv sky.rad room.rad outdoors.rad > scene.oct", folder)
+        self.folder = folder
+
+    def picture(self, view: View) -> np.ndarray:
+        """Luminance [ny, nx], each pixel the mean of finer ones."""
+        n = FINER
+        size = f"-x {n * view.width} -y {n * view.height}"
+        command = f"rpict {QUALITY} {CACHED} {format_view(view)} {size} scene.oct > fine.hdr"
+        radiance.run(command, self.folder)
+        fine = read_hdr(self.folder / "fine.hdr").luminance
+        return fine.reshape(view.height, n, view.width, n).mean(axis=(1, 3))
+
+    def eye_illuminance(self, view: View, points: int) -> tuple[float, float]:
+        """Illuminance at the eye by rtrace, and its standard error."""
+        command = f"rtrace -h -I+ {QUALITY} {POINT} scene.oct"
+        given = radiance.sensors_text([view.position] * points, [view.direction] * points)
+        lines = radiance.run(command, self.folder, given).decode().split()
+        values = np.array(lines, dtype=float).reshape(points, -1)[:, 0] * EFFICACY
+        return float(values.mean()), float(values.std(ddof=1) / np.sqrt(points))
+
+
+def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Outcome:
+    """A case in both programs."""
+    given, view = case(name), fisheye(EYE, DIRECTION, size)
+    folder.mkdir(parents=True, exist_ok=True)
+    theirs = Radiance(given, folder)
+    ev, ev_error = theirs.eye_illuminance(view, points)
+    found, plain = (_eye(one, view) for one in (given, _without_gloss(given)))
+    picture = point_in_time_picture(given.lit, given.sky, view, samples=64)
+    rendered = theirs.picture(view)
+    phases = _five_phase(given, view)
+    np.savez(folder / "pictures.npz", ours=picture, theirs=rendered, five_phase=phases)
+    ours, rated = evaluate(picture, view), evaluate(rendered, view, illuminance=ev)
+    third = evaluate(phases, view)
+    return Outcome(
+        name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]), ours.Ev,
+        third.Ev, rated.dgp, ours.dgp, third.dgp, float(plain.values[0]),
+    )  # fmt: skip
+
+
+def _five_phase(given: Case, view: View) -> np.ndarray:
+    """The picture by five phases; the sun lies on the sky patch that it stands in."""
+    reinhart = ReinhartSky(4)
+    strength, sun = given.sun_luminance * SUN_SOLID_ANGLE, np.zeros((reinhart.size, 1))
+    patch = int(reinhart.index(SUN[None])[0])
+    sun[patch] = strength / reinhart.solid_angles[patch]
+    hour = np.array([12])
+    sky = cfs.AnnualSky(
+        given.patches[:, None] + sun, SUN[None], np.array([strength]), hour, 8760, sun=sun
+    )
+    points, normals = np.array([view.position]), np.array([view.direction])
+    around = given.interior, given.exterior, given.groups
+    scene = cfs.DaylightScene(*around, points, normals, view=view)
+    traced = cfs.PhaseScene(scene, cfs.Sampling(outdoor_samples=16, view_samples=16))
+    clear = cfs.AngularOptics(np.ones(64))
+    shown = cfs.PhaseSystems(traced, [[clear]]).light(sky).pictures(np.array([0]), [0])
+    picture = np.zeros(view.width * view.height, dtype=np.float32)
+    picture[shown.pixels] = shown.values(np.array([0]))[0]
+    return picture.reshape(view.height, view.width)
+
+
+def _eye(given: Case, view: View):
+    return point_in_time(
+        given.lit, given.sky, [view.position], [view.direction], samples=2**19,
+        stopping=Stopping(batches=8),
+    )  # fmt: skip
+
+
+def _without_gloss(given: Case) -> Case:
+    bare = (replace(s, gloss=()) for s in (given.interior, given.exterior))
+    return replace(given, **dict(zip(("interior", "exterior"), bare, strict=True)))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", nargs="+", choices=MATERIALS, default=list(MATERIALS))
+    parser.add_argument("--size", type=int, default=SIZE)
+    parser.add_argument("--points", type=int, default=8, help="times that rtrace finds Ev")
+    parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    variants.activate()
+    rows = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = (options.keep or Path(temporary)).resolve()
+        for name in options.cases:
+            row = outcome(name, folder / name, size=options.size, points=options.points)
+            rows.append(asdict(row))
+            print(json.dumps(rows[-1], indent=1), flush=True)
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""What IFC styles, corrections, boxes and exports say of surfaces that reflect like a mirror."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bim.ifc.building import read_ifc
+from bim.ifc.corrections import read_corrections
+from bim.shoebox import shoebox
+from bim.to_radiance import write_radiance
+from bim.to_tracer import exterior_surfaces, interior_surfaces
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import dielectric, lacquer, mirror, pane
+from tests.bim.small_ifc import box_room
+
+
+def building_with(tmp_path, style: str = "wall", **entries):
+    """The small room's building, its style with these entries."""
+    model = box_room(doubled_wall=True)
+    shading = next(s for s in model.by_type("IfcSurfaceStyle") if s.Name == style).Styles[0]
+    for name, value in entries.items():
+        if isinstance(value, tuple):
+            value = model.create_entity(*value)
+        setattr(shading, name, value)
+    path = tmp_path / "model.ifc"
+    model.write(str(path))
+    return read_ifc(path)
+
+
+def wall_of(building):
+    return next(face for face in building.spaces[0].faces if face.kind == "wall")
+
+
+def element_of(building, name: str):
+    return next(e for e in building.elements if e.name == name)
+
+
+def test_a_method_for_the_screen_is_no_gloss(tmp_path):
+    for method in ("MATT", "PHONG", "NOTDEFINED"):
+        highlight = ("IfcSpecularExponent", 64.0)
+        found = building_with(tmp_path, ReflectanceMethod=method, SpecularHighlight=highlight)
+        assert wall_of(found).gloss is None
+        assert interior_surfaces(found.spaces[0]).gloss == ()
+
+
+def test_metal_is_all_gloss_of_the_roughness_stated(tmp_path):
+    rough = ("IfcSpecularRoughness", 0.15)
+    found = building_with(tmp_path, ReflectanceMethod="METAL", SpecularHighlight=rough)
+    plain = wall_of(building_with(tmp_path))
+    wall, outdoors = wall_of(found), element_of(found, "south again")
+    assert wall.gloss == outdoors.gloss == mirror(plain.reflectance_visible, 0.15)
+    assert wall.reflectance_visible == wall.reflectance_solar == 0.0
+    surfaces = exterior_surfaces(found, found.spaces[0])
+    assert surfaces.gloss[surfaces.names.index("south again")] == wall.gloss
+
+
+def test_an_exponent_is_a_roughness(tmp_path):
+    """cos^n about the mirror's direction: at n = 50 as alpha = 0.1."""
+    highlight = ("IfcSpecularExponent", 50.0)
+    found = building_with(tmp_path, ReflectanceMethod="PLASTIC", SpecularHighlight=highlight)
+    gloss = wall_of(found).gloss
+    assert gloss is not None and gloss.roughness == pytest.approx(0.1)
+    angle = np.radians(4.0)  # of the mirror's direction, twice that of the facet
+    assert np.cos(angle) ** 50 == pytest.approx(np.exp(-((np.tan(angle / 2) / 0.1) ** 2)), rel=2e-3)
+    plain = wall_of(building_with(tmp_path)).reflectance_visible
+    assert wall_of(found).reflectance_visible == pytest.approx(plain * (1 - gloss.at_normal))
+    assert gloss.specular == dielectric(1.52).specular
+
+
+def test_glass_that_says_so_mirrors_the_outdoors(tmp_path):
+    found = building_with(tmp_path, "glass", ReflectanceMethod="GLASS")
+    window = next(e for e in found.elements if e.gloss is not None)
+    assert window.gloss == pane() and window.reflectance_visible == 0.0
+    plain = building_with(tmp_path, "glass")
+    assert all(e.gloss is None for e in plain.elements)
+
+
+def test_corrections_give_a_gloss(tmp_path):
+    path = tmp_path / "model.ifc"
+    box_room(doubled_wall=True).write(str(path))
+    corrections = tmp_path / "model.corrections.toml"
+    entry = "[[reflectance]]\nselect = 'IfcSlab, Name=\"floor\"'\nvisible = 0.2\nspecular = 0.05\n"
+    corrections.write_text(entry)
+    floor = next(f for f in read_ifc(path).spaces[0].faces if f.kind == "floor")
+    assert (floor.reflectance_visible, floor.gloss) == (0.2, lacquer(0.05))
+    for wrong, field in (("specular = 0.9", "specular"), ("roughness = 0.8", "roughness")):
+        key = wrong.split()[0]
+        lines = [line for line in entry.splitlines() if not line.startswith(key)]
+        corrections.write_text("\n".join([*lines, wrong]))
+        with pytest.raises(DataError, match=field):
+            read_corrections(corrections)
+
+
+def test_a_box_has_the_gloss_of_its_parts():
+    room = shoebox(reflectance={"floor": 0.2}, gloss={"floor": lacquer(0.05), "wall": mirror(0.1)})
+    gloss = {face.kind: face.gloss for face in room.spaces[0].faces}
+    assert gloss["floor"] == lacquer(0.05) and gloss["wall"] == mirror(0.1)
+    assert gloss["ceiling"] is None
+    with pytest.raises(ValueError, match="reflects more than it gets"):
+        shoebox(reflectance={"floor": 0.5}, gloss={"floor": mirror(0.6)})
+
+
+def test_a_study_box_says_specular_and_roughness():
+    from scenes.heat.box import box_building
+    from scenes.heat.study_file import BoxTable
+
+    table = {"width": 4, "depth": 5, "height": 3, "window": (),
+             "specular": {"floor": 0.05}, "roughness": {"floor": 0.02}}  # fmt: skip
+    floor = next(f for f in box_building(BoxTable(**table)).spaces[0].faces if f.kind == "floor")
+    assert floor.gloss == lacquer(0.05, 0.02)
+    with pytest.raises(DataError, match=r"box\.roughness\.wall: has no `specular` beside it"):
+        box_building(BoxTable(**table | {"roughness": {"wall": 0.1}}))
+
+
+def test_radiance_gets_the_gloss(tmp_path):
+    building = shoebox(reflectance={"floor": 0.2}, gloss={"floor": lacquer(0.05, 0.1)})
+    files = write_radiance(building.spaces[0], building, tmp_path)
+    text = files.materials.read_text()
+    colour = 0.2 / 0.95
+    assert f"5 {colour:.6g} {colour:.6g} {colour:.6g} 0.05 0.1" in text
+    assert text.count("void plastic") == len(set(text.split("void plastic ")[1:]))
+    assert "_gloss_" in files.room.read_text()
