@@ -204,12 +204,12 @@ class PhaseLight:
             share = np.bincount(row, minlength=len(self.sensors[g])) / len(row)
             sun = sum(w * s.sun_error for w, s in zip(share, self.sensors[g], strict=True))
             variance = variance + (sun / len(row)) ** 2
-        """What D as a mean over a group's parts changes at each sensor, B's error too [S]."""
+        mean = self._of_all(state).mean(axis=1)
         error = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
         return error[: len(self._traced.scene.points)]
 
     def _subdivision_error(self, g: int, row: NDArray[np.int64]) -> NDArray[np.float64]:
-        """What D as a mean over a group's parts changes in each sensor's mean, with B's error [S]."""
+        """What means over a group's parts change in each sensor's mean [S], and the error of B."""
         points, normals = self._traced.scene.sensors()
         found, straight = np.zeros(len(points)), 0.0
         for j, optics in enumerate(self.filled.systems[g]):

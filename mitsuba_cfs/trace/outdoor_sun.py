@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
