@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ llvm.select_library()
 REPOSITORY = Path(__file__).parent.parent
 REAL_DATA = REPOSITORY.parent / "shared" / "data"
 REFERENCE_DATA = REPOSITORY.parent / "shared" / "reference"
+OWN_BLIND = "tests/reference/genbsdf_blind/tilt45.xml"  # for `bsdf_file`
 WINDOW_GLAZING = REPOSITORY / "tests" / "reference" / "window_glazing"
 
 
@@ -42,6 +44,17 @@ def real_data() -> Path:
     if not REAL_DATA.is_dir():
         pytest.skip("the folder of real input files (../shared/data) is not here")
     return REAL_DATA
+
+
+@pytest.fixture(scope="session")
+def bsdf_file(request) -> Callable[[str], Path]:
+    """A BSDF file by its name: one of the repository's, else a real one, skipped without it."""
+
+    def find(name: str) -> Path:
+        own = REPOSITORY / name
+        return own if own.is_file() else request.getfixturevalue("real_data") / "bsdf" / name
+
+    return find
 
 
 @pytest.fixture(scope="session")
