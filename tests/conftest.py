@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     early = {item.path for item in items if item.get_closest_marker("early")}
     items.sort(key=lambda item: item.path not in early)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def matrices_of_this_run(tmp_path_factory) -> Iterator[None]:
+    """One cache of matrices for all tests of a run and all its workers, apart from the user's."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CFS_CACHE", str(folder / "matrices"))
+        yield
 
 
 def default_signals() -> None:

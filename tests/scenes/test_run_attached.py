@@ -24,17 +24,13 @@ from scenes.fenestration.thermal_system import thermal_system
 from scenes.run.options import JobOptions
 from scenes.run.run import read_inputs, used_systems
 
+pytestmark = pytest.mark.early
+
 QUICK = [
     "--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
     "--method", "three-phase",
 ]  # fmt: skip
 TABLES = ("daylight_metrics.csv", "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv")
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch) -> None:
-    """One cache for the runs of this file, apart from the user's."""
-    monkeypatch.setenv("CFS_CACHE", str(tmp_path_factory.getbasetemp() / "matrices"))
 
 
 @pytest.fixture
