@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,7 @@ llvm.select_library()
 REPOSITORY = Path(__file__).parent.parent
 REAL_DATA = REPOSITORY.parent / "shared" / "data"
 REFERENCE_DATA = REPOSITORY.parent / "shared" / "reference"
+OWN_BLIND = "tests/reference/genbsdf_blind/tilt45.xml"  # for `bsdf_file`
 WINDOW_GLAZING = REPOSITORY / "tests" / "reference" / "window_glazing"
 
 
@@ -25,6 +28,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     early = {item.path for item in items if item.get_closest_marker("early")}
     items.sort(key=lambda item: item.path not in early)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def matrices_of_this_run(tmp_path_factory) -> Iterator[None]:
+    """One cache of matrices for all tests of a run and all its workers, apart from the user's."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CFS_CACHE", str(folder / "matrices"))
+        yield
 
 
 def default_signals() -> None:
@@ -42,6 +56,17 @@ def real_data() -> Path:
     if not REAL_DATA.is_dir():
         pytest.skip("the folder of real input files (../shared/data) is not here")
     return REAL_DATA
+
+
+@pytest.fixture(scope="session")
+def bsdf_file(request) -> Callable[[str], Path]:
+    """A BSDF file by its name: one of the repository's, else a real one, skipped without it."""
+
+    def find(name: str) -> Path:
+        own = REPOSITORY / name
+        return own if own.is_file() else request.getfixturevalue("real_data") / "bsdf" / name
+
+    return find
 
 
 @pytest.fixture(scope="session")

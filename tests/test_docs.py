@@ -40,7 +40,6 @@ def folder(tmp_path, monkeypatch):
     view = fisheye((0, 0, 0), (0, 1, 0), 64)
     write_hdr(tmp_path / "desk.hdr", np.full((64, 64), 100.0, np.float32), view)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("CFS_CACHE", str(tmp_path / "cache"))
     return tmp_path
 
 

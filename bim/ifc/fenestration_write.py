@@ -16,7 +16,7 @@ import ifcopenshell
 import numpy as np
 
 from bim.fenestration import AngularGValue, ShadingState
-from bim.ifc.property_sets import Entity, give_set
+from bim.ifc.property_sets import Entity, give_set, list_of_numbers
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from thermal.closure import Closure
@@ -105,10 +105,11 @@ class _Writer:
         )  # fmt: skip
 
     def numbers(self, name: str, values: np.ndarray, measure: str = "IfcReal", unit=None) -> Entity:
-        create = self._model.create_entity
         kind = int if measure == "IfcInteger" else float
-        listed = [create(measure, kind(value)) for value in np.asarray(values).ravel()]
-        return create("IfcPropertyListValue", Name=name, ListValues=listed, Unit=unit)
+        plain = np.asarray(values, dtype=kind).ravel().tolist()
+        made = list_of_numbers(self._model, name, measure, plain)
+        made.Unit = unit
+        return made
 
     def bsdf(self, band: str, bsdf: KlemsBsdf | TensorTreeBsdf) -> Entity:
         """The BSDF of one band, figure 21."""

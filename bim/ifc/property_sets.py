@@ -62,6 +62,38 @@ def _take_off(model: ifcopenshell.file, target: Entity, name: str) -> None:
                 model.remove(pset)
 
 
+def list_of_numbers(
+    model: ifcopenshell.file, name: str, measure: str, values: Sequence[float]
+) -> Entity:
+    """A property that lists numbers, each an instance of the measure; give it its unit then.
+
+    Read from text, as one by one they take four times as long: a BSDF has 168 000.
+    """
+    listed = ",".join(f"{measure.upper()}({_step_number(value)})" for value in values)
+    property_ = f"#1=IFCPROPERTYLISTVALUE('',$,({listed}),$);"
+    text = f"{STEP_HEAD.format(model.schema_identifier)}{property_}\nENDSEC;\nEND-ISO-10303-21;\n"
+    made = model.add(ifcopenshell.file.from_string(text).by_id(1))
+    made.Name = name
+    return made
+
+
+STEP_HEAD = """ISO-10303-21;
+HEADER;
+FILE_DESCRIPTION((''),'2;1');
+FILE_NAME('','',(''),(''),'','','');
+FILE_SCHEMA(('{}'));
+ENDSEC;
+DATA;
+"""
+
+
+def _step_number(value: float) -> str:
+    """A number as ISO 10303-21 writes it: a real one has a point, also before its exponent."""
+    number, exponent, power = repr(value).partition("e")
+    point = "" if isinstance(value, int) or "." in number else "."
+    return f"{number}{point}{exponent and 'E'}{power}"
+
+
 def save(model: ifcopenshell.file, out: str | Path) -> None:
     """Write the model; a file of that name is replaced only once the new one is whole."""
     # not `model.write`: on a full disk it says nothing, or not why, and leaves a file of its own

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from bim.fenestration import AngularGValue, ShadingState, read_g_table
 from bim.ifc.attach import attach
 from bim.ifc.fenestration_read import read_states
+from bim.ifc.property_sets import list_of_numbers
 from bim.ifc.targets import Targets
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBsdf
@@ -184,6 +185,19 @@ def test_bsdf_by_library_reference(path, tmp_path):
     back = states_of(out)[0].bands["Visible"]
     np.testing.assert_allclose(back.transmission_front, 0.05, rtol=1e-6)  # 7 digits in the XML
     assert faults(out) == faults(path)
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4", "IFC4X3"])
+def test_every_number_comes_back_bit_for_bit(schema):
+    numbers = [0.0, -0.0, 1e-5, -2.5e-9, 1 / 3, 123456789.0, 1e22, 1.7e308, 5e-324]
+    model = ifcopenshell.file(schema=schema)
+    listed = list_of_numbers(model, "the pane's, \xe9", "IfcReal", numbers)
+    whole = list_of_numbers(model, "depths", "IfcInteger", [0, -3, 2**31 - 1])
+    again = ifcopenshell.file.from_string(model.to_string())
+    for made in (listed, again.by_id(listed.id())):
+        assert made.Name == "the pane's, \xe9" and made.Unit is None
+        assert [repr(one.wrappedValue) for one in made.ListValues] == [repr(n) for n in numbers]
+    assert [one.wrappedValue for one in again.by_id(whole.id()).ListValues] == [0, -3, 2**31 - 1]
 
 
 @pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])

@@ -15,6 +15,7 @@ from mitsuba_cfs.bsdf.radiance_geometry import read_radiance_layer
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.commands.bsdf import command
+from tests.conftest import OWN_BLIND
 
 
 def run(*arguments: object, text: str | None = None):
@@ -25,8 +26,8 @@ def run(*arguments: object, text: str | None = None):
 
 
 @pytest.fixture
-def blind(real_data):
-    return real_data / "bsdf/klems_full/blinds_20deg_noGlazing_Klems.xml"
+def blind(bsdf_file):
+    return bsdf_file(OWN_BLIND)
 
 
 @pytest.fixture
@@ -61,8 +62,9 @@ def test_eval_of_nothing_and_of_nonsense(blind):
     assert run("eval", blind).exit_code == 2
 
 
-def test_info_lists_bands_and_angles(blind):
-    text = run("info", blind).stdout
+def test_info_lists_bands_and_angles(real_data):
+    path = real_data / "bsdf/klems_full/blinds_20deg_noGlazing_Klems.xml"
+    text = run("info", path).stdout
     assert "LBNL/Klems Full, 145 x 145" in text and "thickness: 65.7 mm" in text
     normal = next(line for line in text.splitlines() if "normal" in line).split()
     assert normal[2:] == ["0.6477", "0.1225", "0.6623", "0.0980"]  # the file inventory's figures
@@ -85,10 +87,10 @@ def test_check_sees_front_and_back_that_do_not_fit(real_data):
     assert "differs from transmission back reversed by 70 %" in text
 
 
-@pytest.mark.parametrize("name", ["klems_full/bcl_cl_Tn0.88_blinds", "tensortree/blinds_20deg_t45"])
-def test_plot_writes_a_picture(real_data, tmp_path, name):
+@pytest.mark.parametrize("name", [OWN_BLIND, "tensortree/blinds_20deg_t45.xml"])
+def test_plot_writes_a_picture(bsdf_file, tmp_path, name):
     out = tmp_path / "plot.png"
-    run("plot", real_data / f"bsdf/{name}.xml", "--incident", 140, 90, "--out", out)
+    run("plot", bsdf_file(name), "--incident", 140, 90, "--out", out)
     assert out.read_bytes().startswith(b"\x89PNG") and out.stat().st_size > 20_000
 
 

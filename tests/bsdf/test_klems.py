@@ -18,6 +18,7 @@ from mitsuba_cfs.bsdf.klems import (
 )
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.directions import incident_azimuth, outgoing_azimuth
+from tests.conftest import OWN_BLIND
 
 ASYMMETRIC_FILES = (  # all with other values on the back than on the front
     "klems_full/SquareSlat_genBSDF.xml",
@@ -110,9 +111,9 @@ def evaluate(system: KlemsBsdf, incident, outgoing):
 
 
 @pytest.mark.peer
-@pytest.mark.parametrize("name", ASYMMETRIC_FILES)
-def test_values_are_those_of_radiance(real_data, name):
-    path = real_data / "bsdf" / name
+@pytest.mark.parametrize("name", [OWN_BLIND, *ASYMMETRIC_FILES])
+def test_values_are_those_of_radiance(bsdf_file, name):
+    path = bsdf_file(name)
     incident, outgoing = radiance.random_directions(10_000, seed=1)
     theirs = radiance.query(path, incident, outgoing)
     ours = evaluate(
@@ -140,9 +141,9 @@ def test_a_basis_of_the_file_s_own_is_read_as_by_radiance(tmp_path):
 
 
 @pytest.mark.peer
-@pytest.mark.parametrize("name", ASYMMETRIC_FILES)
-def test_hemispherical_values_are_those_of_radiance(real_data, name):
-    path = real_data / "bsdf" / name
+@pytest.mark.parametrize("name", [OWN_BLIND, *ASYMMETRIC_FILES])
+def test_hemispherical_values_are_those_of_radiance(bsdf_file, name):
+    path = bsdf_file(name)
     incident, _ = radiance.random_directions(1_000, seed=2)
     theirs = radiance.direct_hemispherical(path, incident)
     system = read_bsdf_xml(path).band("Visible").filled()

@@ -12,6 +12,7 @@ from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import disk_to_square, square_to_disk
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.directions import outgoing_azimuth
+from tests.conftest import OWN_BLIND
 
 COUNT, WIDTH, FINE = 40_000, 8, 8  # samples; cells along a square's side, and points in a cell
 FILES = (
@@ -59,9 +60,9 @@ def patch_shares(bsdf: KlemsBsdf, incident):
 
 @pytest.mark.peer
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["front", "back"])
-@pytest.mark.parametrize("name", FILES)
-def test_radiance_samples_by_our_values(real_data, name, side):
-    path = real_data / "bsdf" / name
+@pytest.mark.parametrize("name", [OWN_BLIND, *FILES])
+def test_radiance_samples_by_our_values(bsdf_file, name, side):
+    path = bsdf_file(name)
     bsdf = read_bsdf_xml(path).band("Visible")
     incident = np.array([0.36, 0.48, 0.8 * side])
     drawn = radiance.to_window(radiance.samples(path, radiance.to_window(incident), COUNT))

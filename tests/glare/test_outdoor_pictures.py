@@ -15,7 +15,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.picture_sharing import Tiles, smoothing
 from tests.trace import rooms
 
-pytestmark = pytest.mark.usefixtures("variant")
+pytestmark = [pytest.mark.early, pytest.mark.usefixtures("variant")]
 
 GROUND, FACADE = 0.3, 0.6
 SIZE = 240  # [px] tiles of four are 3 degrees wide

@@ -8,7 +8,10 @@ from scenes.report.page import report_html
 from tests.report.browser import chromium, inspect
 from tests.report.synthetic import run_result
 
-pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+pytestmark = [
+    pytest.mark.early,
+    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
+]
 WITHOUT_WEBGL = ("--disable-3d-apis",)
 
 

@@ -13,7 +13,7 @@ import pytest
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from tests.scenes.radiance_year import SPACING, STORED_ROOM, Year, radiance_year
 
-pytestmark = [pytest.mark.early, pytest.mark.usefixtures("variant")]
+pytestmark = pytest.mark.usefixtures("variant")
 
 
 def our_year(name: str) -> Year:

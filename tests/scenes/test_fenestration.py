@@ -32,15 +32,11 @@ from tests.scenes.fenestration_models import (
     with_attached,
 )
 
+pytestmark = pytest.mark.early
+
 TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2",
         "--method", "three-phase"]  # fmt: skip
 YEAR = ["--quick", "--size", "64", "--metric", "sDGP", "--method", "three-phase"]
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch) -> None:
-    """One cache for the runs of this file, apart from the user's."""
-    monkeypatch.setenv("CFS_CACHE", str(tmp_path_factory.getbasetemp() / "matrices"))
 
 
 def filled(path: Path, given: Given | None = None) -> FenestrationSystem:

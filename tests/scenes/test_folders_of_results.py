@@ -23,7 +23,7 @@ from tests.scenes.writing_jobs import (
     to_folder,
 )
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = [pytest.mark.early, pytest.mark.usefixtures("own_cache")]
 
 
 @pytest.mark.parametrize("name", heavy_ones_slow(OWN))

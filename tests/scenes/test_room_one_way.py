@@ -51,18 +51,14 @@ cooling_c = 26
 TRACE = "\n".join(f"{name} = {value}" for name, value in SAMPLING.items())
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch) -> None:
-    """One cache for this file, apart from the user's."""
-    monkeypatch.setenv("CFS_CACHE", str(tmp_path_factory.getbasetemp() / "one_way"))
-
-
 @pytest.fixture(scope="module")
 def weather() -> Weather:
     return read_epw(WEATHER)
 
 
-@pytest.mark.parametrize("method", ["three-phase", "five-phase"])
+@pytest.mark.parametrize(
+    "method", [pytest.param("three-phase", marks=pytest.mark.slow), "five-phase"]
+)
 def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None:
     """A room of the demo's office with lamps that daylight dims: bit for bit."""
     operation, thermal, grid = (tmp_path / name for name in ("o.toml", "t.toml", "s.toml"))

@@ -24,17 +24,13 @@ from scenes.fenestration.thermal_system import thermal_system
 from scenes.run.options import JobOptions
 from scenes.run.run import read_inputs, used_systems
 
+pytestmark = pytest.mark.early
+
 QUICK = [
     "--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2", "--space", "A",
     "--method", "three-phase",
 ]  # fmt: skip
 TABLES = ("daylight_metrics.csv", "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv")
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch) -> None:
-    """One cache for the runs of this file, apart from the user's."""
-    monkeypatch.setenv("CFS_CACHE", str(tmp_path_factory.getbasetemp() / "matrices"))
 
 
 @pytest.fixture
@@ -72,6 +68,7 @@ def assert_same(one: Path, other: Path) -> None:
         np.testing.assert_allclose(a[numbers], b[numbers], rtol=2e-5, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.slow  # quick: with the `.toml` in place of --u, below
 def test_attached_data_give_the_numbers_of_the_file(tmp_path, blind) -> None:
     with_data = tmp_path / "with_data.ifc"
     attach(OFFICE, with_data, "--all", "--bsdf", blind, "--u", "1.4")
@@ -237,6 +234,8 @@ def test_the_same_room_has_the_same_temperatures_from_file_and_model(tmp_path, b
     for name in TABLES:
         one, other = ((tmp_path / folder / name).read_bytes() for folder in ("file", "model"))
         assert one == other, name
+    manifest = json.loads((tmp_path / "model" / "run.json").read_text())
+    assert "system" not in manifest["inputs"]
 
 
 def test_what_is_given_goes_before_the_toml_and_is_said(tmp_path, blind, capsys) -> None:

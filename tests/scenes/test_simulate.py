@@ -22,15 +22,7 @@ HOURS = 8760
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    """A cache of its own: what is traced once is traced here."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CFS_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
-@pytest.fixture(scope="module")
-def year(variant, cache) -> cfs.SimulatedYear:
+def year(variant) -> cfs.SimulatedYear:
     """The script."""
     room = cfs.read_building(str(OFFICE)).room("South office")
     system, weather = cfs.read_system(str(VENETIAN_BLIND)), cfs.read_weather(str(WEATHER))
@@ -142,7 +134,7 @@ def test_results_of_others_are_not_written_over(year, tmp_path) -> None:
         year.write(tmp_path)
 
 
-def test_a_room_that_is_no_file_has_a_year_too(variant, cache, tmp_path) -> None:
+def test_a_room_that_is_no_file_has_a_year_too(variant, tmp_path) -> None:
     building = shoebox(3, 4, 3, windows=(WindowRectangle(0.5, 1.0, 2.0, 1.5),), name="cell")
     system, weather = cfs.read_system(VENETIAN_BLIND), cfs.read_weather(WEATHER)
     year = cfs.simulate(

@@ -8,7 +8,8 @@ conditions, films, temperatures of the faces; solar properties and g by the angl
 for diffuse light; inward fractions), and one `blackbox_R.json`, `blackbox_back.json` for all
 (resistance between the faces by their temperatures, with the fit of it; the room side).
 
-The double glazing takes a second, a shade as a matrix over Klems patches some minutes.
+The double glazing takes a second, a shade as a matrix over Klems patches some minutes.  The set's
+ventilated blind is not among them: its slats need the engine anew for each of 145 directions.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from typing import Any
 import numpy as np
 import pywincalc
 from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_shade", "int_shade")
@@ -170,42 +173,62 @@ def resistances(engine: Engine) -> tuple[list[dict[str, float]], list[float]]:
 
 def by_angle(engine: Engine) -> list[dict[str, Any]]:
     """Solar transmittance, reflectance, absorptances of the layers and g, to grazing."""
-    found = []
-    for theta in ANGLES_DEG:
-        result = engine.optics(theta)
-        front = result.system_results.front
-        found.append(
-            {
-                "theta": theta,
-                "tau": _total(front.transmittance), "rho": _total(front.reflectance),
-                "alpha_layers": [one.front.absorptance.direct for one in result.layer_results],
-                "g": engine.g_value(theta),
-            }
-        )  # fmt: skip
+    found = [_at(engine, theta) | {"g": engine.g_value(theta)} for theta in ANGLES_DEG]
     none = [0.0] * len(found[0]["alpha_layers"])
     return [*found, {"theta": 90, "tau": 0.0, "rho": 1.0, "alpha_layers": none, "g": 0.0}]
+
+
+def _at(engine: Engine, theta_deg: float) -> dict[str, Any]:
+    result = engine.optics(theta_deg)
+    front = result.system_results.front
+    return {
+        "theta": theta_deg,
+        "tau": _total(front.transmittance), "rho": _total(front.reflectance),
+        "alpha_layers": [one.front.absorptance.direct for one in result.layer_results],
+    }  # fmt: skip
 
 
 def _total(part: Any) -> float:
     return float(part.direct_direct + part.direct_diffuse)
 
 
-def diffuse(engine: Engine, inward: FloatArray) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Properties for diffuse light from outdoors, and from the room."""
+def diffuse(engine: Engine, inward: FloatArray, *, shaded: bool) -> dict[str, Any]:
+    """Properties for diffuse light from outdoors.
+
+    With a shade that is the mean over the directions of its matrix, as the engine's own value for
+    such systems is 3 % above all of its directions'.
+    """
+    if shaded:
+        of_rings = np.bincount(KLEMS_FULL.rings, KLEMS_FULL.projected_solid_angles())
+        rows = [_at(engine, float(np.degrees(theta))) for theta in _ring_centres()]
+        weight = of_rings / of_rings.sum()
+        tau, rho = (float(weight @ [row[key] for row in rows]) for key in ("tau", "rho"))
+        absorbed = (weight @ np.array([row["alpha_layers"] for row in rows])).tolist()
+    else:
+        result = engine.optics(0.0)
+        front = result.system_results.front
+        tau, rho = front.transmittance.diffuse_diffuse, front.reflectance.diffuse_diffuse
+        absorbed = [one.front.absorptance.diffuse for one in result.layer_results]
+    return {"tau": tau, "rho": rho, "alpha_layers": absorbed, "g": float(tau + inward @ absorbed)}
+
+
+def _ring_centres() -> FloatArray:
+    """Angles of incidence of the Klems rings [rad]."""
+    theta, _ = KLEMS_FULL.centres()
+    return np.array(
+        [theta[KLEMS_FULL.rings == ring][0] for ring in range(KLEMS_FULL.rings[-1] + 1)]
+    )
+
+
+def from_the_room(engine: Engine) -> dict[str, Any]:
+    """Properties for diffuse light from the room; layers in the engine's order."""
     result = engine.optics(0.0)
-    front, back = result.system_results.front, result.system_results.back
-    absorbed = [one.front.absorptance.diffuse for one in result.layer_results]
-    tau = front.transmittance.diffuse_diffuse
-    outdoors = {
-        "tau": tau, "rho": front.reflectance.diffuse_diffuse, "alpha_layers": absorbed,
-        "g": float(tau + inward @ absorbed),
-    }  # fmt: skip
-    room = {
+    back = result.system_results.back
+    return {
         "tau_back": back.transmittance.diffuse_diffuse,
         "rho_back": back.reflectance.diffuse_diffuse,
         "alpha_back_layers": [one.back.absorptance.diffuse for one in result.layer_results],
     }
-    return outdoors, room
 
 
 def write(systems: Sequence[str], out: Path) -> None:
@@ -219,7 +242,9 @@ def write(systems: Sequence[str], out: Path) -> None:
         g, tau = (np.array([row[key] for row in angular]) for key in ("g", "tau"))
         absorbed = np.array([row["alpha_layers"] for row in angular])
         inward = np.linalg.lstsq(absorbed, g - tau, rcond=None)[0]
-        outdoors, room_side[name] = diffuse(engine, inward)
+        outdoors, room_side[name] = (
+            diffuse(engine, inward, shaded=name != "dgu"), from_the_room(engine),
+        )  # fmt: skip
         by_faces[name], by_faces[f"{name}_fit"] = resistances(engine)
         data = {
             "cfs": name, "engine": f"pywincalc {version('pywincalc')}", "U": u_values(engine),
