@@ -18,6 +18,7 @@ NO_EVIDENCE = {
         "| part of a five-phase picture | resolution |",
     },
     "thermal.md": {"| closure | absorptances from | layer resistance | films of the layers |"},
+    "comply.md": {"| in the folder of results | what |", "| option | what |"},
     "studies.md": {"| in the folder | what |"},
     "pv.md": {"| key | what |"},
 }  # fmt: skip

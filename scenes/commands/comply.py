@@ -20,6 +20,7 @@ from scenes.commands.room_options import (
     space_option,
     subdivide_option,
     system_option,
+    write_ifc_option,
 )
 from scenes.comply.options import ComplyOptions
 from scenes.room.options import RoomOptions
@@ -54,6 +55,7 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
 )  # fmt: skip
 @eye_height_option
 @click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
+@write_ifc_option("a level for each criterion of each room")
 @subdivide_option
 @seed_option
 @no_cache_option
@@ -68,6 +70,7 @@ def command(
     out: Path,
     standards: tuple[str, ...],
     day: str,
+    write_ifc: Path | None,
     quick: bool,
     no_cache: bool,
     **chosen,
@@ -81,15 +84,18 @@ def command(
         building, weather, standards, system, closed, uses=uses, day=day_of(day),
         annual_glare=glare, cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen), **own,
     )  # fmt: skip
+    from mitsuba_cfs.files import check_file
     from scenes.comply.files import read_files
     from scenes.result_folder import ResultFolder
 
     folder = ResultFolder(out, "comply", inputs=(building, weather, system, closed, uses))
+    if write_ifc is not None:
+        check_file(write_ifc, field="--write-ifc", inputs=(building,))
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.comply.comply import check_building
-    from scenes.comply.outputs import write_compliance
+    from scenes.comply.outputs import write_compliance, write_into_ifc
 
     if quick:
         click.echo(quick_run.NOTE)
@@ -103,6 +109,10 @@ def command(
     for text in (*result.assumptions, *result.notes):
         click.echo(f"note: {text}")
     click.echo(f"dossier: {out / 'dossier.html'}")
+    if write_ifc is not None:
+        for problem in write_into_ifc(result, write_ifc):
+            click.echo(f"note: {problem.where}: {problem.what}")
+        click.echo(f"building with results: {write_ifc}")
 
 
 def day_of(text: str) -> tuple[int, int]:

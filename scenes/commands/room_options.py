@@ -87,6 +87,14 @@ def samples_option(default: int, why: str) -> Option:
     )  # fmt: skip
 
 
+def write_ifc_option(sets: str) -> Option:
+    """`--write-ifc`; which `sets` there are."""
+    return click.option(
+        "--write-ifc", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT.ifc",
+        help=f"The building with the results in property sets; {sets}.",
+    )  # fmt: skip
+
+
 def view_option(name: str, what: str, *, several: bool) -> Option:
     """`--view` into the parameter `name`."""
     return click.option(

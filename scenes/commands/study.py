@@ -9,7 +9,7 @@ import click
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import quick_option
-from scenes.commands.room_options import method_option, out_folder_option
+from scenes.commands.room_options import method_option, out_folder_option, write_ifc_option
 
 
 @click.command()
@@ -23,10 +23,7 @@ from scenes.commands.room_options import method_option, out_folder_option
 @method_option(["auto"], "auto: by cost and error, in place of the file's")
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
-@click.option(
-    "--write-ifc", type=click.Path(path_type=Path, dir_okay=False), metavar="OUT.ifc",
-    help="The study's building with each case's results in property sets.",
-)  # fmt: skip
+@write_ifc_option("one for each case of a study of one file")
 @quick_option
 def command(
     study: Path,

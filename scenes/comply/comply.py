@@ -19,6 +19,7 @@ from scenes.comply.assess import assess_building, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, calendar_of
+from scenes.comply.glass import windows_without_view
 from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
@@ -102,6 +103,7 @@ class Check:
         self.building = traced_building(building, self.systems)
         self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
         self.notes += files.weather.notes
+        self.hidden, self.glass = windows_without_view(windows, self.systems)
         self.calendar = calendar_of(files.weather)
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
         self.outdoors: OutdoorMesh = outdoors_of(self.building)
@@ -136,7 +138,12 @@ class Check:
         for number, space in enumerate(spaces):
             self.progress("view and sunlight", number / len(spaces))
             try:
-                view = view_out(space, self.outdoors, eye_height=self.options.eye_height)
+                view = view_out(
+                    space,
+                    self.outdoors,
+                    eye_height=self.options.eye_height,
+                    hidden=self.hidden,
+                )
             except RoomError as error:
                 problems.append(Problem(space.guid, str(error), "the room was left out"))
                 continue
@@ -243,6 +250,7 @@ class Check:
                 f"View out: eyes {options.eye_height:g} m above the floor, 0.5 m apart and off the "
                 "walls, are the utilised area; furniture does not count."
             )
+            found += self.glass
         if "glare" in self.parts and not options.annual_glare:
             found.append("Glare was not computed: --annual-glare rates every hour with daylight.")
         if "open" in self.parts and self.calendar.median_diffuse is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,7 @@ def view_out(
     spacing: float = SPACING,
     eye_height: float = SEATED,
     margin: float = 0.5,
+    hidden: Collection[str] = (),
 ) -> ViewOut:
     """The view from a grid of eyes all over the utilised area of a room.
 
@@ -62,15 +64,19 @@ def view_out(
     wall to what a level ray through the opening meets, and is the median over the sight angle.
     The layers are those that one opening shows.  Rooflights show none.
 
-    Args: spacing, margin: of the eyes and off the walls [m]; eye_height: above the floor [m], 1.2
-    seated and 1.7 standing.
+    Args:
+        spacing, margin: of the eyes and off the walls [m].
+        eye_height: above the floor [m], 1.2 seated and 1.7 standing.
+        hidden: GUIDs of windows that one does not see through.
 
     Source: EN 17037:2018+A1:2021, 5.2 and annexes A.3 and C.  The standard has no rule for rays:
     the median and the horizon of 5 degrees are those of ClimateStudio's documentation.
     """
     points, _ = sensor_grid(space, spacing=spacing, height=eye_height, margin=margin)
     room, own = opaque_room(space), outdoors.windows_of(space)
-    openings = [one for one in openings_of(space) if not one.is_horizontal]
+    openings = [
+        one for one in openings_of(space) if not one.is_horizontal and one.window.guid not in hidden
+    ]
     layers = np.zeros((len(points), len(LAYERS)), dtype=bool)
     seen = [np.empty((0, 4))]
     for opening in openings:

@@ -11,8 +11,11 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.metrics import lm83
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.blinds import diffuse_shade, open_and_closed, with_default_shade
+from scenes.comply.glass import sight_through, windows_without_view
 from scenes.comply.light import lights_of, sensor_grid_of
+from scenes.comply.outdoors import outdoors_of
 from scenes.comply.rules import GridTable, read_rule
+from scenes.comply.view_out import view_out
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.options import RoomOptions, SensorGrid
@@ -117,3 +120,29 @@ def test_operation_by_group_of_arrays():
     direct[0, 1, :2], direct[0, 2, :3], direct[1, 0, :50] = 1000.0, 1000.0, 2000.0
     wanted = [[False, False, True], [True, False, False]]
     np.testing.assert_array_equal(lm83.blinds_operated(direct), wanted)
+
+
+def test_glass_is_seen_through_and_a_diffuser_is_not():
+    """Clear glass goes straight on; a shade of 5 % diffuse has no peak."""
+    clear = sight_through(glazing(0.7))
+    assert clear.transmittance == pytest.approx(0.7, abs=0.005) and clear.haze < 0.02
+    assert clear.is_view
+    shaded = sight_through(with_default_shade(glazing(0.7)))
+    assert shaded.straight == 0.0 and shaded.haze == 1.0 and not shaded.is_view
+
+
+def test_windows_without_view_are_no_view_openings():
+    """The clear one of two windows alone has a sight angle; a window without data is clear."""
+    two = [WindowRectangle(0.25, 1, 1.5, 1), WindowRectangle(2.25, 1, 1.5, 1)]
+    building = shoebox(windows=two)
+    space = building.spaces[0]
+    first, second = space.windows
+    systems = {first.guid: (glazing(),), second.guid: (with_default_shade(glazing()),)}
+    hidden, notes = windows_without_view(space.windows, systems)
+    assert hidden == {second.guid} and len(notes) == 2
+    assert "haze 100 %: does not count" in notes[1]
+    found = view_out(space, outdoors_of(building), hidden=hidden)
+    x, y = found.points[:, 0], found.points[:, 1]
+    wanted = np.degrees(np.arctan2(1.75 - x, y) - np.arctan2(0.25 - x, y))
+    np.testing.assert_allclose(found.sight_angle_deg, wanted, atol=0.1)
+    assert windows_without_view(space.windows, {}) == (frozenset(), ())

@@ -112,8 +112,8 @@ def test_levels_of_sunlight(calendar, hours, level):
 
 
 def test_view_wants_all_three_at_one_eye(calendar):
-    """Half of the eyes have the angle, the other half the distance: not met."""
-    angle, distance = np.array([60.0, 60, 5, 5]), np.array([3.0, 3, 90, 90])
+    """Three of four eyes have the angle, two of four the distance, one both: not met."""
+    angle, distance = np.array([60.0, 60, 60, 5]), np.array([3.0, 3, 90, 90])
     view = ViewOut(np.zeros((4, 3)), angle, distance, np.ones((4, 3), dtype=bool))
     assert reached("en17037", Findings(calendar, view=view))["view_out"] == NOT_MET
     wide = ViewOut(np.zeros((4, 3)), np.array([28.0, 28, 28, 5]), distance + 90, view.layers)

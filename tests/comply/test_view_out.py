@@ -32,13 +32,15 @@ def test_sight_angle_of_flush_glass():
 
 
 def test_sight_angle_behind_a_wall():
-    """The nearer corners of the reveals, at the inner surface, hide the glass behind them."""
-    view = seen(shoebox(windows=[WINDOW], recess=0.4))
+    """From aside the nearer corner of the reveals, at the inner surface, hides glass behind it."""
+    view = seen(shoebox(windows=[WindowRectangle(1.5, 0.9, 1.0, 1.8)], recess=0.4))
     x, y = view.points[:, 0], view.points[:, 1]
     # each edge: the reveal's inner or outer corner, whichever hides more
-    right = np.minimum(np.arctan2(3.5 - x, y), np.arctan2(3.5 - x, y + 0.4))
-    left = np.maximum(np.arctan2(0.5 - x, y), np.arctan2(0.5 - x, y + 0.4))
-    np.testing.assert_allclose(view.sight_angle_deg, np.degrees(right - left), atol=0.1)
+    right = np.minimum(np.arctan2(2.5 - x, y), np.arctan2(2.5 - x, y + 0.4))
+    left = np.maximum(np.arctan2(1.5 - x, y), np.arctan2(1.5 - x, y + 0.4))
+    wanted = np.degrees(np.maximum(right - left, 0.0))
+    assert wanted.min() < 10 < wanted.max()
+    np.testing.assert_allclose(view.sight_angle_deg, wanted, atol=0.1)
 
 
 def test_sight_angles_of_openings_add_where_they_are_apart():

@@ -1,0 +1,88 @@
+"""BCF topics of rooms that miss a criterion: a viewer selects the room in the model.
+
+Source: buildingSMART, BIM Collaboration Format 2.1 (markup.xsd, visinfo.xsd, version.xsd).
+"""
+
+from __future__ import annotations
+
+import datetime
+import uuid
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+from mitsuba_cfs.files import replacing
+from scenes.comply.results import CheckedRoom, Compliance
+from scenes.comply.rules import NOT_MET
+from scenes.comply.tables import limit_of, shown
+
+VERSION = "2.1"
+AUTHOR = "mitsuba-cfs"
+
+
+def write_bcf(result: Compliance, path: Path) -> int:
+    """Write a topic for each room that misses a criterion; how many there are.
+
+    A topic selects the room by its GUID.  It has no camera: viewers go to what is selected.
+    """
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    rooms = [room for room in result.rooms if any(_missed(room))]
+    with replacing(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("bcf.version", _text(_version()))
+        for room in rooms:
+            topic = str(uuid.uuid5(uuid.NAMESPACE_URL, f"{AUTHOR}/comply/{room.space.guid}"))
+            view = str(uuid.uuid5(uuid.NAMESPACE_URL, f"{AUTHOR}/comply/view/{room.space.guid}"))
+            archive.writestr(f"{topic}/markup.bcf", _text(_markup(room, topic, view, now)))
+            archive.writestr(f"{topic}/viewpoint.bcfv", _text(_viewpoint(room, view)))
+    return len(rooms)
+
+
+def _missed(room: CheckedRoom) -> Iterator[str]:
+    """A sentence for each criterion of which the room reaches no level."""
+    for verdict in room.verdicts:
+        if not verdict.applies or verdict.reached != NOT_MET:
+            continue
+        one, values = verdict.criterion, verdict.values[0]
+        numbers = "; ".join(
+            f"{need.words}: {shown(need, value)}, {limit_of(need)} for {one.level[0].name}"
+            for need, value in zip(one.level[0].needs, values, strict=True)
+            if not need.met(value)
+        )
+        yield f"{verdict.rule}, {one.title} ({one.clause}): {numbers}"
+
+
+def _version() -> ElementTree.Element:
+    root = ElementTree.Element("Version", VersionId=VERSION)
+    ElementTree.SubElement(root, "DetailedVersion").text = VERSION
+    return root
+
+
+def _markup(room: CheckedRoom, topic: str, view: str, now: str) -> ElementTree.Element:
+    root = ElementTree.Element("Markup")
+    about = ElementTree.SubElement(root, "Topic", Guid=topic, TopicType="Issue", TopicStatus="Open")
+    missed = list(_missed(room))
+    what = "criterion" if len(missed) == 1 else "criteria"
+    title = f"{room.space.label}: {len(missed)} {what} not met"
+    ElementTree.SubElement(about, "Title").text = title
+    ElementTree.SubElement(about, "CreationDate").text = now
+    ElementTree.SubElement(about, "CreationAuthor").text = AUTHOR
+    ElementTree.SubElement(about, "Description").text = "\n".join(missed)
+    views = ElementTree.SubElement(root, "Viewpoints", Guid=view)
+    ElementTree.SubElement(views, "Viewpoint").text = "viewpoint.bcfv"
+    return root
+
+
+def _viewpoint(room: CheckedRoom, view: str) -> ElementTree.Element:
+    root = ElementTree.Element("VisualizationInfo", Guid=view)
+    components = ElementTree.SubElement(root, "Components")
+    ElementTree.SubElement(components, "ViewSetupHints", SpacesVisible="true")
+    selection = ElementTree.SubElement(components, "Selection")
+    ElementTree.SubElement(selection, "Component", IfcGuid=room.space.guid)
+    ElementTree.SubElement(components, "Visibility", DefaultVisibility="true")
+    return root
+
+
+def _text(root: ElementTree.Element) -> bytes:
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)

@@ -1,0 +1,64 @@
+"""What one sees through a window's system: how much goes straight on, and how much is haze."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from bim.model import Window
+from mitsuba_cfs.bsdf.klems_peak import through_peak
+from scenes.fenestration.systems import FenestrationSystem, States
+
+MOST_HAZE = 0.5  # share of the light passed that may be scattered in what counts as a view
+
+
+@dataclass(frozen=True, slots=True)
+class SightThrough:
+    """Light of normal incidence through a system."""
+
+    transmittance: float  # all that passes
+    straight: float  # what goes straight on
+
+    @property
+    def haze(self) -> float:
+        """Share of what passes that is scattered, 0 to 1; 1 where nothing passes."""
+        if self.transmittance <= 0:
+            return 1.0
+        return max(1.0 - self.straight / self.transmittance, 0.0)
+
+    @property
+    def is_view(self) -> bool:
+        """Whether one sees through: at least half of what passes goes straight on."""
+        return self.haze <= MOST_HAZE
+
+
+def sight_through(system: FenestrationSystem) -> SightThrough:
+    """What of the light of normal incidence passes, and what straight on, in the visible band."""
+    klems = system.visible
+    block = klems.transmission_front
+    straight = through_peak(block, klems.basis_in).transmittance[0]
+    return SightThrough(float(klems.direct_hemispherical(block)[0]), float(straight))
+
+
+def windows_without_view(
+    windows: Iterable[Window], systems: Mapping[str, States]
+) -> tuple[frozenset[str], tuple[str, ...]]:
+    """GUIDs of the windows that one does not see through when open, and a sentence on each system.
+
+    Windows whose system is not known are seen through.
+    """
+    known: dict[int, SightThrough] = {}
+    hidden, notes = set(), {}
+    for window in windows:
+        if window.guid not in systems:
+            continue
+        system = systems[window.guid][0]
+        sight = known.setdefault(id(system), sight_through(system))
+        counts = "counts" if sight.is_view else "does not count"
+        notes[system.name] = (
+            f"{system.name}: {100 * sight.straight:.0f} % of the light straight on at normal "
+            f"incidence, haze {100 * sight.haze:.0f} %: {counts} as a view."
+        )
+        if not sight.is_view:
+            hidden.add(window.guid)
+    return frozenset(hidden), tuple(notes.values())

@@ -1,0 +1,207 @@
+"""A check of rooms by rays alone, and its files: dossier, values, BCF topics, property sets."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.errors import DataError
+from scenes.commands.comply import command
+from scenes.comply.comply import check_rooms
+from scenes.comply.files import ComplyFiles, least_altitude, read_files
+from scenes.comply.options import ComplyOptions
+from scenes.comply.outputs import write_compliance, write_into_ifc
+from scenes.comply.page import dossier_html
+from scenes.comply.rules import read_rule
+from scenes.comply.uses import read_uses
+from scenes.demo import OFFICE, WEATHER
+from scenes.fenestration.systems import Given
+from scenes.result_folder import ResultFolder
+from scenes.run.building import read_building
+from scenes.run.inputs import read_weather
+
+RULE = """
+title = "View and sun"
+edition = "2026 <draft>"
+source = ["mine"]
+grid = {height = 0.8, margin = 0.5}
+[[criterion]]
+key = "view"
+title = "View & distance"
+clause = "clause 7.1"
+[[criterion.level]]
+name = "met"
+needs = [{what = "view", angle_deg = 14, distance = 6, layers = 1, at_least = 0.75}]
+[[criterion]]
+key = "sun"
+title = "Sun"
+clause = "clause 7.2"
+occupied = true
+[[criterion.level]]
+name = "met"
+needs = [{what = "sun_hours", at_least = 1.5}]
+"""
+
+
+@pytest.fixture(scope="module")
+def options(tmp_path_factory) -> ComplyOptions:
+    path = tmp_path_factory.mktemp("rule") / "rays.toml"
+    path.write_text(RULE)
+    return ComplyOptions(None, WEATHER, (str(path),))
+
+
+def files_of(options: ComplyOptions, **more) -> ComplyFiles:
+    rules = {"rays": read_rule(options.standards[0])}
+    found = ComplyFiles(
+        read_weather(WEATHER), rules, read_uses(), Given(), None, 13.0, "assumed: as you like"
+    )
+    return replace(found, **more)
+
+
+@pytest.fixture(scope="module")
+def result(options):
+    """A south office that meets all, a north store, a room with a hatch, one without a window."""
+    south = shoebox(name="Office south").spaces[0]
+    north = shoebox(name="Store north", facing_deg=0).spaces[0]
+    hatch = [WindowRectangle(1.9, 2.6, 0.2, 0.2)]
+    dim = shoebox(name="Office hatch", windows=hatch, facing_deg=0).spaces[0]
+    dark = shoebox(name="Meeting room", windows=[]).spaces[0]
+    lost = shoebox(name="Cell", windows=[]).spaces[0]
+    building = replace(shoebox(), name="<House>", spaces=(south, north, dim, dark, lost))
+    return check_rooms(building, options, files_of(options))
+
+
+def verdicts(result):
+    return {
+        room.space.name: {v.criterion.key: v.reached for v in room.verdicts}
+        for room in result.rooms
+    }
+
+
+def test_rooms_are_checked(result):
+    """No rays of light: a window's system is not even asked for; dark rooms count if occupied."""
+    assert verdicts(result) == {
+        "Office south": {"view": "met", "sun": "met"},
+        "Store north": {"view": "met", "sun": "not for this room"},
+        "Office hatch": {"view": "not met", "sun": "not met"},
+        "Meeting room": {"view": "not met", "sun": "not met"},
+    }  # a cell without a window and without a use is no occupied room
+    assert [v.rooms for v in result.verdicts] == [4, 3]
+    assert result.verdicts[0].values == pytest.approx([0.5])
+
+
+def test_assumptions_name_what_was_assumed(result):
+    text = "\n".join(result.assumptions)
+    assert "13° above the horizon (assumed: as you like)" in text
+    assert "Office south: office, name 'Office south' holds 'office'." in text
+
+
+def test_the_dossier_says_all(result):
+    html = dossier_html(result)
+    for wanted in ("&lt;House&gt;", "2026 &lt;draft&gt;", "clause 7.1", "View &amp; distance",
+                   "≥ 75 %", "Meeting room", "Sunlight at the openings", "mine"):  # fmt: skip
+        assert wanted in html
+    assert "<script" not in html and "http:" not in html.replace("http://www.w3.org", "")
+
+
+def test_values_have_a_row_for_each_need(result, tmp_path):
+    write_compliance(result, ResultFolder(tmp_path / "out", "comply"))
+    table = pd.read_csv(tmp_path / "out" / "values.csv")
+    assert len(table) == 4 + 3
+    row = table[(table.room == "Office south") & (table.criterion == "view")].iloc[0]
+    assert (row.limit, row.unit, row.met, row.clause) == (75.0, "%", "yes", "clause 7.1")
+    assert row.value == 100.0
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"dossier.html", "issues.bcf", "model.ids", "problems.csv"} <= names
+
+
+def test_topics_are_of_rooms_that_miss_something(result, tmp_path):
+    """BCF 2.1: a topic selects its room; numbers and limits stand in its description."""
+    write_compliance(result, ResultFolder(tmp_path / "out", "comply"))
+    with zipfile.ZipFile(tmp_path / "out" / "issues.bcf") as archive:
+        assert ElementTree.fromstring(archive.read("bcf.version")).get("VersionId") == "2.1"
+        markups = [name for name in archive.namelist() if name.endswith("markup.bcf")]
+        found = {}
+        for name in markups:
+            topic = ElementTree.fromstring(archive.read(name)).find("Topic")
+            folder = name.partition("/")[0]
+            assert topic.get("Guid") == folder
+            view = ElementTree.fromstring(archive.read(f"{folder}/viewpoint.bcfv"))
+            guid = view.find("Components/Selection/Component").get("IfcGuid")
+            found[guid] = topic.findtext("Title"), topic.findtext("Description")
+    assert set(found) == {"Office hatch-guid", "Meeting room-guid"}
+    title, text = found["Meeting room-guid"]
+    assert title == "Meeting room: 2 criteria not met"
+    assert "clause 7.2" in text and "0.00 h, ≥ 1.5 h for met" in text
+
+
+def test_levels_go_into_the_ifc(options, tmp_path):
+    """A property set on each room of a real file."""
+    import ifcopenshell
+    import ifcopenshell.util.element
+
+    building = read_building(OFFICE)
+    found = check_rooms(building, replace(options, building=OFFICE), files_of(options))
+    assert not write_into_ifc(found, tmp_path / "with.ifc")
+    model = ifcopenshell.open(tmp_path / "with.ifc")
+    sets = [ifcopenshell.util.element.get_psets(s) for s in model.by_type("IfcSpace")]
+    levels = [one["CFS compliance"]["rays view"] for one in sets if "CFS compliance" in one]
+    assert levels and set(levels) <= {"met", "not met"}
+    assert {one["CFS compliance"]["use"] for one in sets if "CFS compliance" in one} == {"office"}
+
+
+@pytest.mark.parametrize(
+    ("site", "altitude", "source"),
+    [
+        ("FRANKFURT AM MAIN, DEU", 11.0, "of DEU, by the rule file en17037"),
+        ("PRAHA, CZE", 13.0, "of CZE"),
+        ("Chicago, USA", 13.0, "assumed: no rule file has one for USA"),
+    ],
+)
+def test_least_altitude_of_the_sun(site, altitude, source):
+    weather = replace(read_weather(WEATHER), site=site)
+    rules = {"en17037": read_rule("en17037")}
+    options = ComplyOptions(None, None, ("en17037",))
+    found, said = least_altitude(options, rules, weather)
+    assert found == altitude and source in said
+    own = replace(options, least_altitude_deg=5.0)
+    assert least_altitude(own, rules, weather)[0] == 5.0
+
+
+def test_a_building_without_windows_is_said(options):
+    building = shoebox(windows=[])
+    with pytest.raises(DataError, match="no space has a window"):
+        check_rooms(building, options, files_of(options))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--standard", "en17073"], "no rule 'en17073'; there are breeam-hea01, en17037"),
+        (["--standard", "en17037", "--day", "03-22"], "expected a day from 02-01 to 03-21"),
+        (["--standard", "en17037", "--day", "02-30"], "expected a day from 02-01 to 03-21"),
+        (["--standard", "en17037", "--day", "noon"], "expected a day from 02-01 to 03-21"),
+        ([], "Missing option '--standard'"),
+    ],
+)
+def test_wrong_choices_are_named_first(words, said, tmp_path):
+    arguments = [str(OFFICE), "--weather", str(WEATHER), "--out", str(tmp_path / "out"), *words]
+    found = CliRunner().invoke(command, arguments)
+    assert found.exit_code != 0
+    assert said in f"{found.output} {found.exception}"
+
+
+def test_files_are_read_by_their_options(tmp_path):
+    path = tmp_path / "house.toml"
+    path.write_text(RULE)
+    options = ComplyOptions(OFFICE, WEATHER, ("en17037", str(path)))
+    found = read_files(options)
+    assert list(found.rules) == ["en17037", "house"]
+    assert found.given.light_only and isinstance(Path(str(path)), Path)
