@@ -25,6 +25,7 @@ from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
+from bim.ifc.space_boundaries import boundary_problems
 from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
 from bim.model import Building, Element, Problem, Space
 from bim.outdoors import lifted_sites, unblinded
@@ -94,6 +95,7 @@ def read_ifc(
             continue
         spaces.append(space)
         problems += more
+    problems += boundary_problems(source, spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
     problems += more
     tell("surroundings", 0.0)
