@@ -13,6 +13,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.boundaries import ElementRecord, faces_and_windows, floor_area
+from bim.coarser import coarser
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
@@ -151,7 +152,8 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
     )
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
-    return outdoors.elements, [*problems, *more, *outdoors.problems]
+    traced, fine = coarser(list(outdoors.elements))
+    return tuple(traced), [*problems, *more, *outdoors.problems, *fine]
 
 
 def _surroundings(
