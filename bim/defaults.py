@@ -2,7 +2,8 @@
 
 Reflectances.  Room: EN 17037:2018, B.3 and IES LM-83-12, 2.2.6 (ceiling 0.7, walls 0.5, floor 0.2);
 facades outdoors 0.3, frames and furniture 0.5: IES LM-83-12.  Glass of other windows seen
-from outdoors: near normal reflectance of clear double glazing, 0.15 (Fresnel, four surfaces of n = 1.52).
+from outdoors: near normal reflectance of clear double glazing, 0.15 (Fresnel, four surfaces of
+n = 1.52).
 Solar reflectance equals the visible one where nothing is known; emissivity 0.9 as in EN ISO 6946
 for ordinary building surfaces.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from os import PathLike
 
 
@@ -31,3 +33,13 @@ class RoomError(CfsError, ValueError):
 
 class VariantError(CfsError, RuntimeError):
     """No usable Mitsuba variant or LLVM library: says what to install."""
+
+
+def no_such_key(key: str, known: Iterable[str]) -> str:
+    """What to say of a key that there is not: the known one that it most resembles, else all."""
+    folded = {one.casefold(): one for one in known}
+    near = get_close_matches(key.casefold(), folded, n=1)
+    instead = (
+        f"did you mean {folded[near[0]]}?" if near else "there are " + ", ".join(folded.values())
+    )
+    return f"no such key; {instead}"

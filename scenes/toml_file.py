@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, no_such_key
 
 T = TypeVar("T", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0)]
@@ -102,7 +102,7 @@ def _said(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
         *place, last = place
     kind = fault["type"]
     if _is_key(fault):
-        return f"no such key; {_instead(str(last), keys_of(_at(model, place)) or ())}"
+        return no_such_key(str(last), keys_of(_at(model, place)) or ())
     if kind == "missing":
         return f"expected {last + 1} values" if isinstance(last, int) else "is missing"
     if kind == "value_error":
@@ -122,13 +122,6 @@ def _near(fault: Mapping[str, Any], model: type[BaseModel]) -> str:
     choices = [str(c) for one in _alternatives(_at(model, fault["loc"])) for c in get_args(one)]
     near = get_close_matches(str(fault["input"]), choices, n=1)
     return f"; did you mean {near[0]!r}?" if near else ""
-
-
-def _instead(key: str, known: tuple[str, ...]) -> str:
-    """The known key that a wrong one most resembles, else all of them."""
-    folded = {one.casefold(): one for one in known}
-    near = get_close_matches(key.casefold(), folded, n=1)
-    return f"did you mean {folded[near[0]]}?" if near else "there are " + ", ".join(known)
 
 
 def _shown(value: object) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
+from bim.coarser import coarser
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
@@ -24,6 +25,7 @@ from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
+from bim.ifc.space_boundaries import boundary_problems
 from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
 from bim.model import Building, Element, Problem, Space
 from bim.outdoors import lifted_sites, unblinded
@@ -91,6 +93,7 @@ def read_ifc(
             continue
         spaces.append(space)
         problems += more
+    problems += boundary_problems(source, spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
     problems += more
     tell("surroundings", 0.0)
@@ -146,7 +149,8 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
     )
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
-    return outdoors.elements, [*problems, *more, *outdoors.problems]
+    traced, fine = coarser(list(outdoors.elements))
+    return tuple(traced), [*problems, *more, *outdoors.problems, *fine]
 
 
 def _surroundings(

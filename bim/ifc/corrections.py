@@ -3,6 +3,7 @@
 `model.corrections.toml` beside `model.ifc` is used without being asked for:
 
     leave_out = ['IfcBuildingElementProxy', 'IfcSlab, type="Canopy"']   # selectors of ifcopenshell
+    opaque = ['IfcWindow, Name="Sign"']  # what is drawn transparent there is no glass
     keep = ['IfcShadingDevice, Name=/Louvre.*/']   # traced, though a BSDF with a shade is behind it
     only = ['IfcWall', 'IfcSlab', 'IfcWindow', 'IfcSpace']              # nothing else is read
     join = [["Hall", "Living"]] # rooms open to each other that are to be one
@@ -30,14 +31,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.errors import DataError, no_such_key
 from mitsuba_cfs.gloss import ROUGHEST, Gloss, lacquer
 
 if TYPE_CHECKING:
     import ifcopenshell
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
-KEYS = {"leave_out", "only", "keep", "join", "surroundings", "reflectance"}
+KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance")
+PAINT_KEYS = ("select", "visible", "solar")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,7 @@ class Corrections:
     join: tuple[tuple[str, ...], ...] = ()  # names or GUIDs of rooms to make one
     file: str = ""
     keep: tuple[str, ...] = ()  # shading devices that are traced before any BSDF
+    opaque: tuple[str, ...] = ()  # elements without glass, whatever they are drawn as
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -78,6 +81,10 @@ class Corrections:
     def kept(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that `keep` chooses."""
         return set().union(*(chosen(model, query, self.file) for query in self.keep))
+
+    def unglazed(self, model: ifcopenshell.file) -> set[int]:
+        """STEP ids of the products that `opaque` chooses."""
+        return set().union(*(chosen(model, query, self.file) for query in self.opaque))
 
     def painted(self, model: ifcopenshell.file) -> dict[int, Paint]:
         """The paint by STEP id; later entries win."""
@@ -136,10 +143,11 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise DataError(f"is not TOML: {error}", file=path) from None
-    unknown = sorted(set(table) - KEYS)
-    if unknown:
-        raise DataError(f"expected one of {', '.join(sorted(KEYS))}", file=path, field=unknown[0])
-    paints = tuple(_paint(entry, path) for entry in table.get("reflectance", ()))
+    _check_keys(table, KEYS, path)
+    entries = table.get("reflectance", [])
+    if not isinstance(entries, list):
+        raise DataError("expected tables, [[reflectance]]", file=path, field="reflectance")
+    paints = tuple(_paint(entry, path) for entry in entries)
     surroundings = table.get("surroundings")
     if surroundings is not None:
         surroundings = _share(surroundings, path, "surroundings")
@@ -149,13 +157,21 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
     join = tuple(_texts({"join": group}, "join", path) for group in groups)
     return Corrections(
         _texts(table, "leave_out", path), _texts(table, "only", path), paints, surroundings, join,
-        str(path), _texts(table, "keep", path),
+        str(path), _texts(table, "keep", path), _texts(table, "opaque", path),
     )  # fmt: skip
+
+
+def _check_keys(table: dict, known: Sequence[str], path: Path, prefix: str = "") -> None:
+    """Refuse a key that there is not, naming the nearest."""
+    for key in table:
+        if key not in known:
+            raise DataError(no_such_key(key, known), file=path, field=prefix + key)
 
 
 def _paint(entry: dict, path: Path) -> Paint:
     if not isinstance(entry, dict) or not isinstance(entry.get("select"), str):
         raise DataError("expected select = '...'", file=path, field="reflectance")
+    _check_keys(entry, PAINT_KEYS, path, "reflectance.")
     if "visible" not in entry:
         raise DataError("expected visible = 0 to 1", file=path, field="reflectance")
     visible = _share(entry["visible"], path, "visible")

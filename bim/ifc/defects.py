@@ -36,7 +36,6 @@ def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Pro
         *wrong_classes(shapes),
         *open_bodies(shapes, solids),
         *walls_apart(shapes, solids),
-        *unused_boundaries(model),
     ]
 
 
@@ -136,12 +135,3 @@ def walls_apart(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> 
                 done = "harmless to rooms drawn as spaces; closed where rooms have to be found"
                 problems.append(Problem(one.guid, what, done))
     return problems
-
-
-def unused_boundaries(model: ifcopenshell.file) -> list[Problem]:
-    """A note that the file's space boundaries are not relied on."""
-    count = len(model.by_type("IfcRelSpaceBoundary"))
-    if not count:
-        return []
-    what = f"has {count} space boundaries"
-    return [Problem("IfcRelSpaceBoundary", what, "not used: neighbours are found from geometry")]

@@ -91,7 +91,7 @@ def outdoor_elements(
         base = Element(
             shape.guid, shape.name or shape.ifc_class, shape.ifc_class, shape.triangles, default,
             default, next(iter(cad_layers_of(entity)), ""), storey_of(entity),
-            _material_name(entity), shape.step_id in kept,
+            material_name(entity), shape.step_id in kept,
         )  # fmt: skip
         for index in np.unique(shape.look):
             visible = solar = default
@@ -128,7 +128,8 @@ def cad_layers_of(entity: ifcopenshell.entity_instance) -> list[str]:
     return names
 
 
-def _material_name(entity: ifcopenshell.entity_instance) -> str:
+def material_name(entity: ifcopenshell.entity_instance) -> str:
+    """Name of an element's first material."""
     with contextlib.suppress(Exception):  # damaged associations
         import ifcopenshell.util.element as util
 

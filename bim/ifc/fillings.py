@@ -37,6 +37,8 @@ def read_fillings(
     scale = _length_scale(model)
     for element in [*model.by_type("IfcWindow"), *model.by_type("IfcDoor")]:
         shape = shapes.get(element.id())
+        if shape is not None and shape.is_unglazed and not element.is_a("IfcDoor"):
+            continue  # a wall, to the room
         opening, host = _opening_and_host(element)
         body = None if opening is None else shapes.get(opening.id())
         if shape is None and body is None:

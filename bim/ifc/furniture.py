@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.coarser import coarser
 from bim.defaults import FURNITURE_REFLECTANCE
 from bim.drawn_shades import hangs_at, is_named_shade
 from bim.ifc.shapes import Shape, read_shapes
@@ -53,7 +54,9 @@ def furnished(
         place, problem = _placed(shape, spaces, meshes)
         problems += [] if problem is None else [problem]
         if place is not None:
-            found.setdefault(place, []).extend(_elements(shape))
+            pieces, more = coarser(_elements(shape))
+            found.setdefault(place, []).extend(pieces)
+            problems += more
     result = _with(spaces, found)
     count = sum(len({e.guid for e in space.furniture}) for space in result)
     problems.append(Problem(FURNITURE, f"{count} piece(s) of furniture", "in light and views"))

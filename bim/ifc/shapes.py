@@ -61,6 +61,7 @@ class Shape:
     looks: tuple[Look, ...]
     look: NDArray[np.int64]  # [N] index into looks, -1 where the file has no style
     is_painted: bool = False  # whether its reflectances come from the user's corrections
+    is_unglazed: bool = False  # whether the user's corrections say that it has no glass
 
     @property
     def transparent(self) -> NDArray[np.bool_]:

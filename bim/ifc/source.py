@@ -90,19 +90,30 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     shapes, faults = read_shapes(
         model, lambda fraction: tell("geometry", fraction), without=removed
     )
+    unglazed = corrections.unglazed(model)
+    shapes |= {key: opaque(shapes[key]) for key in unglazed if key in shapes}
     shapes, phantoms = judged_transparent(model, shapes)
     problems += more + site + faults + phantoms
     for step_id, paint in corrections.painted(model).items():
         if step_id in shapes:
             shapes[step_id] = painted(shapes[step_id], paint)
     if corrections.file:
-        what = f"{len(removed)} products left out, {len(corrections.painted(model))} repainted"
+        what = (
+            f"{len(removed)} products left out, {len(corrections.painted(model))} repainted,"
+            f" {len(unglazed)} without glass"
+        )
         problems.append(Problem(corrections.file, "corrections are used", what))
     placed = in_world(shapes, rotation)
     return Source(
         Path(path), model, placed, corrections, latitude, longitude, elevation,
         tuple([*problems, *placed.problems]),
     )  # fmt: skip
+
+
+def opaque(shape: Shape) -> Shape:
+    """The shape without glass."""
+    looks = tuple(replace(look, transparency=0.0) for look in shape.looks)
+    return replace(shape, looks=looks, is_unglazed=True)
 
 
 def painted(shape: Shape, paint: Paint) -> Shape:

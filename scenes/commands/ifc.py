@@ -270,6 +270,34 @@ def survey(files: tuple[Path, ...], table: Path | None) -> None:
     click.echo(markdown(rows))
 
 
+@command.command()
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@click.argument("selector")
+def query(building: Path, selector: str) -> None:
+    """The elements that a SELECTOR of the corrections chooses, such as 'IfcWall, layer="A-WALL"'.
+
+    By GUID, class, Name, type, material, location (storey), property (Pset_WallCommon.IsExternal),
+    each with = or a regular expression (Name=/Louvre.*/), and by CAD layer; + joins groups.
+    """
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from bim.ifc.query import query as chosen_elements
+
+    found = chosen_elements(building, selector)
+    table = Table()
+    for head in ("class", "name", "type", "storey", "material", "layer", "GUID"):
+        table.add_column(head, overflow="fold")
+    for one in found:
+        row = (one.ifc_class, one.name, one.type_name, one.storey, one.material, one.layer)
+        table.add_row(*map(escape, row), one.guid)
+    console = Console(width=None if Console().is_terminal else UNCUT)
+    if found:
+        console.print(table)
+    console.print(f"{len(found)} elements")
+
+
 def _rooms(building: Building) -> Table:
     """One line for each room, drawn figures beside those that the file states."""
     from rich.table import Table

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import ifcopenshell
 import ifcopenshell.api.material
 import ifcopenshell.api.pset
 import ifcopenshell.api.root
 import ifcopenshell.api.spatial
 import ifcopenshell.api.type
 import pytest
+from click.testing import CliRunner
 
 from bim.ifc.building import read_ifc
-from bim.ifc.corrections import Corrections, read_corrections
+from bim.ifc.corrections import Corrections, Paint, read_corrections
+from bim.ifc.query import query
+from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
-from tests.bim.small_ifc import box_room
+from scenes.commands.ifc import command
+from tests.bim.small_ifc import DEPTH, HEIGHT, WALLS, WIDTH, box_model, box_room
 
 
 @pytest.fixture
@@ -63,7 +68,11 @@ def test_only_keeps_nothing_else(path):
     ("text", "message"),
     [
         ("leave_out = 3", "leave_out"),
-        ("leaves = []", "leaves"),
+        ("leaves = []", "leaves: no such key; did you mean leave_out"),
+        ("nothing_like_it = 1", "there are leave_out, only"),
+        ("[[reflectance]]\nselect = 'IfcWall'\nvisibel = 0.5", "reflectance.visibel: .* visible"),
+        ("reflectance = 3", "reflectance"),
+        ("opaque = 'IfcWindow'", "opaque"),
         ("surroundings = 1.2", "surroundings"),
         ("[[reflectance]]\nvisible = 0.5", "select"),
         ("[[reflectance]]\nselect = 'IfcWall'", "visible"),
@@ -80,6 +89,33 @@ def test_wrong_entries_are_named(tmp_path, text, message):
 def test_selector_that_cannot_be_parsed_is_named(path):
     with pytest.raises(DataError, match="IfcWall,,,"):
         read_ifc(path, corrections=Corrections(leave_out=("IfcWall,,,=",)))
+
+
+@pytest.mark.parametrize("selector", ['IfcWindow, Name="W1"', 'IfcWall, Name="south"'])
+def test_glass_that_the_corrections_make_opaque_is_a_wall(tmp_path, selector):
+    small, walls = box_model(window="Window" in selector)
+    if "Wall" in selector:  # the wall itself is drawn transparent, and painting it leaves it so
+        small.show(walls["south"], [(*WALLS["south"], small.style("Glass", 0.5, 0.9))])
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    plain = read_ifc(path, corrections=Corrections(paints=(Paint(selector, 0.4, 0.4),)))
+    assert plain.windows and plain.account.glass_out > 1.0
+    building = read_ifc(path, corrections=Corrections(opaque=(selector,)))
+    (room,) = building.spaces
+    assert room.windows == () and building.account.glass_out == 0.0
+    assert open_edges(room.shell) == 0
+    assert room.volume == pytest.approx(WIDTH * DEPTH * HEIGHT, rel=1e-6)
+
+
+def test_query_lists_what_a_selector_chooses(path):
+    say = CliRunner().invoke(command, ["query", str(path), "IfcWall, Name=/south.*/"])
+    assert say.exit_code == 0, say.output
+    assert "south again" in say.output and "north" not in say.output
+    assert say.output.splitlines()[-1] == "2 elements"
+    wall = next(w for w in ifcopenshell.open(str(path)).by_type("IfcWall") if w.Name == "east")
+    assert [one.name for one in query(path, wall.GlobalId)] == ["east"]
+    wrong = CliRunner().invoke(command, ["query", str(path), "IfcWall,,,="])
+    assert wrong.exit_code != 0 and isinstance(wrong.exception, DataError)
 
 
 @pytest.mark.parametrize(

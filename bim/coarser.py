@@ -1,0 +1,72 @@
+"""Meshes that are far finer than light needs, with fewer triangles and a stated error.
+
+Vertices are merged on ever wider grids until few enough triangles are left; what a vertex has moved
+by at the most is the error.  Only what stands outdoors and in rooms is made coarser, never what
+bounds a room.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Element, Problem
+from bim.planes import area_vectors
+
+FINE = 5_000  # triangles of one element, above which it is made coarser
+STEPS = (0.002, 0.005, 0.01, 0.02)  # of the grids [m]
+KEPT_AREA = 0.9  # share of the surface that has to be left: slats and bars must not vanish
+
+
+def coarser(elements: list[Element]) -> tuple[list[Element], list[Problem]]:
+    """The elements, those of many triangles made coarser, and how far vertices were moved."""
+    result, problems = [], []
+    for element in elements:
+        triangles, error = coarser_mesh(element.triangles)
+        if len(triangles) < len(element.triangles):
+            what = (
+                f"{element.ifc_class} {element.name}: {len(element.triangles)} triangles are finer"
+                f" than light needs"
+            )
+            done = f"{len(triangles)} are traced, vertices moved by {1000 * error:.0f} mm or less"
+            problems.append(Problem(element.guid, what, done, kind="finer than light needs"))
+            element = replace(element, triangles=triangles)
+        result.append(element)
+    return result, problems
+
+
+def coarser_mesh(
+    triangles: NDArray[np.float64], most: int = FINE
+) -> tuple[NDArray[np.float64], float]:
+    """Triangles [M, 3, 3], at most `most` where that can be, and how far a vertex moved [m]."""
+    best, error = triangles, 0.0
+    area = _area(triangles)
+    for step in STEPS:
+        if len(best) <= most:
+            break
+        merged, moved = _merged(triangles, step)
+        if _area(merged) < KEPT_AREA * area:
+            break
+        best, error = merged, moved
+    return best, error
+
+
+def _merged(triangles: NDArray[np.float64], step: float) -> tuple[NDArray[np.float64], float]:
+    """Vertices of one cell of a grid put to their mean; collapsed and repeated faces left out."""
+    corners = triangles.reshape(-1, 3)
+    cells = np.floor(corners / step).astype(np.int64)
+    _, index = np.unique(cells, axis=0, return_inverse=True)
+    index = index.ravel()
+    counts = np.bincount(index)
+    means = np.stack([np.bincount(index, corners[:, k]) / counts for k in range(3)], axis=1)
+    moved = float(np.linalg.norm(means[index] - corners, axis=1).max())
+    faces = index.reshape(-1, 3)
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return means[faces[np.sort(first)]], moved
+
+
+def _area(triangles: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(area_vectors(triangles), axis=1).sum())

@@ -1,0 +1,191 @@
+"""Second-level space boundaries of an IFC file beside those found from geometry.
+
+Neighbours and areas are always our own (`bim.surroundings`); the file's are compared with them by
+room and element, so that a reader sees where an energy tool that takes the file's would differ.
+Compared are the areas, and whether the open air or the ground lies beyond.  A wall's boundary holds
+its windows and doors in some files and not in others: either agrees.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import ifcopenshell
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.ifc.project import length_scale
+from bim.ifc.source import Source
+from bim.model import Face, Problem, Space
+from bim.planes import newell_normal
+
+SAME_SHARE, SAME_AREA = 0.05, 0.2  # areas that differ by less agree: share, and [m2]
+RELATION = "IfcRelSpaceBoundary"
+# our words for theirs; most files have EXTERNAL for the ground too, IFC2X3 no other word
+OUTSIDE = {"EXTERNAL": ("outside", "ground"), "EXTERNAL_EARTH": ("ground",)}
+INSIDE = ("space", "adiabatic", "unknown")
+
+
+@dataclass(slots=True)
+class _Stated:
+    """What the file says of one element at one room."""
+
+    area: float = 0.0  # [m2]
+    beyond: dict[str, float] = field(default_factory=lambda: defaultdict(float))  # area by word
+
+
+def boundary_problems(source: Source, spaces: Sequence[Space]) -> list[Problem]:
+    """How the file's second-level boundaries differ from the rooms' faces."""
+    model = source.model
+    relations = model.by_type(RELATION)
+    second = [one for one in relations if _is_second_level(one)]
+    if not relations:
+        return []
+    if not second:
+        what = f"has {len(relations)} space boundaries, none of the second level"
+        return [Problem(RELATION, what, "not used: neighbours are found from geometry")]
+    stated, unread = _stated(second, length_scale(model))
+    rooms = {space.guid: space for space in spaces}
+    problems, compared = [], 0
+    hosts = _hosts(model)
+    for (room, element), theirs in stated.items():
+        if room not in rooms:
+            continue
+        compared += 1
+        problems += _differences(model.by_guid(element), theirs, rooms[room], hosts)
+    differing = len({(p.where, p.what.partition(":")[0]) for p in problems})
+    what = (
+        f"has {len(second)} second-level space boundaries of {compared} pairs of room and element:"
+        f" {compared - differing} agree with ours within {100 * SAME_SHARE:.0f} %"
+        + (f", {unread} of a shape that is not read" if unread else "")
+    )
+    return [Problem(RELATION, what, "not used: neighbours are found from geometry"), *problems]
+
+
+def _hosts(model: ifcopenshell.file) -> dict[str, str]:
+    """GUID of the element that each window or door is in."""
+    return {
+        fills.RelatedBuildingElement.GlobalId: voids.RelatingBuildingElement.GlobalId
+        for fills in model.by_type("IfcRelFillsElement")
+        for voids in fills.RelatingOpeningElement.VoidsElements or ()
+    }
+
+
+def _is_second_level(relation: ifcopenshell.entity_instance) -> bool:
+    text = f"{relation.is_a()} {relation.Name or ''} {relation.Description or ''}".lower()
+    return any(word in text for word in ("2ndlevel", "second level", "2a", "2b"))
+
+
+def _stated(
+    relations: Sequence[ifcopenshell.entity_instance], scale: float
+) -> tuple[dict[tuple[str, str], _Stated], int]:
+    """The file's boundaries by GUID of room and element, and how many could not be read."""
+    found: dict[tuple[str, str], _Stated] = defaultdict(_Stated)
+    unread = 0
+    for one in relations:
+        element, room = one.RelatedBuildingElement, one.RelatingSpace
+        # type 2b ends at a wall, so that nothing of it passes to a neighbour: ours are adiabatic
+        if element is None or room is None or one.PhysicalOrVirtualBoundary == "VIRTUAL":
+            continue
+        area = None
+        with contextlib.suppress(Exception):  # damaged or rare geometry
+            area = _area(one.ConnectionGeometry.SurfaceOnRelatingElement) * scale**2
+        if area is None:
+            unread += 1
+            continue
+        entry = found[room.GlobalId, element.GlobalId]
+        entry.area += area
+        entry.beyond[one.InternalOrExternalBoundary or ""] += area
+    return dict(found), unread
+
+
+def _area(surface: ifcopenshell.entity_instance) -> float | None:
+    """Area of a plane boundary in the file's units squared; None where its curves are others."""
+    if surface.is_a("IfcCurveBoundedPlane"):
+        outer = _ring_area(surface.OuterBoundary)
+        inner = [_ring_area(curve) for curve in surface.InnerBoundaries or ()]
+        return None if outer is None or None in inner else outer - sum(inner)
+    if surface.is_a("IfcSurfaceOfLinearExtrusion"):
+        points = _points(surface.SweptCurve.Curve)
+        if points is None:
+            return None
+        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() * surface.Depth)
+    return None
+
+
+def _ring_area(curve: ifcopenshell.entity_instance) -> float | None:
+    points = _points(curve)
+    if points is None or len(points) < 3:
+        return None
+    return float(np.linalg.norm(newell_normal(points)))
+
+
+def _points(curve: ifcopenshell.entity_instance) -> NDArray[np.float64] | None:
+    """Corners [N, 3] of a curve made of straight lines; None of any other."""
+    if curve.is_a("IfcPolyline"):
+        flat = np.array([point.Coordinates for point in curve.Points], dtype=float)
+        return np.pad(flat, ((0, 0), (0, 3 - flat.shape[1])))
+    if curve.is_a("IfcCompositeCurve"):
+        parts = [_points(segment.ParentCurve) for segment in curve.Segments]
+        turned = [
+            part if part is None or segment.SameSense else part[::-1]
+            for part, segment in zip(parts, curve.Segments, strict=True)
+        ]
+        return None if any(p is None for p in turned) else np.concatenate(turned)
+    return None
+
+
+def _differences(
+    element: ifcopenshell.entity_instance,
+    theirs: _Stated,
+    room: Space,
+    hosts: Mapping[str, str],
+) -> list[Problem]:
+    """What the file says otherwise of one element at a room."""
+    faces = [f for f in room.faces if f.element == element.GlobalId and f.kind != "reveal"]
+    net, gross = _own_areas(element.GlobalId, faces, room, hosts)
+    label = f"{element.is_a()} {element.Name or ''} at room {room.label}"
+    between = net < theirs.area < gross  # with some of its openings
+    if not (between or _agree(theirs.area, net) or _agree(theirs.area, gross)):
+        own = f"{net:.2f}" if _agree(net, gross) else f"{net:.2f} to {gross:.2f}"
+        what = f"{label}: {theirs.area:.2f} m2 by the file's boundaries, {own} m2 by ours"
+        kind = "boundary's area" if net else "boundary without a face"
+        return [Problem(element.GlobalId, what, "ours are used", kind=kind)]
+    word = max(theirs.beyond, key=lambda key: theirs.beyond[key])
+    beyond: Mapping[str, float] = _by_adjacency(faces)
+    if not beyond or word not in (*OUTSIDE, "INTERNAL"):
+        return []
+    ours = max(beyond, key=lambda key: beyond[key])
+    if ours in OUTSIDE.get(word, INSIDE):
+        return []
+    what = f"{label}: {word.lower()} by the file's boundaries, {ours} by ours"
+    return [Problem(element.GlobalId, what, "ours is used", kind="boundary's neighbour")]
+
+
+def _own_areas(
+    guid: str, faces: Sequence[Face], room: Space, hosts: Mapping[str, str]
+) -> tuple[float, float]:
+    """Area [m2] of an element at a room: without the openings in it, and with them."""
+    own = [window for window in room.windows if window.guid == guid]
+    if own:
+        glass = sum(window.area for window in own)
+        return glass, max(sum(window.opening_area for window in own), glass)
+    net = sum(face.area for face in faces)
+    inner = [f for f in room.faces if f.kind != "reveal" and hosts.get(f.element or "") == guid]
+    lit = {w.guid for w in room.windows}  # frames of these are in their openings' area
+    openings = sum(w.opening_area for w in room.windows if w.host == guid)
+    return net, net + openings + sum(f.area for f in inner if f.element not in lit)
+
+
+def _by_adjacency(faces: Sequence[Face]) -> dict[str, float]:
+    areas: dict[str, float] = defaultdict(float)
+    for face in faces:
+        areas[face.adjacency] += face.area
+    return areas
+
+
+def _agree(one: float, other: float) -> bool:
+    return abs(one - other) < max(SAME_AREA, SAME_SHARE * max(one, other))
