@@ -26,6 +26,8 @@ R_OUTER = 0.04  # [m2 K/W] EN 673:2011 / ISO 6946 outer film
 R_INNER = 0.13  # [m2 K/W] EN 673:2011 / ISO 6946 inner film
 MEASUREMENT_SLACK = 0.15  # absorptance that measuring errors and film assumptions may explain
 
+SLOPE = 0.0065  # of U with the mean layer temperature [1/K] (Fener)
+
 _log = logging.getLogger(__name__)
 
 
@@ -190,9 +192,7 @@ def steady_window(
     return outer, inner, to_room
 
 
-def linear_u(
-    u_value: float, *, slope: float = 0.0065, reference_c: float = 10.0
-) -> LayerResistance:
+def linear_u(u_value: float, *, slope: float = SLOPE, reference_c: float = 10.0) -> LayerResistance:
     """R from a U-value that grows linearly with the mean layer temperature (Fener: 0.65 %/K)."""
     per_kelvin = u_value * slope
     at_ten = u_value + per_kelvin * (10.0 - reference_c)

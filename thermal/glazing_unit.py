@@ -56,6 +56,8 @@ class GlazingLayer:
     emissivity: tuple[float, float] = (0.84, 0.84)  # front, back
     infrared_transmittance: float = 0.0
     openings: Openings | None = None  # None: a pane, which closes the gap
+    # transmittance, front and back reflectance of a pane for the sun at normal incidence
+    solar: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         require_range(self.thickness, 1e-6, 0.5, "layer thickness", "m")
@@ -65,6 +67,11 @@ class GlazingLayer:
             require_range(value, 1e-4, 1.0, f"layer emissivity, {side}")
             total = value + self.infrared_transmittance
             require(total <= 1.0 + 1e-9, f"layer, {side}", f"absorbs and passes {total:g} of 1")
+        if self.solar is not None:
+            tau, front, back = self.solar
+            least, most = min(self.solar), tau + max(front, back)
+            fits = least >= 0 and most <= 1.0 + 1e-9
+            require(fits, "layer, solar", f"expected shares of 1, got {self.solar}")
 
 
 @dataclass(frozen=True, slots=True)

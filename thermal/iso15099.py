@@ -19,7 +19,9 @@ from thermal.layer_balance import INDOORS, UnitArrays, UnitState, settle
 FloatArray = NDArray[np.float64]
 CONVECTION_OUTSIDE, CONVECTION_INSIDE = 20.0, 2.7  # [W/(m2 K)]; with radiation about 25 and 7.7
 U_STATE_C = (0.0, 20.0)  # outdoors and indoors
-G_STATE = (25.0, 24.0, 500.0)  # outdoors and indoors [degC], sun [W/m2]
+# Outdoors and indoors [degC], sun [W/m2]: the reference and the summer state of ISO 52022-3.  The
+# g of a shade hangs on the state, as the air behind it does: a year is given the mean of both
+G_STATES = ((5.0, 20.0, 300.0), (25.0, 25.0, 500.0))
 OUTDOOR_C = (-25.0, -15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0)  # grid of R(T_m, dT)
 INDOOR_C = (5.0, 15.0, 25.0, 35.0, 45.0)
 UNSETTLED = 1e-3  # [K] change of the last round beyond which a state has no meaning
@@ -126,7 +128,17 @@ def iso15099_g_values(
     dark = _balance(unit, arrays, state, 0.0).heat_in
     sun, rows = conditions.sun, alpha.reshape(-1, layers)
     secondary = [(_balance(unit, arrays, state, sun * row).heat_in - dark) / sun for row in rows]
-    return tau + np.array(secondary).reshape(tau.shape)
+    # absorbed sun warms: less than nothing is the tolerance of the balance
+    return tau + np.maximum(np.array(secondary), 0.0).reshape(tau.shape)
+
+
+def yearly_g_values(
+    unit: GlazingUnit, transmittance: ArrayLike, absorptance: ArrayLike
+) -> FloatArray:
+    """g [...] as the Blackbox takes it for a year: the mean of `G_STATES`, films prescribed."""
+    states = [prescribed(*state) for state in G_STATES]
+    found = [iso15099_g_values(unit, state, transmittance, absorptance) for state in states]
+    return np.mean(found, axis=0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,15 +151,23 @@ class Iso15099Data:
     resistance: LayerResistance  # between the two faces
 
 
-def iso15099_data(unit: GlazingUnit) -> Iso15099Data:
-    """U, realised films and R(T_m, dT) of a unit, films prescribed."""
-    u_value, r_outer, _, r_inner, _ = _dark_state(unit, *U_STATE_C)
+def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Data:
+    """U, realised films and R(T_m, dT) of a unit, films prescribed.
+
+    Args: u_value: measured [W/(m2 K)]; R is shifted by what it differs from the computed one.
+    """
+    found, r_outer, _, r_inner, _ = _dark_state(unit, *U_STATE_C)
     states = [_dark_state(unit, e, i) for e in OUTDOOR_C for i in INDOOR_C if abs(i - e) > 5.0]
     mean, difference, resistance = (
         np.array(column) for column in zip(*(_middle(state) for state in states), strict=True)
     )
+    if u_value is not None:
+        resistance = resistance + 1.0 / u_value - 1.0 / found
+        message = f"U = {u_value:g} is more than the layers let through: {found:.3g} W/(m2 K)"
+        require(bool(resistance.min() > 1e-4), "glazing", message)
+        found = u_value
     fit = fit_conductance_surface(mean, difference, resistance)
-    return Iso15099Data(u_value, r_outer, r_inner, fit)
+    return Iso15099Data(found, r_outer, r_inner, fit)
 
 
 DarkState = tuple[float, float, float, float, tuple[float, float]]

@@ -21,13 +21,20 @@ import numpy as np
 from bim.fenestration import AngularGValue, ShadingState
 from bim.ifc.fenestration_write import (
     BLOCKS,
+    BLOWN,
     CLOSURE,
     G_BY_PATCH,
     G_NORMAL,
     GAP,
+    HEAT_OF_LAYER,
+    LAYERS,
+    OPENINGS,
     POSITION,
     REALISED,
     SET_NAME,
+    SLOPE,
+    SOLAR_OF_LAYER,
+    SURFACE,
     TREE,
     U_MODEL,
 )
@@ -39,6 +46,7 @@ from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from thermal.closure import Closure
 from thermal.glazing import Gap
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, Openings
 from thermal.gvalue import TYPICAL_SYSTEMS
 
 Entity = ifcopenshell.entity_instance
@@ -182,14 +190,44 @@ def _position(prop: Entity) -> str:
 
 def _closure(prop: Entity) -> Closure:
     parts = _children(prop)
-    gap = None
+    found = {field: _single(parts[name]) for field, name in REALISED.items() if name in parts}
     if GAP in parts:
         of_gap = _children(parts[GAP])
-        gas = tuple((share.Name, _single(share)) for share in of_gap["Gas"].HasProperties)
-        faces = tuple(float(value) for value in _numbers(of_gap["Emissivities"]))
-        gap = Gap(_single(of_gap["Width"]), gas, faces)
-    realised = {field: _single(parts[name]) for field, name in REALISED.items() if name in parts}
-    return Closure(parts[U_MODEL].NominalValue.wrappedValue, gap, **realised)
+        found["gap"] = Gap(*_gas_gap(of_gap), _tuple(of_gap["Emissivities"]))
+    if SLOPE in parts:
+        found["slope"] = _single(parts[SLOPE])
+    if SURFACE in parts:
+        found["surface"] = _tuple(parts[SURFACE])
+    if LAYERS in parts:
+        found["unit"] = _unit(_children(parts[LAYERS]))
+    return Closure(parts[U_MODEL].NominalValue.wrappedValue, **found)
+
+
+def _tuple(prop: Entity) -> tuple[float, ...]:
+    return tuple(float(value) for value in _numbers(prop))
+
+
+def _gas_gap(parts: dict[str, Entity]) -> tuple[float, tuple[tuple[str, float], ...]]:
+    """Width and gas of a gap."""
+    gas = tuple((share.Name, _single(share)) for share in parts["Gas"].HasProperties)
+    return _single(parts["Width"]), gas
+
+
+def _unit(parts: dict[str, Entity]) -> GlazingUnit:
+    """Layers and gaps of a glazing."""
+    layers, gaps = [], []
+    for name, prop in parts.items():
+        held = _children(prop) if name.startswith(("Layer ", "Gap ")) else {}
+        if name.startswith("Layer "):
+            thickness, conductivity, infrared = _tuple(held[HEAT_OF_LAYER])
+            solar = _tuple(held[SOLAR_OF_LAYER]) if SOLAR_OF_LAYER in held else None
+            openings = Openings(*_tuple(held[OPENINGS])) if OPENINGS in held else None
+            faces = _tuple(held["Emissivities"])
+            layers.append(GlazingLayer(thickness, conductivity, faces, infrared, openings, solar))
+        elif name.startswith("Gap "):
+            blown = _tuple(held[BLOWN]) if BLOWN in held else None
+            gaps.append(GasGap(*_gas_gap(held), blown))
+    return GlazingUnit(tuple(layers), tuple(gaps), *_tuple(parts["Height, width, tilt"]))
 
 
 THERMAL = {  # name of the property: field of the state, and what reads it

@@ -10,6 +10,7 @@ angles are radians with their unit beside them, so that no number is rounded on 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from itertools import pairwise
 
 import ifcopenshell
@@ -20,6 +21,8 @@ from bim.ifc.property_sets import Entity, give_set, list_of_numbers
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from thermal.closure import Closure
+from thermal.glazing import Gap
+from thermal.glazing_unit import GasGap, GlazingUnit
 
 SET_NAME = "BlackBox Model"
 BLOCKS = {
@@ -31,11 +34,17 @@ BLOCKS = {
 WAVELENGTHS = {"Visible": (380.0, 780.0), "Solar": (300.0, 2500.0)}  # of the bands [nm]
 G_NORMAL, G_BY_PATCH = "G-value at normal incidence", "G-value by Klems patch"
 CLOSURE, POSITION = "Closure", "Shading position"
-U_MODEL, GAP = "U-value with temperature", "Gap"
+U_MODEL, GAP, LAYERS = "U-value with temperature", "Gap", "Layers"
+SLOPE, SURFACE = "Slope of the U-value", "Coefficients of the layer resistance"
 REALISED = {
     "realised_inner_resistance": "Realised inner resistance",
     "realised_outer_resistance": "Realised outer resistance",
 }
+HEAT_OF_LAYER = "Thickness, conductivity, infrared transmittance"
+SOLAR_OF_LAYER = "Solar transmittance, reflectance front and back"
+OPENINGS = "Openings top, bottom, left, right and share of the area"
+BLOWN = "Speed and temperature of the air blown in"
+RATIO = "IfcNormalisedRatioMeasure"
 KLEMS, TREE = "BSDF matrix", "BSDF tensor tree"
 
 
@@ -165,14 +174,44 @@ class _Writer:
             value = getattr(closure, field)
             if value is not None:
                 parts.append(self.single(name, "IfcThermalResistanceMeasure", value))
+        if closure.u_model == "linear":
+            parts.append(self.single(SLOPE, "IfcReal", closure.slope))  # [1/K]
+        if closure.surface is not None:
+            parts.append(self.numbers(SURFACE, np.array(closure.surface)))
         if closure.gap is not None:
-            ratio = "IfcNormalisedRatioMeasure"
-            gas = [self.single(name, ratio, share) for name, share in closure.gap.gas]
-            width = self.single("Width", "IfcPositiveLengthMeasure", closure.gap.width, self._metre)
-            faces = self.numbers("Emissivities", closure.gap.emissivity, ratio)
-            gap = [width, self.complex("Gas", "volume fractions", gas), faces]
+            faces = self.numbers("Emissivities", closure.gap.emissivity, RATIO)
+            gap = [*self._gas_gap(closure.gap), faces]
             parts.append(self.complex(GAP, "gas gap of a double glazing", gap))
+        if closure.unit is not None:
+            parts.append(self._layers(closure.unit))
         return self.complex(CLOSURE, "thermal model of two layers", parts)
+
+    def _gas_gap(self, gap: Gap | GasGap) -> list[Entity]:
+        """Width and gas of a gap."""
+        gas = [self.single(name, RATIO, share) for name, share in gap.gas]
+        width = self.single("Width", "IfcPositiveLengthMeasure", gap.width, self._metre)
+        return [width, self.complex("Gas", "volume fractions", gas)]
+
+    def _layers(self, unit: GlazingUnit) -> Entity:
+        """Layers and gaps of a glazing from outside to inside, for ISO 15099."""
+        parts = [self.numbers("Height, width, tilt", (unit.height, unit.width, unit.tilt_deg))]
+        for number, layer in enumerate(unit.layers, start=1):
+            heat = (layer.thickness, layer.conductivity, layer.infrared_transmittance)
+            held = [
+                self.numbers(HEAT_OF_LAYER, heat),
+                self.numbers("Emissivities", layer.emissivity, RATIO),
+            ]
+            if layer.solar is not None:
+                held.append(self.numbers(SOLAR_OF_LAYER, layer.solar, RATIO))
+            if layer.openings is not None:
+                held.append(self.numbers(OPENINGS, astuple(layer.openings)))
+            parts.append(self.complex(f"Layer {number}", "pane or shade", held))
+        for number, gap in enumerate(unit.gaps, start=1):
+            held = self._gas_gap(gap)
+            if gap.blown is not None:
+                held.append(self.numbers(BLOWN, gap.blown))
+            parts.append(self.complex(f"Gap {number}", "behind the layer of that number", held))
+        return self.complex(LAYERS, "outermost first", parts)
 
     def g_values(self, table: AngularGValue) -> Entity:
         """Angular g-values, polar angle by polar angle."""

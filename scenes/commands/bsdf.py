@@ -15,6 +15,7 @@ from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, replacing, write_table
+from scenes.commands.bsdf_thermal import thermal
 from scenes.commands.room_options import seed_option
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
@@ -46,6 +47,9 @@ INCIDENT = {"type": ANGLES, "metavar": "THETA PHI", "help": "To the light; in de
 @click.group("bsdf")
 def command() -> None:
     """Read, check, plot and make BSDF files."""
+
+
+command.add_command(thermal)
 
 
 @command.command()

@@ -4,38 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.tables import ClosureTable
+from scenes.fenestration.tables import ByPatch, SystemTable
 from scenes.toml_file import Share, read_table, validated
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError
-from thermal.gvalue import TYPICAL_SYSTEMS
-
-PATCHES = KLEMS_FULL.size
 
 
-ByPatch = Annotated[tuple[float, ...], Field(min_length=PATCHES, max_length=PATCHES)]
+class ThermalTable(SystemTable):
+    """The file beside a BSDF: the same as a study's [[system]], and what g was worked out from."""
 
-
-class ThermalTable(ClosureTable):
-    """The file beside a BSDF: the closure as in a study's [[system]], and what else is known."""
-
-    u_value: float | None = None  # [W/(m2 K)]
-    g_value: float | None = None  # at normal incidence
-    g_value_by_patch: ByPatch | None = None  # for each incident patch of the Klems full basis
-    shading_position: Literal[tuple(TYPICAL_SYSTEMS)] | None = None  # of the shade
-    # What g was worked out from, layer by layer: for readers, the balance takes g
+    # layer by layer; for readers, the balance takes g
     inward_fractions: tuple[Share, ...] = ()
     absorptance_blind: ByPatch | None = None
     absorptance_outer_pane: ByPatch | None = None
     absorptance_inner_pane: ByPatch | None = None
+    kappa: Share | None = None  # of Kuhn's formula
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,15 +45,14 @@ class ThermalFile:
         if not path.is_file():
             return cls()
         table = validated(ThermalTable, read_table(path), path)
-        by_patch = table.g_value_by_patch
         try:
-            closure = table.closure()
+            closure = table.placed(path.parent).closure()
         except ThermalInputError as error:
             raise DataError(str(error), file=path) from error
         return cls(
             table.u_value,
             table.g_value,
-            None if by_patch is None else np.array(by_patch),
+            table.g_by_patch(),
             closure,
             table.shading_position,
         )

@@ -16,8 +16,12 @@ from thermal.blackbox import (
     LayerAbsorptances,
     layer_absorptances,
 )
-from thermal.errors import ThermalInputError
+from thermal.closure import Closure
+from thermal.errors import ThermalInputError, require
 from thermal.gvalue import thermal_data
+from thermal.layer_sun import layered_thermal_data
+
+SHADE_SCATTERS = 0.5  # share of the light beyond which a BSDF is that of a shade
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +35,8 @@ class ThermalSystem:
     g_value: NDArray[np.float64]  # [K]
     back_reflectance: float  # diffuse, from the room
     back_absorptance: float  # diffuse, from the room
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what had to be assumed
+    model: str  # the window model by name, and the error to expect
 
 
 def thermal_system(system: FenestrationSystem) -> ThermalSystem:
@@ -40,19 +45,20 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
     rho = solar.direct_hemispherical(solar.reflection_front)
     rho = np.minimum(rho, 1.0 - tau)
-    data = thermal_data(
-        tau, rho, u_value=system.u_value, g_normal=system.g_value,
-        shading_position=system.shading_position or "none", item=system.name,
-    )  # fmt: skip
+    place = _place(system)
+    closure = (system.closure or Closure()).for_place(place)
+    known = {"u_value": system.u_value, "g_normal": system.g_value, "item": system.name}
+    if closure.unit is None:
+        data = thermal_data(tau, rho, shading_position=place, **known)
+    else:
+        theta = solar.basis_in.centres()[0]
+        data = layered_thermal_data(closure.unit, tau, rho, theta, **known)
     g_value = data.g_value if system.g_by_patch is None else system.g_by_patch
     back_rho, back_tau = (
         _diffuse(solar, block) for block in (solar.reflection_back, solar.transmission_back)
     )
-    fenestration, films = Fenestration(system.name, data.u_value), {}
-    if system.closure is not None:
-        fenestration = system.closure.close(fenestration)
-        if system.closure.changes_films:
-            films = {"r_outer": fenestration.r_outer, "r_inner": fenestration.r_inner}
+    fenestration = closure.close(Fenestration(system.name, data.u_value))
+    films = {"r_outer": fenestration.r_outer, "r_inner": fenestration.r_inner}
     return ThermalSystem(
         fenestration,
         layer_absorptances(tau, rho, g_value, data.u_value, item=system.name, **films),
@@ -61,8 +67,41 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
         g_value,
         back_rho,
         max(1.0 - back_rho - back_tau, 0.0),
-        data.assumptions,
+        (*data.assumptions, *_unplaced(system, closure)),
+        f"{system.name}: window model: {closure.described(place)}.",
     )
+
+
+def _place(system: FenestrationSystem) -> str:
+    """Where the shade is: as stated, else as in the layers, else there is none."""
+    unit = None if system.closure is None else system.closure.unit
+    of_layers = None if unit is None else unit.shade_place
+    stated = system.shading_position
+    fits = None in (of_layers, stated) or of_layers == stated
+    message = f"{stated!r}, but the layers have their shade {of_layers!r}"
+    require(fits, f"{system.name}: shading_position", message)
+    return stated or of_layers or "none"
+
+
+def _unplaced(system: FenestrationSystem, closure: Closure) -> list[str]:
+    """A sentence where what may be a shade is taken for panes, for want of its place and data."""
+    placed = system.shading_position is not None or closure.unit is not None
+    by_patch = system.g_by_patch is not None
+    known = system.u_value is not None and (by_patch or system.g_value is not None)
+    if placed or known or scattered_share(system.solar) < SHADE_SCATTERS:
+        return []
+    return [
+        f"{system.name}: scatters light as a shade does, but where the shade is was not stated: "
+        "its U and g are those of panes without one; state shading_position (external, internal, "
+        "integrated or none)."
+    ]
+
+
+def scattered_share(solar: KlemsBsdf) -> float:
+    """Share of the light from the front that does not pass straight on, at normal incidence."""
+    through = solar.basis_out.projected_solid_angles() * solar.transmission_front[:, 0]
+    total = float(through.sum())
+    return 0.0 if total < 1e-6 else 1.0 - float(through[0]) / total
 
 
 def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:

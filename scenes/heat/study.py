@@ -59,8 +59,10 @@ def run_study(
     building = traced_building(building, in_windows)
     systems = list({id(s): s for states in in_windows.values() for s in states}.values())
     notes = dict.fromkeys(source_notes(window_sources(windows, in_windows)))
-    noted = (weather, *systems, *map(thermal_system, systems))
+    heats = [thermal_system(system) for system in systems]
+    noted = (weather, *systems, *heats)
     notes |= dict.fromkeys(note for t in noted for note in t.notes)
+    notes |= dict.fromkeys(heat.model for heat in heats)
     variants.activate()
     options, trace = study.options, study.trace
     skies, cache = skies_for(weather, options.method, options.sampling), MatrixCache.of_user()

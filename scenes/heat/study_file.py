@@ -142,7 +142,9 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
     """
     study = schedules_there(validated(StudyFile, read_table(path), path), path)
     here = path.parent
-    systems = tuple(s.model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system)
+    systems = tuple(
+        s.placed(here).model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system
+    )
     found = {"weather": _there(here, study.weather, path), "system": systems}
     if quick:
         given = study.trace.model_fields_set

@@ -44,7 +44,7 @@ def read_operation(path: str | PathLike[str]) -> Operation:
         place = path.parent / one.bsdf
         if not place.is_file():
             raise DataError(f"no such file: {one.bsdf}", file=path, field=f"system.{number}.bsdf")
-        system = read_state(one, place, by=f"[[system]] of {path.name},")
+        system = read_state(one.placed(path.parent), place, by=f"[[system]] of {path.name},")
         if any(system.name == other.name for other in systems):
             system = replace(system, name=place.stem)
         systems.append(system)
@@ -69,7 +69,13 @@ def read_state(table: StateTable, path: Path, *, by: str = "") -> FenestrationSy
     Args: by: what names the file, for the system's source.
     """
     system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
-    return replace(system, closure=table.closure() or system.closure)
+    by_patch = table.g_by_patch()
+    return replace(
+        system,
+        closure=table.closure() or system.closure,
+        g_by_patch=system.g_by_patch if by_patch is None else by_patch,
+        shading_position=table.shading_position or system.shading_position,
+    )
 
 
 def check_states(operation: Operation, states: int) -> None:

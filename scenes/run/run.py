@@ -92,7 +92,9 @@ def run_inputs(
     start = time.monotonic() if start is None else start
     building, weather = inputs.building, inputs.weather
     used = used_systems(inputs)
-    thermal_notes = [note for system in used for note in thermal_system(system).notes]
+    thermal_notes = [
+        note for heat in map(thermal_system, used) for note in (*heat.notes, heat.model)
+    ]
     sun = sun_directions(weather)
     variant = variants.activate()
     progress("sky", 0.0)

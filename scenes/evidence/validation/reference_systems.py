@@ -7,12 +7,17 @@ A closure turns the same measurable data into the two-layer model:
     gap       the same with R following the gas gap by EN 673, at the level of U
     surface   R(T_m, dT) in place of a constant
     films     R(T_m, dT), and the resistances that the system's faces really have
+    place     plain Kuhn with the films that a shade in its place typically has
+    gap place `gap` with those films
+    layers    our own ISO 15099: U, g, R(T_m, dT) and films from the layers; the set's tau and rho
+
+All but `place`, `gap place` and `layers` take U, g and films of WINDOW's engine.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,13 +34,20 @@ from thermal.blackbox import (
     linear_u,
     with_realised_films,
 )
+from thermal.closure import Closure
 from thermal.glazing import Gap, gap_resistance
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.iso15099 import iso15099_data, yearly_g_values
+from thermal.layer_sun import sun_in_layers
+from thermal.panes import hemispherical
+from thermal.shade_layers import sheet_layer, venetian_layer
 
 FloatArray = NDArray[np.float64]
 SYSTEMS = ("dgu", "ext_blind", "ext_shade", "int_shade")
-CLOSURES = ("kuhn", "linear", "gap", "surface", "films")
+CLOSURES = ("kuhn", "linear", "gap", "surface", "films", "place", "gap place", "layers")
 GAP = Gap(0.016, (("argon", 0.9), ("air", 0.1)), (0.84, 0.05))  # of the set's glazing
 REALISED_STATE = 0  # of the U list: 0/20 degC
+PLACES = {"dgu": "none", "int_shade": "internal", "ext_blind": "external", "ext_shade": "external"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,21 +91,23 @@ def read_optics(folder: Path, name: str) -> Optics:
 def _klems_optics(folder: Path, back: dict[str, float]) -> Optics:
     z = np.load(folder / "blackbox_ext_blind_klems.npz")
     theta, phi, weight = np.radians(z["theta"]), np.radians(z["phi"]), z["lam"]
-    above = np.sin(phi) < -1e-9
-    below = np.sin(phi) > 1e-9
-    level = ~above & ~below
-    columns = np.stack([z["tau"], z["rho"], z["g"]])
-    halves = [
-        columns @ (weight * (half + 0.5 * level)) / np.sum(weight * (half + 0.5 * level))
-        for half in (above, below)
-    ]
+    halves = _halves(folder, phi, np.stack([z["tau"], z["rho"], z["g"]]))
     scatter = z["T_front_bsdf"] * weight[:, None]
     if (
         np.abs(scatter.sum(axis=0) - z["tau"]).max()
         > np.abs((z["T_front_bsdf"].T * weight[:, None]).sum(axis=0) - z["tau"]).max()
     ):
         scatter = z["T_front_bsdf"].T * weight[:, None]
-    return Optics(theta, phi, z["tau"], z["rho"], z["g"], np.array(halves), scatter, back)
+    return Optics(theta, phi, z["tau"], z["rho"], z["g"], halves, scatter, back)
+
+
+def _halves(folder: Path, phi: FloatArray, columns: FloatArray) -> FloatArray:
+    """Means [2, C] of values [C, K] of the blind over the light of the sky and of the ground."""
+    weight = np.load(folder / "blackbox_ext_blind_klems.npz")["lam"]
+    above, below = np.sin(phi) < -1e-9, np.sin(phi) > 1e-9
+    level = 0.5 * (~above & ~below)
+    shares = [weight * (half + level) for half in (above, below)]
+    return np.array([columns @ share / share.sum() for share in shares])
 
 
 def at_directions(values: FloatArray, optics: Optics, local: FloatArray) -> FloatArray:
@@ -115,6 +129,42 @@ def at_directions(values: FloatArray, optics: Optics, local: FloatArray) -> Floa
     value = stack[at, step] * (1 - f) + stack[at + 1, step] * f
     grazing = np.clip((np.pi / 2 - theta) / (np.pi / 2 - rings[-1]), 0.0, 1.0)
     return value * np.where(theta > rings[-1], grazing, 1.0)
+
+
+def layers(name: str) -> GlazingUnit:
+    """The layers of a system as REFERENCE.md of the set states them."""
+    clear = GlazingLayer(0.006, 0.9, (0.84, 0.84), solar=(0.775, 0.071, 0.071))
+    low_e = GlazingLayer(0.006, 0.9, (0.05, 0.84), solar=(0.600, 0.220, 0.170))
+    panes, argon = (clear, low_e), GasGap(GAP.width, GAP.gas)
+    if name == "dgu":
+        return GlazingUnit(panes, (argon,))
+    wide = 0.05 if name == "int_shade" else 0.1
+    edges = (wide,) * 4
+    if name == "ext_blind":
+        shade = venetian_layer(0.08, 0.072, 45.0, slat_thickness=0.00045, edges=edges)
+    else:
+        shade = sheet_layer(0.0, thickness=0.0005, conductivity=0.15, edges=edges)
+    if name == "int_shade":
+        return GlazingUnit((*panes, shade), (argon, GasGap(wide)))
+    return GlazingUnit((shade, *panes), (GasGap(wide), argon))
+
+
+def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[Closure, float, Optics]:
+    """Closure, U and optics with g, all from the layers."""
+    unit = layers(name)
+
+    def g(tau: FloatArray, rho: FloatArray, theta: FloatArray) -> FloatArray:
+        absorbed = sun_in_layers(unit, tau, rho, theta)
+        return yearly_g_values(unit, tau, absorbed)
+
+    found = g(optics.tau, optics.rho, optics.theta)
+    diffuse = optics.diffuse.copy()
+    if optics.phi is None:
+        diffuse[:, 2] = hemispherical(found, optics.theta)
+    else:
+        diffuse[:, 2] = _halves(folder, optics.phi, found[None])[:, 0]
+    found = replace(optics, g=found, diffuse=diffuse)
+    return Closure("layers", unit=unit), iso15099_data(unit).u_value, found
 
 
 def system(
@@ -144,6 +194,13 @@ def system(
     plain = Fenestration(
         name, u, R_OUTER, R_INNER, resistance, emissivity_in=emissivity, emissivity_out=outside
     )
+    if closure in ("place", "gap place"):
+        u_model = "gap" if closure == "gap place" else "constant"
+        known = Closure(u_model, gap=GAP if u_model == "gap" else None).for_place(PLACES[name])
+        plain = known.close(replace(plain, resistance=None))
+    if closure == "layers":
+        known, u, optics = _of_layers(folder, name, optics)
+        plain = known.close(replace(plain, u_value=u, resistance=None))
     if closure == "films":
         plain = with_realised_films(
             plain,

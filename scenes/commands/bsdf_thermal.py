@@ -1,0 +1,72 @@
+"""`cfs bsdf thermal`: U, g_tot, secondary heat and EN 14501 classes of BSDF files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import check_file, write_table, write_text
+
+PLACES = ("external", "internal", "integrated")
+FILE = click.Path(path_type=Path)
+
+
+@click.command("thermal")
+@click.argument("states", nargs=-1, required=True, type=FILE, metavar="STATE.xml ...")
+@click.option("--place", type=click.Choice(PLACES), help="The files are shades; where they stand.")
+@click.option(
+    "--glazing", type=click.Choice(["A", "B", "C", "D"]), help="Of EN 14501, with --place."
+)
+@click.option(
+    "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
+    help="Of Kuhn's formula for interior shades.",
+)  # fmt: skip
+@click.option("--table", type=FILE, help="CSV file: a row for each state and method.")
+@click.option("--json", "as_json", type=FILE, help="The same as JSON, g by patch with it.")
+@click.option("--toml", type=FILE, help="Write what the heat balance takes, of one state.")
+def thermal(
+    states: tuple[Path, ...],
+    place: str | None,
+    glazing: str | None,
+    kappa: float,
+    **outputs: Path | None,
+) -> None:
+    """U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
+
+    A state is a BSDF file; the .toml beside it says what else is known: U and g, or its layers,
+    which are rated by ISO 15099 (NFRC), ISO 52022-3, EN 673 and EN 410.  With --place and --glazing
+    the files are shades alone, rated by EN 13363-1 and Kuhn.
+    """
+    from scenes.fenestration.ratings import printed, rated_state, thermal_toml
+
+    table, as_json, toml = (outputs[name] for name in ("table", "as_json", "toml"))
+    if (place is None) != (glazing is None):
+        raise click.UsageError("--place and --glazing belong together")
+    if toml is not None and (len(states) != 1 or place is not None):
+        raise click.UsageError("--toml writes the data of one state, not of a shade alone")
+    for option, path in (("--table", table), ("--json", as_json), ("--toml", toml)):
+        if path is not None:
+            check_file(path, field=option, inputs=states)
+    missing = [path for path in states if not path.is_file()]
+    if missing:
+        raise DataError("no such file", file=missing[0])
+    found = [rated_state(path, place=place, glazing=glazing, kappa=kappa) for path in states]
+    rows = [row for state in found for row in state.rows()]
+    for line in printed(rows):
+        click.echo(line)
+    for note in dict.fromkeys(n for s in found for n in (*s.heat.notes, s.heat.model)):
+        if place is None:
+            click.echo(f"note: {note}")
+    if table is not None:
+        import pandas as pd
+
+        write_table(pd.DataFrame(rows), table, index=False, float_format="%.4f")
+    if as_json is not None:
+        by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in found}
+        record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}
+        write_text(as_json, json.dumps(record, indent=2) + "\n")
+    if toml is not None:
+        write_text(toml, thermal_toml(found[0]))

@@ -1,0 +1,117 @@
+"""Ratings of BSDF files by the standards: a row for each state and method; the `.toml` beside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mitsuba_cfs.errors import DataError
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.fenestration.thermal_system import ThermalSystem, checked_system
+from thermal.errors import ThermalInputError
+from thermal.layer_sun import sun_in_layers
+from thermal.ratings import (
+    CLASSES,
+    REFERENCE_GLAZINGS,
+    ThermalRating,
+    layered_ratings,
+    shade_ratings,
+)
+
+TITLES = {"g": "class of g_tot", "secondary": "class of q_i", "tau": "class of tau_e"}
+
+
+@dataclass(frozen=True, slots=True)
+class RatedState:
+    """One state: what the heat balance takes, and the ratings by method."""
+
+    path: Path
+    system: FenestrationSystem
+    heat: ThermalSystem
+    ratings: tuple[ThermalRating, ...]
+
+    def rows(self) -> list[dict[str, object]]:
+        """A row for each method."""
+        return [
+            {
+                "state": self.path.stem,
+                "method": rating.method,
+                "U [W/(m2 K)]": rating.u_value,
+                "tau_e": rating.transmittance,
+                "q_i": rating.secondary,
+                "g_tot": rating.g_value,
+                **{TITLES[of]: rating.solar_class(of) for of in CLASSES},
+            }
+            for rating in self.ratings
+        ]
+
+
+def rated_state(path: Path, *, place: str | None, glazing: str | None, kappa: float) -> RatedState:
+    """A BSDF file with its `.toml` rated.
+
+    Args: place, glazing: the file is of a shade alone, rated there with a glazing of EN 14501.
+
+    Raises: `DataError` for data that do not go together.
+    """
+    system = read_system(path)
+    heat = checked_system(system, path)
+    tau, rho = (float(np.clip(v[0], 0.0, 1.0)) for v in (heat.transmittance, heat.reflectance))
+    if place is not None and glazing is not None:
+        known = REFERENCE_GLAZINGS[glazing]
+        return RatedState(
+            path, system, heat, tuple(shade_ratings(tau, rho, place, known, kappa=kappa))
+        )
+    ratings = [
+        ThermalRating("heat balance", heat.fenestration.u_value, tau, float(heat.g_value[0]))
+    ]
+    unit = None if system.closure is None else system.closure.unit
+    if unit is not None:
+        try:
+            absorbed = sun_in_layers(unit, [tau], [rho], [0.0])[0]
+            ratings += layered_ratings(unit, tau, absorbed)
+        except ThermalInputError as error:
+            raise DataError(error.message, file=path.with_suffix(".toml")) from error
+    return RatedState(path, system, heat, tuple(ratings))
+
+
+def thermal_toml(state: RatedState) -> str:
+    """The `.toml` beside the state's file: U and g by patch as the heat balance takes them."""
+    values = ", ".join(f"{g:.4f}" for g in state.heat.g_value)
+    lines = [
+        f"# {state.heat.model} Written by cfs bsdf thermal",
+        f"u_value = {state.heat.fenestration.u_value:.4f}  # [W/(m2 K)]",
+        f"g_value = {state.heat.g_value[0]:.4f}  # at normal incidence",
+        f"g_value_by_patch = [{values}]",
+    ]
+    if state.system.shading_position is not None:
+        lines.append(f'shading_position = "{state.system.shading_position}"')
+    films = state.heat.fenestration
+    resistance = films.layer_resistance
+    if resistance.kind == "surface":
+        lines.append(f"surface = [{', '.join(f'{c:.6g}' for c in resistance.coefficients)}]")
+        closed = state.heat.model
+        if "films" in closed and films.extra_inner > 0:
+            lines.append(f"realised_inner_resistance = {films.r_inner:.4f}  # [m2 K/W]")
+        if "films" in closed and films.extra_outer > 0:
+            lines.append(f"realised_outer_resistance = {films.r_outer:.4f}  # [m2 K/W]")
+    return "\n".join(lines) + "\n"
+
+
+def printed(rows: Sequence[dict[str, object]]) -> list[str]:
+    """The rows as lines of a table."""
+    cells = [list(rows[0])] if rows else []
+    for row in rows:
+        cells.append([_cell(value) for value in row.values()])
+    widths = [max(len(line[i]) for line in cells) for i in range(len(cells[0]))] if cells else []
+    return [
+        "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells
+    ]
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.3f}" if isinstance(value, float) else str(value)

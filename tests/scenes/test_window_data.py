@@ -1,0 +1,253 @@
+"""Window data from files: panes, gas and shade, the closure that follows, in TOML and in IFC."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bim.fenestration import ShadingState
+from bim.ifc.attach import attach
+from bim.ifc.fenestration_read import read_fenestration
+from bim.ifc.targets import Targets
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.errors import DataError
+from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.fenestration.thermal_file import ThermalFile
+from scenes.fenestration.thermal_system import thermal_system
+from scenes.room.operation import read_operation
+from tests.scenes.fenestration_models import grey, room
+from thermal.blackbox import R_INNER
+from thermal.closure import ERRORS, TYPICAL_FILMS, Closure
+from thermal.errors import ThermalInputError
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, Openings
+from thermal.iso15099 import iso15099_data, iso15099_u_value, prescribed
+from thermal.layer_sun import layered_thermal_data, sun_in_layers
+
+BLIND = Path(__file__).parents[2] / "scenes" / "demo" / "venetian_blind.xml"
+ROOT = Path(__file__).parents[2]
+CLEAR = GlazingLayer(0.006, 0.9, solar=(0.775, 0.071, 0.071))
+LOW_E = GlazingLayer(0.006, 0.9, (0.05, 0.84), solar=(0.600, 0.220, 0.170))
+ARGON = GasGap(0.016, (("argon", 0.9), ("air", 0.1)))
+SHADE = GlazingLayer(0.0005, 0.15, (0.9, 0.9), openings=Openings(0.05, 0.05, 0.05, 0.05))
+INTERNAL = GlazingUnit((CLEAR, LOW_E, SHADE), (ARGON, GasGap(0.05)))
+EXTERNAL = GlazingUnit((SHADE, CLEAR, LOW_E), (GasGap(0.1), ARGON))
+LAYERS = """
+[[system.layers]]
+thickness = 0.006
+conductivity = 0.9
+solar = [0.775, 0.071, 0.071]
+gap = { width = 0.016, gas = { argon = 0.9, air = 0.1 } }
+[[system.layers]]
+thickness = 0.006
+conductivity = 0.9
+emissivity = [0.05, 0.84]
+solar = [0.6, 0.22, 0.17]
+gap = { width = 0.05 }
+[[system.layers]]
+openness = 0.0
+edges = [0.05, 0.05, 0.05, 0.05]
+"""
+
+
+def grey_system(**more) -> FenestrationSystem:
+    """A system that scatters."""
+    return FenestrationSystem("grey", grey(0.2), grey(0.2), **more)
+
+
+def test_layers_give_u_g_films_and_resistance_by_default():
+    heat = thermal_system(grey_system(closure=Closure("layers", unit=INTERNAL)))
+    data = iso15099_data(INTERNAL)
+    assert heat.fenestration.u_value == pytest.approx(data.u_value)
+    assert heat.fenestration.r_inner == pytest.approx(data.r_inner) != R_INNER
+    np.testing.assert_allclose(
+        heat.fenestration.layer_resistance.coefficients, data.resistance.coefficients, rtol=1e-9
+    )
+    assert heat.transmittance[0] < heat.g_value[0] < 0.9
+    assert "ISO 15099 layer by layer, films that the shade realises" in heat.model
+    assert len(heat.notes) == 2  # U and g are from the layers
+    known = thermal_system(
+        grey_system(closure=Closure("layers", unit=INTERNAL), u_value=1.0, g_value=0.4)
+    )
+    assert known.fenestration.u_value == 1.0 and known.g_value[0] == pytest.approx(0.4)
+    assert not known.notes
+
+
+def test_a_measured_u_shifts_the_resistance_of_the_layers():
+    data = iso15099_data(EXTERNAL, 0.9)
+    assert data.u_value == 0.9
+    free = iso15099_data(EXTERNAL)
+    apart = data.resistance.at(10.0, 15.0) - free.resistance.at(10.0, 15.0)
+    assert float(apart) == pytest.approx(1 / 0.9 - 1 / free.u_value, rel=0.02)
+    with pytest.raises(ThermalInputError, match="more than the layers let through"):
+        iso15099_data(EXTERNAL, 6.9)
+
+
+@pytest.mark.parametrize("unit", [INTERNAL, EXTERNAL])
+def test_what_layers_absorb_adds_up_and_panes_get_their_part(unit):
+    theta = np.radians([0.0, 40.0, 70.0])
+    tau, rho = np.array([0.1, 0.1, 0.05]), np.array([0.4, 0.4, 0.5])
+    absorbed = sun_in_layers(unit, tau, rho, theta)
+    np.testing.assert_allclose(absorbed.sum(axis=1), 1 - tau - rho)
+    assert np.all(absorbed >= 0)
+    shade = 2 if unit is INTERNAL else 0
+    if unit is EXTERNAL:  # behind the shade only what passes: the panes' share of 0.1
+        assert absorbed[0, shade] > 0.4 and absorbed[0, 1:].max() < 0.06
+    else:
+        assert absorbed[0, :2].min() > 0.15
+    g = layered_thermal_data(unit, tau, rho, theta).g_value
+    inward = (g - tau) / (1 - tau - rho)
+    # of the shade's own heat nearly all comes in from inside, nearly none from outside
+    assert inward[0] > 0.4 if unit is INTERNAL else inward[0] < 0.2
+
+
+def test_layers_absorb_as_windows_engine_has_it(reference_data):
+    """The interior shade of the reference set: shares of each layer, from its tau and rho."""
+    from scenes.evidence.validation.reference_systems import layers, read_optics
+
+    folder = reference_data / "energyplus"
+    import json
+
+    for name in ("dgu", "int_shade", "ext_shade"):
+        rows = json.loads((folder / f"blackbox_{name}.json").read_text())["angular"]
+        row = min(rows, key=lambda one: one["theta"])
+        optics = read_optics(folder, name)
+        ours = sun_in_layers(layers(name), optics.tau[:1], optics.rho[:1], optics.theta[:1])[0]
+        # the engine's directions and a diffuse shade: a hundredth of the sun
+        np.testing.assert_allclose(ours, row["alpha_layers"], atol=0.01)
+
+
+def test_place_of_a_shade_gives_its_typical_films_unless_stated():
+    for place, unit in (("internal", INTERNAL), ("external", EXTERNAL)):
+        inner, outer = TYPICAL_FILMS[place]
+        heat = thermal_system(grey_system(u_value=1.1, g_value=0.4, shading_position=place))
+        assert heat.fenestration.r_inner == (inner or R_INNER)
+        assert "films that the shade realises" in heat.model
+        # shades that stand 1 to 10 cm open at their edges realise about these
+        found = [
+            iso15099_data(
+                replace(
+                    unit,
+                    layers=tuple(
+                        one if one is not SHADE else replace(SHADE, openings=Openings(w, w, w, w))
+                        for one in unit.layers
+                    ),
+                )
+            )
+            for w in (0.005, 0.1)
+        ]
+        low, high = sorted(d.r_inner if inner else d.r_outer for d in found)
+        assert low < (inner or outer) < high
+    stated = Closure("constant", realised_inner_resistance=0.1)
+    heat = thermal_system(grey_system(u_value=1.1, shading_position="internal", closure=stated))
+    assert heat.fenestration.r_inner == 0.1
+
+
+def test_a_shade_is_not_taken_for_a_pane_by_silence():
+    said = thermal_system(grey_system()).notes
+    assert "state shading_position" in said[-1]
+    for known in ({"shading_position": "none"}, {"u_value": 1.1, "g_value": 0.4}):
+        assert not any("shading_position" in n for n in thermal_system(grey_system(**known)).notes)
+    wrong = grey_system(closure=Closure("layers", unit=INTERNAL), shading_position="external")
+    with pytest.raises(ThermalInputError, match="layers have their shade 'internal'"):
+        thermal_system(wrong)
+
+
+def operation(tmp_path: Path, text: str) -> FenestrationSystem:
+    path = tmp_path / "operation.toml"
+    path.write_text(f'[[system]]\nbsdf = "{BLIND}"\n{text}')
+    return read_operation(path).systems[0]
+
+
+def test_toml_says_panes_gases_and_shade(tmp_path):
+    unit = operation(tmp_path, LAYERS).closure.unit
+    assert unit == replace(
+        INTERNAL, layers=(CLEAR, LOW_E, replace(SHADE, infrared_transmittance=0.0))
+    )
+    u = iso15099_u_value(unit, prescribed(0.0, 20.0))
+    assert 1.1 < u < 1.2
+    sloped = operation(tmp_path, "u_slope = 0.004\n").closure
+    assert (sloped.u_model, sloped.slope) == ("linear", 0.004)
+    fit = operation(tmp_path, "surface = [1.2, 0.005, 0.03, -1e-4, -3e-4, 7e-5]\n").closure
+    assert fit.u_model == "surface"
+    angles = operation(tmp_path, "g_value_by_angle = [[0, 0.5], [60, 0.4], [90, 0]]\n")
+    theta = KLEMS_FULL.centres()[0]
+    expected = np.interp(np.degrees(theta), [0, 60, 90], [0.5, 0.4, 0.0])
+    np.testing.assert_allclose(angles.g_by_patch, expected)
+    assert operation(tmp_path, "shading_position = 'external'\n").shading_position == "external"
+
+
+def test_a_panes_file_lies_beside_the_toml(tmp_path, real_data):
+    source = real_data / "bsdf" / "products_spectral" / "CLEAR_3.DAT"
+    (tmp_path / "CLEAR_3.DAT").write_bytes(source.read_bytes())
+    text = '[[system.layers]]\npane = "CLEAR_3.DAT"\n'
+    (layer,) = operation(tmp_path, text).closure.unit.layers
+    assert layer.thickness == pytest.approx(0.003048)
+    assert layer.solar[0] == pytest.approx(0.834, abs=0.005)  # NFRC's, in CLEAR_3.json
+    (tmp_path / "CLEAR_3.DAT").unlink()
+    with pytest.raises(DataError, match=r"CLEAR_3.DAT.*cannot be read"):
+        operation(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("u_slope = 0.1\n", "u_slope"),
+        ("u_slope = 0.005\nsurface = [1, 0, 0, 0, 0, 0]\n", "exclude each other"),
+        ('u_model = "constant"\nu_slope = 0.005\n', 'belongs to u_model "linear"'),
+        ('u_model = "layers"\n', "belong together"),
+        (LAYERS.replace("emissivity", "emisivity"), r"layers.*emisivity.*emissivity"),
+        (LAYERS.replace("argon = 0.9", "neon = 0.9"), "layers"),
+        (LAYERS.replace("width = 0.016", "width = 16"), r"gap.*width.*16"),
+        ("[[system.layers]]\nopenness = 0.1\npane = 'a'\n", "exclude each other"),
+        ("[[system.layers]]\nemissivity = [0.8, 0.8]\n", "expected a pane"),
+        ("[[system.layers]]\nthickness = 0.006\nedges = [1, 1, 1, 1]\n", "edges: are of shades"),
+        ("g_value_by_angle = [[60, 0.4], [0, 0.5]]\n", "rising angles"),
+        ("shading_position = 'inside'\n", "shading_position"),
+    ],
+)
+def test_a_fault_of_the_window_data_names_its_key(tmp_path, text, words):
+    with pytest.raises(DataError, match=words):
+        operation(tmp_path, text)
+
+
+def test_the_file_beside_a_bsdf_holds_the_same(tmp_path):
+    path = tmp_path / "system.toml"
+    head = 'shading_position = "internal"\nkappa = 0.4\n'
+    path.write_text(head + LAYERS.replace("system.", ""))
+    read = ThermalFile.read(path)
+    assert read.shading_position == "internal" and read.closure.u_model == "layers"
+    assert len(read.closure.unit.layers) == 3
+
+
+@pytest.mark.parametrize(
+    "closure",
+    [
+        Closure("layers", unit=INTERNAL),
+        Closure("layers", unit=replace(EXTERNAL, gaps=(GasGap(0.1, blown=(0.2, 15.0)), ARGON))),
+        Closure("linear", slope=0.003, realised_inner_resistance=0.07),
+        Closure("surface", surface=(1.2, 0.005, 0.03, -1e-4, -3e-4, 7e-5)),
+    ],
+    ids=["layers", "blown", "slope", "surface"],
+)
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_ifc_holds_every_closure(tmp_path, closure, schema):
+    path = tmp_path / "room.ifc"
+    room(path, schema=schema)
+    state = ShadingState("", u_value=1.1, closure=closure)
+    attach(path, tmp_path / "with.ifc", state, Targets(every_window=True))
+    (held,) = next(iter(read_fenestration(tmp_path / "with.ifc").values()))
+    assert held.closure == closure
+
+
+def test_the_errors_that_a_result_names_are_those_of_the_docs():
+    page = (ROOT / "docs" / "thermal.md").read_text()
+    for place, models in ERRORS.items():
+        for model, (air, window) in models.items():
+            assert f"{air:.2f}, {window:.2f}" in page, (place, model)
+
+
+def test_reads_a_plain_file_as_before():
+    assert read_system(BLIND).closure.u_model == "constant"

@@ -1,0 +1,141 @@
+"""Ratings by the standards: formulas by hand, limits of classes, the command."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
+from scenes import cli
+from scenes.fenestration.thermal_file import ThermalFile
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.layer_sun import sun_in_layers
+from thermal.ratings import REFERENCE_GLAZINGS, ThermalRating, layered_ratings, shade_ratings
+from thermal.shade_layers import sheet_layer
+
+
+def rated(tau: float, g: float) -> ThermalRating:
+    return ThermalRating("by hand", 1.2, tau, g)
+
+
+def test_en_13363_by_hand():
+    glazing = REFERENCE_GLAZINGS["C"]
+    (external,) = shade_ratings(0.1, 0.5, "external", glazing)
+    # 1/L = 1/1.2 + 1/6 + 1/18; g = tau g + alpha L/18 + tau (1 - g) L/6
+    whole = 1 / (1 / 1.2 + 1 / 6 + 1 / 18)
+    assert external.g_value == pytest.approx(0.0590 + 0.4 * whole / 18 + 0.041 * whole / 6)
+    assert external.transmittance == pytest.approx(0.1 * 0.49 / (1 - 0.5 * 0.29))
+    internal, kuhn = shade_ratings(0.1, 0.5, "internal", glazing, kappa=0.4)
+    # 1/L = 1/1.2 + 1/18; g (1 - g rho - alpha L/18)
+    share = 1.125 / 18
+    assert internal.g_value == pytest.approx(0.59 * (1 - 0.59 * 0.5 - 0.4 * share))
+    bounce = 1 / (1 - 0.5 * 0.27)
+    tau = 0.49 * 0.1 + 0.49 * 0.5 * 0.27 * 0.1 * bounce
+    back = 0.6 * 0.49 * (1 - 0.49 - 0.27) * 0.5 * bounce
+    heat = 0.49 * 0.4 * (1 - 1 / (1 + 18 / 1.2)) * bounce
+    assert kuhn.g_value == pytest.approx(tau + 0.59 - 0.49 + back + heat)
+    assert "kappa 0.4" in kuhn.method
+    more = shade_ratings(0.1, 0.5, "internal", glazing, kappa=1.0)[1]
+    assert more.g_value < kuhn.g_value  # what the panes keep of the light thrown back goes out
+
+
+def test_classes_begin_at_their_limits():
+    for g, expected in ((0.5, 0), (0.49, 1), (0.35, 1), (0.15, 2), (0.149, 3), (0.1, 3), (0.09, 4)):
+        assert rated(0.0, g).solar_class("g") == expected
+    assert rated(0.2, 0.2).solar_class("tau") == 0
+    assert rated(0.049, 0.2).solar_class("tau") == 4
+    assert rated(0.1, 0.41).solar_class("secondary") == 0
+    assert rated(0.1, 0.129).solar_class("secondary") == 4
+
+
+def test_layers_by_every_standard():
+    clear = GlazingLayer(0.004, 1.0, (0.837, 0.837), solar=(0.83, 0.075, 0.075))
+    low_e = GlazingLayer(0.004, 1.0, (0.03, 0.837), solar=(0.59, 0.28, 0.26))
+    unit = GlazingUnit((clear, low_e), (GasGap(0.016, (("argon", 0.9), ("air", 0.1))),))
+    absorbed = sun_in_layers(unit, [0.52], [0.27], [0.0])[0]
+    ratings = {r.method: r for r in layered_ratings(unit, 0.52, absorbed)}
+    european = ratings["EN 673, EN 410"]
+    assert european.u_value == pytest.approx(1.12, abs=0.03)  # sold as 1.1
+    assert ratings["ISO 52022-3, summer"].u_value is None
+    assert 0.52 < european.g_value < 0.65
+    values = [r.g_value for r in ratings.values()]
+    assert max(values) - min(values) < 0.03
+    shaded = GlazingUnit((*unit.layers, sheet_layer(0.05)), (*unit.gaps, GasGap(0.05)))
+    methods = [r.method for r in layered_ratings(shaded, 0.1, np.array([0.2, 0.1, 0.2]))]
+    assert "EN 673, EN 410" not in methods and len(methods) == 3
+
+
+@pytest.fixture
+def shade(tmp_path):
+    """A Lambertian sheet that passes 0.1 and reflects 0.5."""
+    shape = (KLEMS_FULL.size, KLEMS_FULL.size)
+    t, r = np.full(shape, 0.1 / np.pi), np.full(shape, 0.5 / np.pi)
+    sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, t, t, r, r)
+    path = tmp_path / "sheet.xml"
+    write_bsdf_xml(BsdfFile({"Visible": sheet, "Solar": sheet}, name="sheet"), path)
+    return path
+
+
+LAYERS = """
+shading_position = "internal"
+[[layers]]
+thickness = 0.006
+solar = [0.775, 0.071, 0.071]
+gap = { width = 0.016, gas = { argon = 0.9, air = 0.1 } }
+[[layers]]
+thickness = 0.006
+emissivity = [0.05, 0.84]
+solar = [0.6, 0.22, 0.17]
+gap = { width = 0.05 }
+[[layers]]
+openness = 0.02
+edges = [0.02, 0.02, 0, 0]
+"""
+
+
+def test_command_rates_a_state_and_writes_what_the_balance_takes(tmp_path, shade, capsys):
+    shade.with_suffix(".toml").write_text(LAYERS)
+    out = [tmp_path / name for name in ("table.csv", "table.json", "again.toml")]
+    options = ["--table", out[0], "--json", out[1], "--toml", out[2]]
+    assert cli.run(["bsdf", "thermal", str(shade), *map(str, options)]) == 0
+    said = capsys.readouterr().out
+    assert "ISO 52022-3, summer" in said and "ISO 15099 layer by layer" in said
+    table = pd.read_csv(out[0])
+    assert list(table["method"]) == [
+        "heat balance", "NFRC", "ISO 52022-3, reference", "ISO 52022-3, summer",
+    ]  # fmt: skip
+    np.testing.assert_allclose(table["g_tot"] - table["tau_e"], table["q_i"], atol=2e-4)
+    record = json.loads(out[1].read_text())
+    assert len(record["g by patch"]["sheet"]) == KLEMS_FULL.size
+    again = ThermalFile.read(out[2])
+    assert again.u_value == pytest.approx(table["U [W/(m2 K)]"][0], abs=1e-4)
+    assert again.closure.u_model == "surface" and again.closure.realised_inner_resistance < 0.13
+    assert again.shading_position == "internal"
+
+
+def test_command_rates_a_shade_alone(shade, capsys):
+    words = ["bsdf", "thermal", str(shade), "--place", "internal", "--glazing", "C"]
+    assert cli.run(words) == 0
+    said = capsys.readouterr().out
+    assert "EN 13363-1, internal" in said and "Kuhn 2006, kappa 0.4" in said
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--place", "internal"], "belong together"),
+        (["--place", "internal", "--glazing", "C", "--toml", "a.toml"], "one state"),
+    ],
+)
+def test_command_names_what_does_not_go_together(shade, capsys, options, words):
+    assert cli.run(["bsdf", "thermal", str(shade), *options]) != 0
+    assert words in capsys.readouterr().err
+
+
+def test_command_names_a_file_that_is_missing(tmp_path, capsys):
+    assert cli.run(["bsdf", "thermal", str(tmp_path / "none.xml")]) != 0
+    assert "none.xml" in capsys.readouterr().err
