@@ -51,6 +51,17 @@ def uncoated_values(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Transmittance and reflectance [..] of a plain pane of glass at `theta` [rad].
 
+    The means of `polarised_values`.
+    """
+    tau, rho = polarised_values(transmittance, reflectance, theta)
+    return tau.mean(axis=0), rho.mean(axis=0)
+
+
+def polarised_values(
+    transmittance: float, reflectance: float, theta: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Transmittance and reflectance [2, ..] of a plain pane of glass for either polarisation.
+
     Refractive index and absorption are those that give the two values at normal incidence; then
     Fresnel's equations for either polarisation and all inner reflections, with
     t = (1 - r)2 a / (1 - r2 a2), rho = r + r t a.
@@ -71,7 +82,7 @@ def uncoated_values(
         tau = (1 - r) ** 2 * absorbed / (1 - (r * absorbed) ** 2)
         taus.append(tau)
         rhos.append(r + r * absorbed * tau)
-    return np.mean(taus, axis=0), np.mean(rhos, axis=0)
+    return np.stack(taus), np.stack(rhos)
 
 
 def _normal_surface_reflectance(transmittance: float, reflectance: float) -> float:

@@ -202,7 +202,7 @@ class PhaseLight:
         return error[: len(self._traced.scene.points)]
 
     def _subdivision_error(self, g: int, row: NDArray[np.int64]) -> NDArray[np.float64]:
-        """What D as a mean over a group's parts changes in each sensor's mean, and B's error [S]."""
+        """What means over a group's parts change in each sensor's mean [S], and the error of B."""
         points, normals = self._traced.scene.sensors()
         found, straight = np.zeros(len(points)), 0.0
         for j, optics in enumerate(self.filled.systems[g]):

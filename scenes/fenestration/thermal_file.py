@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.angular_file import AngularData
 from scenes.fenestration.tables import ClosureTable
 from scenes.toml_file import Share, read_table, validated
 from thermal.closure import Closure
@@ -31,6 +33,7 @@ class ThermalTable(ClosureTable):
     g_value: float | None = None  # at normal incidence
     g_value_by_patch: ByPatch | None = None  # for each incident patch of the Klems full basis
     shading_position: Literal[tuple(TYPICAL_SYSTEMS)] | None = None  # of the shade
+    angular: AngularData | None = None  # of a specular system, visible
     # What g was worked out from, layer by layer: for readers, the balance takes g
     inward_fractions: tuple[Share, ...] = ()
     absorptance_blind: ByPatch | None = None
@@ -38,9 +41,20 @@ class ThermalTable(ClosureTable):
     absorptance_inner_pane: ByPatch | None = None
 
 
+def files_beside(bsdf: Path) -> tuple[Path, ...]:
+    """The `.toml` file beside a BSDF's and the files that it names; none where there is none."""
+    path = bsdf.with_suffix(".toml")
+    if not path.is_file():
+        return ()
+    angular = validated(ThermalTable, read_table(path), path).angular
+    named = () if angular is None else angular.files
+    there = (path.parent / file for file in named)
+    return path, *(file for file in there if file.is_file())
+
+
 @dataclass(frozen=True, slots=True)
 class ThermalFile:
-    """U, g, closure and the place of the shade of a system, from the file beside its BSDF.
+    """U, g, closure, place of the shade and angular function, from the file beside a BSDF.
 
     The file has the name of the XML file; `ThermalTable` says what it may hold.
     """
@@ -50,6 +64,7 @@ class ThermalFile:
     g_value_by_patch: NDArray[np.float64] | None = None  # [K]
     closure: Closure | None = None
     shading_position: str | None = None
+    angular: AngularTable | None = None  # visible, of a specular system
 
     @classmethod
     def read(cls, path: Path) -> ThermalFile:
@@ -68,4 +83,5 @@ class ThermalFile:
             None if by_patch is None else np.array(by_patch),
             closure,
             table.shading_position,
+            None if table.angular is None else table.angular.read(path),
         )
