@@ -130,16 +130,24 @@ def radiance_material(name: str, reflectance: float, gloss: Gloss | None = None)
 def pane_shares(
     cosine: ArrayLike, index: float, transmissivity: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Transmittance and reflectance [..] of a pane at cosines of incidence, unpolarised light.
+    """Transmittance and reflectance [..] of a pane at cosines of incidence, unpolarised light."""
+    tau, rho = polarised_shares(cosine, index, transmissivity)
+    return tau.mean(axis=0), rho.mean(axis=0)
 
-    t = (1 - r)2 a / (1 - r2 a2), rho = r + r t a, for either polarisation.
+
+def polarised_shares(
+    cosine: ArrayLike, index: float, transmissivity: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Transmittance and reflectance [2, ..] of a pane for either polarisation.
+
+    t = (1 - r)2 a / (1 - r2 a2), rho = r + r t a.
     """
     cosine = np.asarray(cosine, dtype=float)
     inner = np.sqrt(1 - (1 - cosine**2) / index**2)
     a = np.clip(transmissivity, 1e-12, 1.0) ** (1 / inner)
     r = _fresnel(cosine, index)
     tau = (1 - r) ** 2 * a / np.maximum(1 - (r * a) ** 2, 1e-12)
-    return tau.mean(axis=0), (r + r * a * tau).mean(axis=0)
+    return tau, r + r * a * tau
 
 
 def _fresnel(cosine: NDArray[np.float64], index: float) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
-from mitsuba_cfs.gloss import pane_shares
+from mitsuba_cfs.gloss import polarised_shares
 
 # coefficients in cos(theta) of the transmittance of clear and bronze glass relative to normal
 # incidence, and of transmittance + reflectance: the shape that coated panes are given
@@ -52,14 +52,25 @@ def uncoated_values(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Transmittance and reflectance [..] of a plain pane of glass at `theta` [rad].
 
+    The means of `polarised_values`.
+    """
+    tau, rho = polarised_values(transmittance, reflectance, theta)
+    return tau.mean(axis=0), rho.mean(axis=0)
+
+
+def polarised_values(
+    transmittance: float, reflectance: float, theta: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Transmittance and reflectance [2, ..] of a plain pane of glass for either polarisation.
+
     Refractive index and absorption are those that give the two values at normal incidence; then
-    `mitsuba_cfs.gloss.pane_shares`.
+    `mitsuba_cfs.gloss.polarised_shares`.
     """
     surface = _normal_surface_reflectance(transmittance, reflectance)
     root = np.sqrt(surface)
     index = (1 + root) / (1 - root)
     passed = (reflectance / surface - 1) / transmittance if surface > 0 else transmittance
-    return pane_shares(np.cos(np.asarray(theta, dtype=float)), index, passed)
+    return polarised_shares(np.cos(np.asarray(theta, dtype=float)), index, passed)
 
 
 def _normal_surface_reflectance(transmittance: float, reflectance: float) -> float:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.colour import relative_rgb
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import through_peak
@@ -35,6 +36,7 @@ def klems_plugin(
     colour: tuple[KlemsBsdf, KlemsBsdf] | None = None,
     up: tuple[float, float, float] | None = None,
     peak: bool = False,
+    angular: AngularTable | None = None,
 ) -> dict:
     """The `load_dict` entry of a system's BSDF, for the active Mitsuba variant.
 
@@ -42,6 +44,7 @@ def klems_plugin(
         colour: its CIE-X and CIE-Z bands, for variants of colour.
         up: [3] world vector of the system's up.
         peak: let what goes straight on pass undisturbed.
+        angular: what passes so of a specular system at every angle, in place of the data's patches.
     """
     variants.activate(vectorised=False)
     import mitsuba as mi
@@ -61,6 +64,8 @@ def klems_plugin(
             entry[prefix + name] = mi.TensorXf(np.ascontiguousarray(block, dtype=np.float32))
     if up is not None:
         entry["up"] = list(map(float, up))
+    if angular is not None:
+        entry |= {"peak": True, "angular": mi.TensorXf(angular.by_cosine().astype(np.float32))}
     return entry
 
 

@@ -11,6 +11,9 @@ up means, north where the pane is level.  A plugin says, for directions in the w
   of its own (a null component), which `values` and `totals` leave out;
 - `through_entry(ctx, known, active)`: the table entry of that beam.
 
+With `angular`, shares at even steps of the cosine of incidence from 0 to 1, that beam is this
+function's in place of the data's: `mitsuba_cfs.bsdf.angular.AngularTable.by_cosine`.
+
 f is grey (the luminance).  In variants of colour a plugin may have the `colour` of each entry,
 which f is multiplied with; directions are drawn by the grey value.
 
@@ -23,11 +26,15 @@ reflection or transmission in proportion to the totals, then `density` x cos(the
 
 from __future__ import annotations
 
+import numpy as np
+
 
 def window_bsdf():
     """The base class of the plugins, on the active variant's types."""
     import drjit as dr
     import mitsuba as mi
+
+    from mitsuba_cfs.bsdf.traced_klems import gather, table
 
     flags = mi.BSDFFlags
     TRANSMISSION, REFLECTION = int(flags.GlossyTransmission), int(flags.GlossyReflection)
@@ -51,6 +58,12 @@ def window_bsdf():
                 sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
                 self.m_components = [*self.m_components, mi.BSDFFlags.Null | sides]
                 self.m_flags |= self.m_components[2]
+            self.angular, self.angles = None, 0
+            if "angular" in props:
+                if not self.peak:
+                    raise ValueError("angular shares are those of the beam: they need `peak`")
+                shares = np.array(props["angular"]).ravel()
+                self.angular, self.angles = table(shares), len(shares)
 
         # ---- the window frame, turned about the normal against the shading frame
 
@@ -84,8 +97,17 @@ def window_bsdf():
             reflects, transmits = self.enabled(ctx)
             straight = 0.0
             if self.peak and ctx.is_enabled(mi.BSDFFlags.Null, 2):
-                straight = self.through(ctx, known, active)
+                straight = self.straight_on(ctx, known, active)
             return reflected if reflects else 0.0, transmitted if transmits else 0.0, straight
+
+        def straight_on(self, ctx, known, active):
+            """Share of the beam: the angular one where it is given, else that of the data."""
+            if self.angular is None:
+                return self.through(ctx, known, active)
+            place = dr.clip(dr.abs(known.z), 0, 1) * (self.angles - 1)
+            low = mi.UInt32(dr.minimum(place, self.angles - 2))
+            a, b = (gather(self.angular, low + k, active) for k in (0, 1))
+            return dr.lerp(a, b, place - mi.Float(low))
 
         def tinted(self, value, entry, si, active):
             """Grey values of table entries as a spectrum, zero where not active."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.plugin_base import window_bsdf
 from mitsuba_cfs.bsdf.plugin_data import PREFIXES, read_band
 from mitsuba_cfs.bsdf.plugin_trees import BLOCKS, plugin_trees
@@ -28,6 +29,7 @@ def tensor_tree_plugin(
     colour: tuple[TensorTreeBsdf, TensorTreeBsdf] | None = None,
     up: tuple[float, float, float] | None = None,
     peak: bool = False,
+    angular: AngularTable | None = None,
 ) -> dict:
     """The `load_dict` entry of a system's BSDF, for the active Mitsuba variant.
 
@@ -35,6 +37,7 @@ def tensor_tree_plugin(
         colour: its CIE-X and CIE-Z bands, for variants of colour.
         up: [3] world vector of the system's up.
         peak: let what goes straight on pass undisturbed.
+        angular: what passes so of a specular system at every angle, in place of the data's patches.
     """
     variants.activate(vectorised=False)
     import mitsuba as mi
@@ -47,6 +50,8 @@ def tensor_tree_plugin(
             entry["rank"] = tree.rank
     if up is not None:
         entry["up"] = list(map(float, up))
+    if angular is not None:
+        entry |= {"peak": True, "angular": mi.TensorXf(angular.by_cosine().astype(np.float32))}
     return entry
 
 

@@ -10,11 +10,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
-from mitsuba_cfs.trace.systems import AngularScattering, lit_system, sun_scattering
+from mitsuba_cfs.trace.systems import (
+    AngularScattering,
+    lit_system,
+    sun_scattering,
+    without_peaks,
+)
 
 PATCH_ANGLES = 32  # of incidence in each patch, for its mean
 
@@ -45,30 +51,52 @@ States = Sequence[SystemOptics]  # of a window group, such as from open to close
 class BsdfOptics:
     """The optics of BSDF data; each method's form is made when it is first asked for."""
 
-    def __init__(self, coarse: KlemsBsdf, fine: Bsdf | None = None) -> None:
-        """From Klems matrices, and the same as finely as it is known: a tensor tree."""
+    def __init__(
+        self, coarse: KlemsBsdf, fine: Bsdf | None = None, angular: AngularTable | None = None
+    ) -> None:
+        """From Klems matrices, and the same as finely as it is known.
+
+        Args:
+            fine: a tensor tree.
+            angular: of a specular system its beam and its mirrors at every angle; the matrices
+                then have its means over their patches.
+        """
         self._coarse, self._fine = coarse, coarse if fine is None else fine
+        self._angular = angular
 
     @cached_property
     def transmission(self) -> NDArray[np.float64]:
         """See `SystemOptics`."""
-        return self._coarse.transmission_matrix()
+        if self._angular is None:
+            return self._coarse.transmission_matrix()
+        rest = without_peaks(self._coarse, "transmission")
+        return rest.transmission_matrix() + np.diag(
+            self._angular.patch_means(self._coarse.basis_in)
+        )
 
     @cached_property
     def scattering(self) -> Scattering:
         """See `SystemOptics`."""
-        return sun_scattering(self._fine)
+        return sun_scattering(self._fine, self._angular)
 
     @cached_property
     def paths(self) -> PathOptics:
         """See `SystemOptics`."""
-        return lit_system(self._fine)
+        return lit_system(self._fine, self._angular)
 
     @cached_property
     def reflection(self) -> NDArray[np.float64] | None:
         """See `SystemOptics`."""
-        back = self._coarse.filled().reflection_back
-        return None if back is None else back * self._coarse.basis_in.projected_solid_angles()
+        full, mirror = self._coarse.filled(), None
+        if self._angular is not None and self._angular.reflectance_back is not None:
+            full = without_peaks(full, "reflection")
+            values = self._angular.reflectance_back
+            mirror = np.diag(self._angular.patch_means(full.basis_in, values, 1.0))
+        back = full.reflection_back
+        if back is None:
+            return mirror
+        back = back * full.basis_in.projected_solid_angles()
+        return back if mirror is None else back + mirror
 
 
 class AngularOptics:

@@ -9,7 +9,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
+from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
@@ -21,29 +23,88 @@ from mitsuba_cfs.trace.lit_room import AngularBeam, PatchBeam, PathOptics
 WINDOW_UP = (0, 1, 0)  # of a plugin that is asked in the window's own frame
 
 
-def sun_scattering(bsdf: Bsdf) -> Scattering:
-    """How a system passes the sun, its through beam kept apart."""
+def sun_scattering(bsdf: Bsdf, angular: AngularTable | None = None) -> Scattering:
+    """How a system passes the sun, its through beam kept apart.
+
+    Args: angular: what the beam of a specular system has, in place of the data's patches.
+    """
     if isinstance(bsdf, TensorTreeBsdf):
-        return TreeScattering(bsdf)
-    peak = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
-    exponent = specular_exponent(peak, bsdf.basis_in)
-    return KlemsScattering(bsdf.basis_in, peak.scattered, peak.transmittance, exponent)
+        found: Scattering = TreeScattering(bsdf)
+    else:
+        peak = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
+        exponent = None if angular is not None else specular_exponent(peak, bsdf.basis_in)
+        beams = bsdf.basis_in, peak.scattered, peak.transmittance, exponent
+        found = KlemsScattering(*beams)
+    return found if angular is None else SpecularScattering(found, angular)
 
 
-def lit_system(bsdf: Bsdf) -> PathOptics:
+def lit_system(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
     """A system for paths that cross it either way, its through beam kept apart.
 
     The beam towards the room stands for that of the other direction too.
+
+    Args: angular: as for `sun_scattering`; reflectances that it has are those of mirrors.
     """
+    if angular is not None:
+        return _specular_system(bsdf, angular)
     if isinstance(bsdf, TensorTreeBsdf):
         scattering, beam = _without_beam(bsdf), TreeBeam(bsdf) if _has_beams(bsdf) else None
         return PathOptics(_loaded(tensor_tree_plugin(scattering)), beam)
-    full = bsdf.filled()
-    front = through_peak(full.transmission_front, bsdf.basis_in)
-    back = through_peak(full.transmission_back, bsdf.basis_in)
-    rest = replace(full, transmission_front=front.scattered, transmission_back=back.scattered)
+    front = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
     beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
-    return PathOptics(_loaded(klems_plugin(rest)), beam)
+    return PathOptics(_loaded(klems_plugin(without_peaks(bsdf, "transmission"))), beam)
+
+
+def without_peaks(bsdf: KlemsBsdf, *kinds: str) -> KlemsBsdf:
+    """Klems matrices without what goes straight on ("transmission") or is mirrored."""
+    full = bsdf.filled()
+    blocks = {f"{kind}_{side}": None for kind in kinds for side in ("front", "back")}
+    for name in blocks:
+        block = getattr(full, name)
+        blocks[name] = None if block is None else through_peak(block, full.basis_in).scattered
+    return replace(full, **blocks)
+
+
+def _specular_system(bsdf: Bsdf, angular: AngularTable) -> PathOptics:
+    """A specular system by its exact function; only what scatters is left to the data."""
+    mirrors, kinds = [], ["transmission"]
+    for values in (angular.reflectance_front, angular.reflectance_back):
+        mirrors.append(None if values is None else AngularBeam(angular.by_cosine(values, 1.0)))
+    if None not in mirrors:
+        kinds.append("reflection")
+    else:
+        mirrors = [None, None]  # the data's, on both sides
+    beam = AngularBeam(angular.by_cosine())
+    if isinstance(bsdf, TensorTreeBsdf):
+        trees = _without_beam(bsdf)
+        if "reflection" in kinds:
+            trees = TensorTreeBsdf(
+                transmission_front=trees.transmission_front,
+                transmission_back=trees.transmission_back,
+            )
+        return PathOptics(_loaded(tensor_tree_plugin(trees)), beam, tuple(mirrors))
+    rest = without_peaks(bsdf, *kinds)
+    if not any(block is not None and block.any() for block in rest.blocks().values()):
+        return PathOptics(None, beam, tuple(mirrors))
+    return PathOptics(_loaded(klems_plugin(rest)), beam, tuple(mirrors))
+
+
+class SpecularScattering:
+    """A specular system by its exact function; what scatters is the data's."""
+
+    def __init__(self, rest: Scattering, angular: AngularTable) -> None:
+        """From the data's way and the system's function."""
+        shares = angular.by_cosine()
+        self._rest, self._beam = rest, AngularBeam(shares)
+        self.key: object = ("specular", rest.key, shares)
+
+    def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return self._rest.scattered(sun, outward)
+
+    def through(self, sun: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return self._beam.at(sun)
 
 
 class AngularScattering:

@@ -88,6 +88,7 @@ def held_thermal(state: ShadingState) -> dict:
         "g_by_patch": by_patch,
         "closure": state.closure or beside.closure,
         "shading_position": state.shading_position or beside.shading_position,
+        "angular": beside.angular,
     }
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bim.model import Window
+from mitsuba_cfs.bsdf.angular import roos_table
 from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.simple_glazing import (
@@ -98,7 +99,8 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
     panes = values.panes or (1 if u > HIGH_U else 2)
     front, back = visible_reflectances(values.visible)
     name = "glazing, " + _in_words(values)
-    visible = specular_klems(Glazing(name, values.visible, front, back, panes), KLEMS_FULL)
+    clear = Glazing(name, values.visible, front, back, panes)
+    visible = specular_klems(clear, KLEMS_FULL)
     solar, tau, g = visible, values.solar, values.g_value
     notes = [f"{name}: no BSDF, a clear glazing of {panes} pane(s) after Roos et al. 2001."]
     if g is not None:
@@ -111,7 +113,7 @@ def glazing_system(values: StatedValues, file: str) -> FenestrationSystem:
             )
     return FenestrationSystem(
         name, visible, solar, u_value=values.u_value, g_value=g, shading_position="none",
-        notes=tuple(notes), source=f"the values stated in {file}",
+        notes=tuple(notes), source=f"the values stated in {file}", angular=roos_table(clear),
     )  # fmt: skip
 
 

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.resample import klems_of
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.angular_file import check_specular
 from scenes.fenestration.thermal_file import ThermalFile
 from thermal.closure import Closure
 
@@ -36,6 +38,7 @@ class FenestrationSystem:
     tree: TensorTreeBsdf | None = None  # visible, where the data are a tree: for sun and pictures
     file: Path | None = None  # that it was read from
     source: str = ""  # where the system comes from, in words
+    angular: AngularTable | None = None  # visible, of a specular system: exact at every angle
 
     @property
     def fine(self) -> Bsdf:
@@ -91,6 +94,7 @@ def read_system(
         g_by_patch=beside.g_value_by_patch if g_value is None else None,
         closure=beside.closure,
         shading_position=beside.shading_position,
+        angular=beside.angular,
         notes=file.notes,
         file=path,
         source=f"{by} {path.name}".strip(),
@@ -103,7 +107,7 @@ def system_of(
     *,
     path: Path,
     notes: Sequence[str] = (),
-    **more: float | str | Path | NDArray[np.float64] | Closure | None,
+    **more: float | str | Path | NDArray[np.float64] | Closure | AngularTable | None,
 ) -> FenestrationSystem:
     """The system of BSDF data by band, Klems full or tensor trees.
 
@@ -118,6 +122,7 @@ def system_of(
     visible = bands.get("Visible") or bands["Solar"]
     solar = bands.get("Solar") or bands["Visible"]
     klems = _klems(visible, path, "Visible")
+    check_specular(klems, more.get("angular"), path)
     return FenestrationSystem(
         name,
         klems,

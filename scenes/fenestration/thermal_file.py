@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.angular_file import AngularData
 from scenes.fenestration.tables import ByPatch, SystemTable
 from scenes.toml_file import Share, read_table, validated
 from thermal.closure import Closure
@@ -18,6 +20,7 @@ from thermal.errors import ThermalInputError
 class ThermalTable(SystemTable):
     """The file beside a BSDF: the same as a study's [[system]], and what g was worked out from."""
 
+    angular: AngularData | None = None  # of a specular system, visible
     # layer by layer; for readers, the balance takes g
     inward_fractions: tuple[Share, ...] = ()
     absorptance_blind: ByPatch | None = None
@@ -26,9 +29,21 @@ class ThermalTable(SystemTable):
     kappa: Share | None = None  # of Kuhn's formula
 
 
+def files_beside(bsdf: Path) -> tuple[Path, ...]:
+    """The `.toml` file beside a BSDF's and the files that it names; none where there is none."""
+    path = bsdf.with_suffix(".toml")
+    if not path.is_file():
+        return ()
+    table = validated(ThermalTable, read_table(path), path)
+    panes = (layer.pane for layer in table.layers if layer.pane is not None)
+    named = (*panes, *(() if table.angular is None else table.angular.files))
+    there = (path.parent / file for file in named)
+    return path, *(file for file in there if file.is_file())
+
+
 @dataclass(frozen=True, slots=True)
 class ThermalFile:
-    """U, g, closure and the place of the shade of a system, from the file beside its BSDF.
+    """U, g, closure, place of the shade and angular function, from the file beside a BSDF.
 
     The file has the name of the XML file; `ThermalTable` says what it may hold.
     """
@@ -38,6 +53,7 @@ class ThermalFile:
     g_value_by_patch: NDArray[np.float64] | None = None  # [K]
     closure: Closure | None = None
     shading_position: str | None = None
+    angular: AngularTable | None = None  # visible, of a specular system
 
     @classmethod
     def read(cls, path: Path) -> ThermalFile:
@@ -55,4 +71,5 @@ class ThermalFile:
             table.g_by_patch(),
             closure,
             table.shading_position,
+            None if table.angular is None else table.angular.read(path),
         )

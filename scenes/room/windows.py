@@ -41,7 +41,7 @@ class RoomWindows:
         for states in self.systems:
             for system in states:
                 if id(system) not in known:
-                    known[id(system)] = BsdfOptics(system.visible, system.fine)
+                    known[id(system)] = BsdfOptics(system.visible, system.fine, system.angular)
         return [[known[id(system)] for system in states] for states in self.systems]
 
     def of_state(self, state: int, what: Callable[[FenestrationSystem], T]) -> list[T]:

@@ -20,6 +20,7 @@ from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.thermal_file import files_beside
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
@@ -227,9 +228,8 @@ def _manifest(
     files = {name: path for name, path in files.items() if path is not None}
     if options.system is not None:
         files["system"] = options.system
-        beside = options.system.with_suffix(".toml")
-        if beside.is_file():
-            files["system_thermal"] = beside
+        for i, path in enumerate(files_beside(options.system)):
+            files[f"system_angular_{i}" if i else "system_thermal"] = path
     if inputs.operation is not None:
         files["operation"] = inputs.operation.file
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}

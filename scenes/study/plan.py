@@ -9,6 +9,7 @@ from pathlib import Path
 from bim.ifc.building import read_ifc
 from bim.ifc.fenestration_read import read_fenestration
 from bim.model import Building, Space
+from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import box_building
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
@@ -50,12 +51,15 @@ def plan_of(study: Study) -> StudyPlan:
     climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
     operation = None if study.operation is None else InputFile.of(study.operation)
     operated = () if study.operation is None else read_operation(study.operation).files
+    named = tuple(
+        InputFile.of(file) for system in study.system for file in files_beside(system.bsdf)[1:]
+    )
     found: list[Case] = []
     rooms = {}
     for room in study.room:
         building, spaces = rooms_of(room)
         source = room.box if room.box is not None else InputFile.of(room.building)
-        referenced = () if study.system else _referenced(room.building)
+        referenced = named if study.system else _referenced(room.building)
         referenced += tuple(map(InputFile.of, operated))
         for space in spaces:
             about = {
@@ -100,7 +104,7 @@ def _referenced(building: Path) -> tuple[InputFile, ...]:
     """The BSDF files that a building's file names, and the `.toml` files beside them."""
     held = read_fenestration(building).values()
     named = {state.file for states in held for state in states if state.file is not None}
-    beside = (file.with_suffix(".toml") for file in sorted(named))
+    beside = (other for file in sorted(named) for other in files_beside(file))
     return tuple(InputFile.of(file) for file in (*sorted(named), *beside) if file.is_file())
 
 

@@ -100,7 +100,7 @@ def read_year(
     corrections = corrections_file(options.building)
     hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
     # not of files: the model may name others, which change by themselves
-    hashes.append(content_digest(*([s.visible, s.fine] for s in viewed.systems)))
+    hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in viewed.systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
     digest = hashlib.sha256(json.dumps([*chosen, viewed.space.guid]).encode()).hexdigest()
     used = working_hours(weather, *options.occupied)

@@ -1,0 +1,126 @@
+"""Specular systems by their angle of incidence: a table, a formula, or panes behind each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator
+
+from mitsuba_cfs.bsdf.glazing import (
+    Glazing,
+    Pane,
+    coated_values,
+    glazing_values,
+    polarised_values,
+)
+from mitsuba_cfs.bsdf.klems import KlemsBasis
+
+FloatArray = NDArray[np.float64]
+ANGLES = np.radians(np.arange(0.0, 90.25, 0.5))  # that formulas are tabulated at
+STEPS = 1024  # of a table by the cosine, as kernels take it
+PLACES = 32  # angles of incidence in each patch, for its mean
+OVER = 1e-3  # by which transmittance and reflectance may be more than 1, for rounding
+
+
+@dataclass(frozen=True, slots=True)
+class AngularTable:
+    """How a specular system passes and reflects light, by the angle of incidence alone, one band.
+
+    Between its angles the values are monotone cubics.  At 90 degrees nothing passes and all is
+    reflected, whether the table has that line or not.
+    """
+
+    theta: FloatArray  # [N] rising from 0 [rad]
+    transmittance: FloatArray  # [N]
+    reflectance_front: FloatArray | None = None  # [N] None: the BSDF's
+    reflectance_back: FloatArray | None = None  # [N]
+
+    def __post_init__(self) -> None:
+        theta = self.theta
+        if theta.ndim != 1 or len(theta) < 2 or theta[0] != 0 or np.any(np.diff(theta) <= 0):
+            raise ValueError("angles: expected at least two, from 0 and rising")
+        if theta[-1] > np.pi / 2 + 1e-9:
+            raise ValueError(f"angles: expected at most 90 degrees, got {np.degrees(theta[-1]):g}")
+        for name in ("transmittance", "reflectance_front", "reflectance_back"):
+            values = getattr(self, name)
+            if values is None:
+                continue
+            if values.shape != theta.shape or np.any(values < 0) or np.any(values > 1):
+                raise ValueError(f"{name}: expected a share of 1 for each of {len(theta)} angles")
+            if name != "transmittance" and np.any(values + self.transmittance > 1 + OVER):
+                worst = float(np.degrees(theta[np.argmax(values + self.transmittance)]))
+                raise ValueError(f"{name}: more than all is left with what passes, at {worst:g}")
+
+    def transmitted(self, theta: ArrayLike) -> FloatArray:
+        """Transmittance [..] at angles of incidence [rad]."""
+        return self._at(self.transmittance, 0.0, theta)
+
+    def reflected(self, side: str, theta: ArrayLike) -> FloatArray | None:
+        """Reflectance [..] of "front" or "back" at angles of incidence; None where not known."""
+        values = self.reflectance_front if side == "front" else self.reflectance_back
+        return None if values is None else self._at(values, 1.0, theta)
+
+    def by_cosine(self, values: FloatArray | None = None, end: float = 0.0) -> FloatArray:
+        """Shares [STEPS] at even steps of the cosine, 0 to 1; the transmittance by default."""
+        values = self.transmittance if values is None else values
+        return self._at(values, end, np.arccos(np.linspace(0.0, 1.0, STEPS)))
+
+    def patch_means(
+        self, basis: KlemsBasis, values: FloatArray | None = None, end: float = 0.0
+    ) -> FloatArray:
+        """Means [K] over the patches in cos(theta) d_omega; the transmittance by default."""
+        places = (np.arange(PLACES) + 0.5) / PLACES
+        theta, _ = basis.angles_within(np.arange(basis.size)[:, None], places, 0.5)
+        return self._at(self.transmittance if values is None else values, end, theta).mean(axis=1)
+
+    def _at(self, values: FloatArray, end: float, theta: ArrayLike) -> FloatArray:
+        angles = self.theta
+        if angles[-1] < np.pi / 2 - 1e-9:
+            angles, values = np.append(angles, np.pi / 2), np.append(values, end)
+        return np.clip(PchipInterpolator(angles, values)(np.minimum(theta, angles[-1])), 0, 1)
+
+
+def roos_table(glazing: Glazing) -> AngularTable:
+    """A glazing unit after Roos et al. 2001, see `glazing_values`."""
+    tau, front, back = (np.clip(v, 0, 1) for v in glazing_values(glazing, ANGLES))
+    return AngularTable(ANGLES, tau, front, back)
+
+
+def stack_table(panes: Sequence[Pane]) -> AngularTable:
+    """Panes behind each other, the outer one first.
+
+    All reflections between them are added up by intensity, each polarisation by itself.  Uncoated
+    panes follow Fresnel's equations, coated ones LBNL's shape, alike for either polarisation.
+    """
+    if not panes:
+        raise ValueError("expected at least one pane")
+    whole = _pane(panes[0])
+    for pane in panes[1:]:
+        whole = _behind(whole, _pane(pane))
+    tau, front, back = (np.clip(values.mean(axis=0), 0, 1) for values in whole)
+    return AngularTable(ANGLES, tau, front, back)
+
+
+def _pane(pane: Pane) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Transmittance, front and back reflectance of either polarisation [2, N]."""
+    if pane.coated:
+        values = coated_values(
+            pane.transmittance, pane.reflectance_front, pane.reflectance_back, ANGLES
+        )
+        tau, front, back = (np.tile(one, (2, 1)) for one in values)
+        return tau, front, back
+    tau, rho = polarised_values(pane.transmittance, pane.reflectance_front, ANGLES)
+    return tau, rho, rho
+
+
+def _behind(
+    outer: tuple[FloatArray, FloatArray, FloatArray],
+    inner: tuple[FloatArray, FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    (t1, f1, b1), (t2, f2, b2) = outer, inner
+    # two mirrors at 90 degrees send nothing on: what passed the outer one is 0 there
+    between = np.maximum(1 - b1 * f2, 1e-12)
+    return t1 * t2 / between, f1 + t1**2 * f2 / between, b2 + t2**2 * b1 / between
