@@ -116,15 +116,18 @@ def view_matrices(
         elements, close = sun_elements(tracer, area, view, pixels, half, tile, seed=seed)
     least = 0.5 / options.get("samples", 32)
     smooth = sparse.csr_array(sparse.eye_array(m, dtype=np.float32))
+    sharper = smooth  # of the windows' light, which changes fastest where other surfaces are close
     if tile > 1:
         count = np.maximum(total.reshape(-1, 2).sum(axis=1), least)
-        smooth = smoothing(Tiles(tile, view.width), keys, count, close).astype(np.float32)
+        squares = Tiles(tile, view.width)
+        smooth = smoothing(squares, keys, count).astype(np.float32)
+        sharper = smoothing(squares, keys, count, close).astype(np.float32)
     mean, noise = _of_halves(total, least)
     for start in range(0, shape[1], KLEMS_FULL.size):
         part = slice(start, start + KLEMS_FULL.size)
-        for rows in sums:
+        for rows, means in zip(sums, (smooth, sharper), strict=True):
             of_halves = np.array(rows[:, part])
-            rows[:m, part], rows[m:, part] = (smooth @ (a @ of_halves) for a in (mean, noise))
+            rows[:m, part], rows[m:, part] = (means @ (a @ of_halves) for a in (mean, noise))
     found = (None, None)
     if elements is not None:
         found = tuple(elements.of_rows(a, smooth) for a in (mean, noise))

@@ -116,7 +116,8 @@ def add_view_paths(
         if dr.hint(early, mode="scalar"):
             survival = dr.minimum(carried * ROULETTE, 1.0)
         else:
-            survival = dr.select(depth > 3, dr.minimum(beta * 2.0, 0.95), 1.0)
+            # by what is left, not by beta: a picture's is small, and survivors would shine
+            survival = dr.select(depth > 3, dr.minimum(carried * 2.0, 0.95), 1.0)
         active &= (generator.next_float32() < survival) & (depth < max_depth) & (beta > 0)
         beta /= dr.maximum(survival, 1e-6)
         carried /= dr.maximum(survival, 1e-6)
