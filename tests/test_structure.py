@@ -16,7 +16,7 @@ from tests.modules import EVIDENCE, MODULES, dotted, file_name, imports
 # what it imports.  What shares a rank knows nothing of the others there.
 RANKS = {
     "mitsuba_cfs": (
-        {"compiled", "directions", "errors", "llvm", "phases", "processes", "progress",
+        {"compiled", "directions", "errors", "gloss", "llvm", "phases", "processes", "progress",
          "source_code"},
         {"files", "surfaces", "variants"},
         {"bsdf", "images", "sky", "window_parts"},

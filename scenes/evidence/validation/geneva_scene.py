@@ -1,7 +1,7 @@
 """The Geneva office of raytraverse: its `.rad` files, views, skies and reference as arrays.
 
 The glazing is Radiance's `glass`; the fabric of case 03 a `BRTDfunc`: Roos' transmittance straight
-on, the rest diffuse.  All else is diffuse plastic without gloss.
+on, the rest diffuse.  All else is plastic, in this office diffuse.
 """
 
 from __future__ import annotations
@@ -51,12 +51,13 @@ def polygons(path: Path) -> list[tuple[str, NDArray[np.float64]]]:
     return found
 
 
-def reflectances(path: Path) -> dict[str, float]:
-    """Diffuse reflectance of each `plastic` and `metal` of a Radiance file without gloss."""
+def reflectances(path: Path) -> dict[str, tuple[float, cfs.Gloss | None]]:
+    """Diffuse reflectance and gloss of each grey `plastic` and `metal` of a Radiance file."""
     words, found = path.read_text().split(), {}
     for i, kind in enumerate(words[:-2]):
         if kind in ("plastic", "metal") and words[i - 1] == "void":
-            found[words[i + 1]] = float(words[i + 5])
+            numbers = [float(word) for word in words[i + 5 : i + 10]]
+            found[words[i + 1]] = cfs.radiance_gloss(kind, numbers)
     return found
 
 
@@ -88,12 +89,16 @@ def _within(p, a, b, c, normal) -> bool:
 
 def surfaces(office: Path) -> cfs.Surfaces:
     """All opaque polygons of the office."""
-    rho, parts = reflectances(office), []
-    for number, (material, corners) in enumerate(polygons(office)):
+    rho, parts, glosses = reflectances(office), [], []
+    for material, corners in polygons(office):
         if material in rho:
-            found = triangles(corners)
-            parts.append((found, np.full(len(found), rho[material]), np.full(len(found), number)))
-    return cfs.Surfaces(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+            found, (diffuse, gloss) = triangles(corners), rho[material]
+            glosses.append(gloss)
+            parts.append(
+                (found, np.full(len(found), diffuse), np.full(len(found), len(glosses) - 1))
+            )
+    arrays = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return cfs.Surfaces(*arrays, gloss=tuple(glosses) if any(glosses) else ())
 
 
 def window(name: str, corners: NDArray[np.float64]) -> cfs.WindowSurface:
