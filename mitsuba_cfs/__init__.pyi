@@ -32,6 +32,14 @@ from .glare.evaluation import (
     GlareResult as GlareResult,
     evaluate as evaluate,
 )
+from .gloss import (
+    Gloss as Gloss,
+    dielectric as dielectric,
+    lacquer as lacquer,
+    mirror as mirror,
+    pane as pane,
+    radiance_gloss as radiance_gloss,
+)
 from .images.hdr import Picture as Picture, read_hdr as read_hdr, write_hdr as write_hdr
 from .images.view import View as View, fisheye as fisheye, parse_view as parse_view
 from .matrices.cache import MatrixCache as MatrixCache

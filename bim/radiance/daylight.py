@@ -21,17 +21,24 @@ LAYERS = 0.5  # panes this near are layers of one window [m]
 CLEARLY = 1.5  # times the sky of the other side
 
 
-def opaque_surfaces(scene: RadianceScene) -> Surfaces:
-    """Everything opaque with its diffuse reflectance; surface i is the i-th such object."""
-    parts = [thing for thing in scene.objects if thing.material.is_opaque]
+def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfaces:
+    """Everything opaque with its diffuse reflectance and gloss; surface i is the i-th such object.
+
+    Args: facades: materials or modifiers of panes that stand before something dark: they mirror
+        what is before them, and nothing passes.
+    """
+    dark = {id(thing) for thing in scene.of_modifiers(facades)}
+    parts = [o for o in scene.objects if o.material.is_opaque or id(o) in dark]
     if not parts:
         return Surfaces.none()
     counts = [len(part.triangles) for part in parts]
+    glosses = tuple(part.material.gloss for part in parts)
     return Surfaces(
         np.concatenate([part.triangles for part in parts]),
         np.repeat([part.material.diffuse for part in parts], counts),
         np.repeat(np.arange(len(parts)), counts),
         tuple(part.name for part in parts),
+        glosses if any(glosses) else (),
     )
 
 

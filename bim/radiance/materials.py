@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bim.radiance.primitives import Primitive
+from mitsuba_cfs.gloss import ROUGHEST, Gloss, radiance_gloss
 
 LUMINANCE = (0.265, 0.670, 0.065)  # of red, green, blue [1]
 OPAQUE = ("plastic", "metal", "plastic2", "metal2", "trans", "trans2")
@@ -33,9 +34,8 @@ class RadianceMaterial:
 
     name: str
     kind: str
-    diffuse: float = 0.0  # diffuse reflectance [1]
-    specular: float = 0.0  # share that is mirrored, straight or rough [1]
-    roughness: float = 0.0  # slope of the facets, rms; of `plastic2` the mean of its two
+    diffuse: float = 0.0  # diffuse reflectance at normal incidence [1]
+    gloss: Gloss | None = None  # the mirrored part; of a pane as one before something dark
     transmitted: float = 0.0  # of `trans`: passed diffusely [1]
     straight: float = 0.0  # of `trans`: passed without scattering [1]
     transmissivity: float = 1.0  # of glass: of one way through it, straight on [1]
@@ -64,12 +64,13 @@ def material_of(primitive: Primitive) -> RadianceMaterial:
         if len(primitive.strings) <= place:
             raise primitive.fault("names no BSDF file")
         return RadianceMaterial(name, kind, bsdf=primitive.strings[place])
-    if kind in ("glass", "dielectric"):
-        own = numbers[3] if kind == "glass" and len(numbers) > 3 else GLASS_INDEX
-        index = numbers[3] if kind == "dielectric" else own
-        return RadianceMaterial(name, kind, transmissivity=luminance(numbers), index=index)
-    if kind == "mirror":
-        return RadianceMaterial(name, kind, specular=luminance(numbers))
+    if kind in ("glass", "dielectric", "mirror"):
+        grey = [*3 * [luminance(numbers)], *numbers[3:]]
+        if (len(grey) > 3 and not grey[3] >= 1) or not grey[0] <= 1:
+            raise primitive.fault("has a refractive index below 1 or passes more than it gets")
+        index = GLASS_INDEX if len(grey) < 4 else grey[3]
+        gloss = radiance_gloss(kind, grey)[1]
+        return RadianceMaterial(name, kind, gloss=gloss, transmissivity=grey[0], index=index)
     if kind in OPAQUE:
         return _opaque(primitive)
     return RadianceMaterial(name, kind)
@@ -82,15 +83,18 @@ def _opaque(primitive: Primitive) -> RadianceMaterial:
     passed, straight = numbers[-2:] if kind == "trans" else (0.0, 0.0)
     if not (colour <= 1 and share <= 1 and passed <= 1 and straight <= 1):
         raise primitive.fault("reflects or passes more than it gets")
-    kept = colour * (1 - share)
+    coat = "metal" if kind == "metal" else "plastic"
+    if roughness > ROUGHEST:  # no mirror at all any more
+        diffuse, gloss = colour if coat == "metal" else colour * (1 - share) + share, None
+    else:
+        diffuse, gloss = radiance_gloss(coat, [colour, colour, colour, share, roughness])
     return RadianceMaterial(
         primitive.name,
         primitive.kind,
-        diffuse=kept * (1 - passed),
-        specular=share * (colour if kind == "metal" else 1.0),
-        roughness=roughness,
-        transmitted=kept * passed * (1 - straight),
-        straight=kept * passed * straight,
+        diffuse=diffuse * (1 - passed),
+        gloss=gloss,
+        transmitted=diffuse * passed * (1 - straight),
+        straight=diffuse * passed * straight,
     )
 
 

@@ -153,10 +153,15 @@ class PhaseLight:
         if not patches.any():
             return None, None
         at_sun = through_beams(self._traced.parts.groups[q : q + 1], ways, sky.direction)
-        daylight = self._traced.straight_daylight[q : q + 1]
-        found = phases.sun_beams([optics.transmission], patches, at_sun, daylight, sky.sun)
-        by_patch, by_angle = (beam[0].astype(np.float32) for beam in found)
-        return by_patch, by_angle
+        traced, T = self._traced, [optics.transmission]
+        daylight = traced.straight_daylight[q : q + 1]
+        by_patch, by_angle = phases.sun_beams(T, patches, at_sun, daylight, sky.sun)
+        if traced.straight_daylight is not traced.direct_daylight:  # out of a mirror, by patches
+            daylight = traced.direct_daylight[q : q + 1]
+            straight = by_patch
+            by_patch, _ = phases.sun_beams(T, patches, at_sun, daylight, sky.sun)
+            by_angle = by_angle + (by_patch - straight)
+        return by_patch[0].astype(np.float32), by_angle[0].astype(np.float32)
 
     @cached_property
     def sensors(self) -> list[list[SensorLight]]:

@@ -127,7 +127,7 @@ def sun_images(
                 number = dr.minimum(mi.UInt32(place), gloss.plane_count - 1)
             u = mi.Point2f(generator.next_float32(), generator.next_float32())
             v = mi.Point2f(generator.next_float32(), generator.next_float32())
-            image = _image(room, sky, tracer, number, vertex, (u, v), active)
+            image = _image(room, sky, tracer, number, vertex, u=(u, v), active=active)
             if not rough:
                 image = image._replace(strength=dr.select(image.sharp, image.strength, 0.0))
             yield image
@@ -139,6 +139,7 @@ def _image(
     tracer: TracedScene,
     number: mi.UInt32,
     vertex: Vertex,
+    *,
     u: tuple[mi.Point2f, mi.Point2f],
     active: mi.Bool,
 ) -> SunImage:
@@ -235,7 +236,7 @@ def surface_sun(
         active,
         lambda gloss, here: (
             gloss.lobe(triangle, vertex.normal, direction, sun, here)
-            * _own_weight(gloss, triangle, vertex.normal, direction, sun, came, here)
+            * _own_weight(gloss, triangle, vertex.normal, direction, sun, came=came, active=here)
         ),
     )
     bright = active & ((lobe > 0) | (rho > 0))
@@ -274,6 +275,7 @@ def leave_by_gloss(
     vertex: Vertex,
     triangle: mi.UInt32,
     direction: mi.Vector3f,
+    *,
     rho: mi.Float,  # diffuse reflectance for the path's direction
     generator: mi.PCG32,
     active: mi.Bool,
@@ -298,6 +300,7 @@ def _own_weight(
     normal: mi.Vector3f,
     direction: mi.Vector3f,
     sun: mi.Vector3f,
+    *,
     came: mi.Float,
     active: mi.Bool,
 ) -> mi.Float:

@@ -134,6 +134,8 @@ class PictureSun:
     ) -> NDArray[np.float32]:
         """Luminance [m, h] of a picture's rows by the sun that parts of the room reflect."""
         found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
+        for mirror in self._mirrors:
+            found += mirror.on_elements(elements, suns, illuminance)
         suns, illuminance = self._turned(suns, illuminance)
         lit, places = self._shining(suns, illuminance), elements.places
         if not places.size or not len(lit):
@@ -145,7 +147,7 @@ class PictureSun:
             cosine = dr.dot(normal, to_sun)
             tau = self._straight(point, to_sun, cosine > 0)
             light = dr.select(tau > 0, tau * cosine, 0.0).numpy().reshape(places.size, len(hours))
-            found[:, hours] = elements.rows(light * illuminance[hours].astype(np.float32))
+            found[:, hours] += elements.rows(light * illuminance[hours].astype(np.float32))
         return found
 
     def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:

@@ -284,7 +284,7 @@ def add_paths(
         glossy, beta_face = mi.Bool(False), beta * rho
         if dr.hint(room.glossy, mode="scalar"):
             glossy, mirrored, weight = leave_by_gloss(
-                room, vertex, prim, direction, rho, generator, opaque
+                room, vertex, prim, direction, rho=rho, generator=generator, active=opaque
             )
             away, beta_face = dr.select(glossy, mirrored, away), beta * weight
             aimed &= ~glossy

@@ -1,7 +1,7 @@
 """The Geneva office of raytraverse: its `.rad` files, views, skies and reference as arrays.
 
 The glazing is Radiance's `glass`; the fabric of case 03 a `BRTDfunc`: Roos' transmittance straight
-on, the rest diffuse.  All else is diffuse plastic without gloss.
+on, the rest diffuse.  All else is plastic, in this office diffuse.
 """
 
 from __future__ import annotations
