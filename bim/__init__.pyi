@@ -18,7 +18,7 @@ from .model import (
     Window as Window,
 )
 from .radiance.daylight import (
-    glass_transmittance as glass_transmittance,
+    glass_shares as glass_shares,
     opaque_surfaces as opaque_surfaces,
     scene_windows as scene_windows,
 )

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from bim.radiance.materials import RadianceMaterial
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import RayMesh, hemisphere, ray_mesh
-from mitsuba_cfs.bsdf.glazing import uncoated_values
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import pane_shares
 from mitsuba_cfs.surfaces import Surfaces, WindowSurface
 
 ANGLES = 512  # even steps of the cosine of incidence
@@ -82,10 +82,12 @@ def _sky_seen(
     return float(np.mean(is_free & (rays[:, 2] > 0)))
 
 
-def glass_transmittance(material: RadianceMaterial) -> NDArray[np.float64]:
-    """Transmittance [512] of a `glass` at even steps of the cosine of incidence, 0 to 1.
+def glass_shares(
+    material: RadianceMaterial,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Transmittance and reflectance [512] of a `glass` at even steps of the cosine, 0 to 1.
 
-    What `mitsuba_cfs.AngularOptics` takes.
+    `mitsuba_cfs.AngularOptics` takes them as `straight` and `mirrored`.
 
     Raises: `DataError` for another material.
 
@@ -94,7 +96,5 @@ def glass_transmittance(material: RadianceMaterial) -> NDArray[np.float64]:
     """
     if material.kind != "glass":
         raise DataError(f"is {material.kind}, not glass: give a system", element=material.name)
-    inner, r = material.transmissivity, ((material.index - 1) / (material.index + 1)) ** 2
-    normal = (1 - r) ** 2 * inner / (1 - (r * inner) ** 2)
-    angles = np.arccos(np.linspace(0.0, 1.0, ANGLES))
-    return uncoated_values(normal, r + r * normal * inner, angles)[0]
+    steps = np.linspace(0.0, 1.0, ANGLES)
+    return pane_shares(steps, material.index, material.transmissivity)

@@ -23,6 +23,7 @@ from mitsuba_cfs.trace.systems import (
 )
 
 PATCH_ANGLES = 32  # of incidence in each patch, for its mean
+OVER = 1e-3  # by which shares may be more than 1, for rounding
 
 
 class SystemOptics(Protocol):
@@ -103,15 +104,32 @@ class AngularOptics:
     """The optics of a layer that passes light by its angle of incidence alone: glass, a weave.
 
     Exact at every angle for the direct sun, in pictures and for paths; the matrices take the mean
-    of each patch.  It reflects nothing.
+    of each patch.
     """
 
-    def __init__(self, straight: ArrayLike, scattered: ArrayLike = (0.0, 0.0)) -> None:
-        """From shares [n], [m] at even steps of the cosine of incidence, 0 to 1.
+    def __init__(
+        self,
+        straight: ArrayLike,
+        scattered: ArrayLike = (0.0, 0.0),
+        *,
+        mirrored: ArrayLike = (0.0, 0.0),
+        reflected: ArrayLike = (0.0, 0.0),
+    ) -> None:
+        """From shares [n] each, at even steps of the cosine of incidence, 0 to 1.
 
-        Args: straight: that keeps its beam; scattered: that leaves evenly to all sides.
+        Args:
+            straight: that keeps its beam; scattered: that leaves evenly to all sides.
+            mirrored, reflected: of light from the room, straight and evenly.
         """
-        self._straight, self._scattered = (np.asarray(a, float) for a in (straight, scattered))
+        shares = (straight, scattered, mirrored, reflected)
+        given = [np.asarray(one, dtype=float) for one in shares]
+        if any(one.ndim != 1 or len(one) < 2 or (one < 0).any() for one in given):
+            raise ValueError("expected shares of at least two angles each, not negative")
+        even = np.linspace(0.0, 1.0, max(len(one) for one in given))
+        total = sum(np.interp(even, np.linspace(0, 1, len(one)), one) for one in given)
+        if total.max() > 1 + OVER:
+            raise ValueError(f"more leaves than comes, {total.max():.3f} times")
+        self._straight, self._scattered, self._mirrored, self._reflected = given
 
     @cached_property
     def transmission(self) -> NDArray[np.float64]:
@@ -126,20 +144,27 @@ class AngularOptics:
     @cached_property
     def paths(self) -> PathOptics:
         """See `SystemOptics`."""
-        beam = AngularBeam(self._straight)
-        if not self._scattered.any():
-            return PathOptics(beam=beam)
-        return PathOptics(lit_system(self._klems()).bsdf, beam)
+        mirror = AngularBeam(self._mirrored) if self._mirrored.any() else None
+        rest = None
+        if self._scattered.any() or self._reflected.any():
+            rest = lit_system(self._klems()).bsdf
+        return PathOptics(rest, AngularBeam(self._straight), (None, mirror))
 
-    @property
-    def reflection(self) -> None:
+    @cached_property
+    def reflection(self) -> NDArray[np.float64] | None:
         """See `SystemOptics`."""
-        return None
+        if not (self._mirrored.any() or self._reflected.any()):
+            return None
+        back = self._klems().reflection_back * KLEMS_FULL.projected_solid_angles()
+        return back + np.diag(self._patch_means(self._mirrored))
 
     def _klems(self) -> KlemsBsdf:
-        """What is scattered, from either side."""
-        block = np.tile(self._patch_means(self._scattered) / np.pi, (KLEMS_FULL.size, 1))
-        return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block)
+        """What is scattered, from either side, and what the room's side reflects."""
+        passed, back = (
+            np.tile(self._patch_means(shares) / np.pi, (KLEMS_FULL.size, 1))
+            for shares in (self._scattered, self._reflected)
+        )
+        return KlemsBsdf(KLEMS_FULL, KLEMS_FULL, passed, passed, reflection_back=back)
 
     @staticmethod
     def _patch_means(shares: NDArray[np.float64]) -> NDArray[np.float64]:

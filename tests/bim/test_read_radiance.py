@@ -298,11 +298,14 @@ def test_glass_passes_what_radiance_says():
     """The manual's formula of the transmissivity that gives a transmittance straight on."""
     tn = 0.88
     tau = (np.sqrt(0.8402528435 + 0.0072522239 * tn * tn) - 0.9166530661) / 0.0036261119 / tn
-    found = bim.glass_transmittance(bim.RadianceMaterial("pane", "glass", transmissivity=tau))
-    assert found[-1] == pytest.approx(tn, abs=2e-6)
-    assert found[0] == pytest.approx(0, abs=1e-12)
+    pane = bim.RadianceMaterial("pane", "glass", transmissivity=tau)
+    passed, mirrored = bim.glass_shares(pane)
+    assert passed[-1] == pytest.approx(tn, abs=2e-6)
+    assert passed[0] == pytest.approx(0, abs=1e-9)
+    assert mirrored[0] == pytest.approx(1)
+    assert (passed + mirrored).max() <= 1 + 1e-9
 
 
 def test_no_glass_has_no_transmittance():
     with pytest.raises(DataError, match="cloth: is trans, not glass"):
-        bim.glass_transmittance(bim.RadianceMaterial("cloth", "trans"))
+        bim.glass_shares(bim.RadianceMaterial("cloth", "trans"))

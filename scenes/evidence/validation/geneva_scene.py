@@ -22,6 +22,7 @@ PANES = ("wgTopMat", "wgMiddleMat", "wgBottomMat")
 COATING = bim.RadianceMaterial("fabric_outerlayer", "glass", transmissivity=1.0, index=1.05)
 ROOS = (0.03, 4.0, 2.9, 75.0)  # of the fabric: normal transmittance, p, q, cut-off [degrees]
 DIFFUSE = 0.02  # transmittance of the fabric that scatters
+REFLECTED = 0.1  # diffuse reflectance of the fabric on either side
 ANGLES = 512  # even steps of the cosine of incidence
 NEW_YEAR = 1  # the day that `gendaylit -ang` takes for the distance to the sun
 
@@ -45,7 +46,7 @@ def window_groups(folder: Path, case: str) -> tuple[list[cfs.WindowGroup], list[
     office = scene(folder, case)
     panes = bim.scene_windows(office, PANES)
     pane = office.of_modifiers(PANES)[0].material
-    glass = cfs.AngularOptics(bim.glass_transmittance(pane))
+    glass = pane_optics(pane)
     if case == "01_glz":
         return [cfs.WindowGroup("panes", tuple(panes))], [[glass]]
     groups = [
@@ -56,10 +57,17 @@ def window_groups(folder: Path, case: str) -> tuple[list[cfs.WindowGroup], list[
     return groups, [[fabric(pane)], [glass], [glass]]
 
 
+def pane_optics(pane: bim.RadianceMaterial) -> cfs.AngularOptics:
+    """A pane of glass."""
+    passed, mirrored = bim.glass_shares(pane)
+    return cfs.AngularOptics(passed, mirrored=mirrored)
+
+
 def fabric(pane: bim.RadianceMaterial) -> cfs.AngularOptics:
     """The fabric behind a pane, without reflection between the two."""
-    before = bim.glass_transmittance(pane) * bim.glass_transmittance(COATING)
-    return cfs.AngularOptics(before * roos(_cosines()), before * DIFFUSE)
+    before = bim.glass_shares(pane)[0] * bim.glass_shares(COATING)[0]
+    reflected = np.full(ANGLES, REFLECTED)
+    return cfs.AngularOptics(before * roos(_cosines()), before * DIFFUSE, reflected=reflected)
 
 
 def roos(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
