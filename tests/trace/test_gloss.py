@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mitsuba_cfs.gloss import dielectric, lacquer, mirror, pane, radiance_gloss
+from mitsuba_cfs.gloss import dielectric, lacquer, mirror, pane, radiance_gloss, radiance_trans
 from mitsuba_cfs.surfaces import Surfaces
 
 from . import rooms
@@ -92,6 +92,17 @@ def test_radiances_materials_are_its_own_numbers():
         mirror(0.45, 0.1),
     )
     assert radiance_gloss("plastic", (0.3, 0.3, 0.3, 0.0, 0.0)) == (0.3, None)
+
+
+def test_a_trans_passes_what_radiances_does():
+    """Of `rtrace` through `trans 0.8 0.8 0.8 0.05 0 0.6 0.3` at 0, 45, 60 and 78.5 degrees."""
+    straight, scattered = radiance_trans((0.8, 0.8, 0.8, 0.05, 0.0, 0.6, 0.3))
+    cosine = np.array([1, 0.7071068, 0.5, 0.2])
+    found = np.interp(cosine, np.linspace(0, 1, len(straight)), straight)
+    assert found == pytest.approx([0.1366837, 0.1348919, 0.1297363, 0.09461943], rel=1e-3)
+    assert scattered == pytest.approx(straight * 0.7 / 0.3)
+    with pytest.raises(ValueError, match="genBSDF"):
+        radiance_trans((0.8, 0.8, 0.8, 0.05, 0.1, 0.6, 0.3))
 
 
 def test_faults_are_said():
@@ -286,6 +297,17 @@ def test_the_sun_in_a_mirror_is_a_sun_to_the_direct_matrix():
     assert alone.min() > 0
     np.testing.assert_allclose(seen, 0.8 * alone, rtol=2e-3)
     assert not matrix(rooms.NOTHING, SUN).any()
+
+
+def test_a_mirror_behind_the_windows_sends_them_no_sun():
+    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.sun_ways import sun_ways
+
+    _, groups = rooms.test_room()
+    for shift, ways in ((0.0, 2), (30.0, 1)):  # before the window, and behind the house
+        there = facade(mirror(0.8))
+        there = replace(there, triangles=there.triangles + np.array([0.0, shift, 0.0]))
+        assert len(sun_ways(TracedScene(there, groups, windows_block=False))) == ways
 
 
 @pytest.mark.slow
