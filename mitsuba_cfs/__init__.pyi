@@ -39,6 +39,7 @@ from .gloss import (
     mirror as mirror,
     pane as pane,
     radiance_gloss as radiance_gloss,
+    radiance_trans as radiance_trans,
 )
 from .images.hdr import Picture as Picture, read_hdr as read_hdr, write_hdr as write_hdr
 from .images.view import View as View, fisheye as fisheye, parse_view as parse_view

@@ -110,6 +110,25 @@ def radiance_gloss(kind: str, values: Sequence[float]) -> tuple[float, Gloss | N
     return diffuse, gloss
 
 
+def radiance_trans(values: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What a grey smooth Radiance `trans` passes straight on and what it scatters [STEPS].
+
+    Both at even steps of the cosine of incidence, as `AngularOptics` takes them; what it reflects
+    is left out.
+
+    Args: values: red, green, blue (one colour), specularity, roughness 0, transmissivity, and the
+        share of it that goes straight on.
+
+    Source: `normal.c` of Radiance.
+    """
+    colour, specular, roughness, transmitted, share = values[0], *values[3:7]
+    if roughness**2 > 1e-6:
+        raise ValueError("a rough trans passes no beam: make its BSDF by genBSDF")
+    reflected = lacquer(specular).reflectance(_cosines())
+    passed = colour * transmitted * (1 - reflected)
+    return passed * share, passed * (1 - share)
+
+
 def radiance_material(name: str, reflectance: float, gloss: Gloss | None = None) -> str:
     """A Radiance material of a diffuse reflectance at normal incidence and a gloss.
 

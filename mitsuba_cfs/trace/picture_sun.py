@@ -335,7 +335,8 @@ class PictureSun:
 
     def _by_mirror(self, towards: mi.Vector3f, plane: int) -> mi.Float:
         """Share of the sun that comes to the eye by a mirror plane of the room."""
-        gloss, normal = self._inside.gloss, mi.Vector3f(*self._inside.gloss.normals[plane])
+        gloss = self._inside.gloss
+        normal = mi.Vector3f(*map(float, gloss.normals[plane]))
         ray = mi.Ray3f(mi.Point3f(self._eye), towards)
         hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True)
         met = hit.is_valid()

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.trace.scene import TracedScene
 
+BEFORE = 1e-3  # [m] of a window's plane, that a mirror must reach to send it light
+
 
 class SunWay:
     """One way: where the sun's light comes from, and what of it reaches a place."""
@@ -44,9 +46,17 @@ class SunWay:
 
 
 def sun_ways(outside: TracedScene) -> list[SunWay]:
-    """All ways, the straight one first."""
+    """All ways, the straight one first, without mirrors that no window of the scene can see."""
     mirrors = [] if outside.gloss is None else outside.gloss.mirrors
-    return [SunWay(outside), *(SunWay(outside, int(plane)) for plane in mirrors)]
+    return [SunWay(outside), *(SunWay(outside, int(p)) for p in mirrors if _seen(outside, p))]
+
+
+def _seen(outside: TracedScene, plane: int) -> bool:
+    """Whether a plane has a corner before one of the windows; true without any window."""
+    corners = outside.gloss.corners[plane]
+    windows = [window for group in outside.groups for window in group.windows]
+    before = ((corners - w.triangles.mean(axis=(0, 1))) @ w.normal > BEFORE for w in windows)
+    return not windows or any(map(np.any, before))
 
 
 def shining(

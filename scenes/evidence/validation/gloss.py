@@ -86,6 +86,7 @@ class Outcome:
     ev_error: float
     ev_picture: float
     ev_five_phase: float  # of its picture
+    ev_five_phase_point: float
     dgp_rpict: float
     dgp: float
     dgp_five_phase: float
@@ -176,18 +177,18 @@ def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Ou
     found, plain = (_eye(one, view) for one in (given, _without_gloss(given)))
     picture = point_in_time_picture(given.lit, given.sky, view, samples=64)
     rendered = theirs.picture(view)
-    phases = _five_phase(given, view)
+    phases, at_point = _five_phase(given, view)
     np.savez(folder / "pictures.npz", ours=picture, theirs=rendered, five_phase=phases)
     ours, rated = evaluate(picture, view), evaluate(rendered, view, illuminance=ev)
     third = evaluate(phases, view)
     return Outcome(
         name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]), ours.Ev,
-        third.Ev, rated.dgp, ours.dgp, third.dgp, float(plain.values[0]),
+        third.Ev, at_point, rated.dgp, ours.dgp, third.dgp, float(plain.values[0]),
     )  # fmt: skip
 
 
-def _five_phase(given: Case, view: View) -> np.ndarray:
-    """The picture by five phases; the sun lies on the sky patch that it stands in."""
+def _five_phase(given: Case, view: View) -> tuple[np.ndarray, float]:
+    """Picture and Ev by five phases; the sun lies on the sky patch that it stands in."""
     reinhart = ReinhartSky(4)
     strength, sun = given.sun_luminance * SUN_SOLID_ANGLE, np.zeros((reinhart.size, 1))
     patch = int(reinhart.index(SUN[None])[0])
@@ -201,10 +202,11 @@ def _five_phase(given: Case, view: View) -> np.ndarray:
     scene = cfs.DaylightScene(*around, points, normals, view=view)
     traced = cfs.PhaseScene(scene, cfs.Sampling(outdoor_samples=16, view_samples=16))
     clear = cfs.AngularOptics(np.ones(64))
-    shown = cfs.PhaseSystems(traced, [[clear]]).light(sky).pictures(np.array([0]), [0])
+    light = cfs.PhaseSystems(traced, [[clear]]).light(sky)
+    shown = light.pictures(np.array([0]), [0])
     picture = np.zeros(view.width * view.height, dtype=np.float32)
     picture[shown.pixels] = shown.values(np.array([0]))[0]
-    return picture.reshape(view.height, view.width)
+    return picture.reshape(view.height, view.width), float(light.illuminance()[0, 0])
 
 
 def _eye(given: Case, view: View):
