@@ -22,6 +22,7 @@ class RoomMetrics:
     daylight_autonomy: FloatArray  # [S] 300 lx, LM-83's hours
     continuous_daylight_autonomy: FloatArray  # [S] 300 lx, LM-83's hours
     useful_daylight: FloatArray  # [4, S] below 100, 100 to 300, 300 to 3000, above 3000 lx
+    useful_daylight_2005: FloatArray  # [S] 100 to 2000 lx, the limits of 2005
     mean_illuminance: FloatArray  # [S] [lx] over EN 17037's daylight hours
     sunlit_hours: FloatArray | None  # [S] [h] above 1000 lx of direct sun, LM-83's hours
     spatial_daylight_autonomy: float  # sDA300/50%
@@ -39,6 +40,7 @@ class RoomMetrics:
             "udi_100_300": supplementary,
             "udi_300_3000": autonomous,
             "udi_above_3000": exceeded,
+            "udi_100_2000": self.useful_daylight_2005,
             "mean_illuminance_lx": self.mean_illuminance,
         }
         if self.sunlit_hours is not None:
@@ -55,6 +57,7 @@ class RoomMetrics:
             "udi_100_300": float(useful[1]),
             "udi_300_3000": float(useful[2]),
             "udi_above_3000": float(useful[3]),
+            "udi_100_2000": float(self.useful_daylight_2005 @ self.areas),
             "mean_illuminance_lx": float(self.mean_illuminance @ self.areas),
             "spatial_daylight_autonomy": self.spatial_daylight_autonomy,
             "annual_sunlight_exposure": self.annual_sunlight_exposure,
@@ -88,10 +91,15 @@ def room_metrics(
         lit = lm83.sunlit_hours(direct_illuminance, ten, step_h=weather.step_h)
         ase = autonomy.area_share(lit > lm83.ASE_HOURS, areas)
     enough = autonomy.daylight_autonomy(illuminance, ten)
+    useful = [
+        autonomy.useful_daylight_illuminance(illuminance, ten, limits)
+        for limits in (autonomy.UDI_LIMITS, autonomy.UDI_LIMITS_2005)
+    ]
     return RoomMetrics(
         daylight_autonomy=enough,
         continuous_daylight_autonomy=autonomy.continuous_daylight_autonomy(illuminance, ten),
-        useful_daylight=autonomy.useful_daylight_illuminance(illuminance, ten),
+        useful_daylight=useful[0],
+        useful_daylight_2005=useful[1][1:3].sum(axis=0),
         mean_illuminance=np.mean(autonomy.scheduled(illuminance, half), axis=0, dtype=float),
         sunlit_hours=lit,
         spatial_daylight_autonomy=autonomy.area_share(enough >= lm83.SDA_TIME, areas),

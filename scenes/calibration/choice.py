@@ -1,36 +1,26 @@
-"""Which method and which glare metric to take: the rules of the dissertation's 3.2.8 and a clock.
+"""Which method and which glare metric to take: measured errors, and a clock.
 
 - Specular surfaces in the room are outside of what eDGP and sDGP assume, and the phase methods'
   direct sun does not know their reflections: full DGP by point-in-time paths, whatever it takes.
-  (Its rule.  Our tracer knows no mirrors in a room either, and the reason says so.)
-- The three-phase method only where nothing finer than a Klems matrix that blurs the sun is known.
+  (The rule of the dissertation's 3.2.8.  Our tracer knows no mirrors in a room either, and the
+  reason says so.)
 - Otherwise what is near enough and quick enough; of these the nearest, of equals the quickest, with
-  full DGP where it costs no more.  With the dissertation's costs many time steps lead to the
-  five-phase method with full DGP and few to point-in-time with eDGP, as it says.
+  full DGP where it costs no more.  What is near is what was measured of systems like the ones at
+  hand, see `scenes.calibration.errors`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from scenes.calibration.costs import Calibration, Workload
 from scenes.calibration.durations import spoken_time
+from scenes.calibration.errors import Pair
 
-# Relative root mean square error of DGP against measurement: the dissertation's Table 13
-ERRORS = {
-    ("three-phase", "DGP"): 0.23,
-    ("three-phase", "eDGP"): 0.25,
-    ("three-phase", "sDGP"): 0.26,
-    ("five-phase", "DGP"): 0.11,
-    ("five-phase", "eDGP"): 0.10,
-    ("five-phase", "sDGP"): 0.16,
-    ("point-in-time", "DGP"): 0.11,
-    ("point-in-time", "eDGP"): 0.10,
-    ("point-in-time", "sDGP"): 0.15,
-}
-EQUAL = 0.011  # errors that differ by less are equal: the table has whole per cents
+EQUAL = 0.011  # errors that differ by less are equal: they are known to a per cent at best
 SLACK = 1.25  # times that differ by less are equal: then full DGP, which assumes least
-BLURRED, SPECULAR = ("three-phase",), ("point-in-time", "DGP")
+SPECULAR = ("point-in-time", "DGP")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +30,9 @@ class Demand:
     work: Workload
     time_budget: float  # [s]
     dgp_error: float  # relative
-    fine: bool  # every system has a tensor tree, or a matrix with its straight beam apart
-    specular: bool  # a surface of a room mirrors
+    errors: Mapping[Pair, float]  # expected of each method and metric, relative
+    specular: bool = False  # a surface of a room mirrors
+    origin: str = ""  # of the errors, in words
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +57,8 @@ def choose(demand: Demand, calibration: Calibration) -> MethodChoice:
         return _choice(SPECULAR, seconds, demand, "a surface of the room mirrors, which eDGP, sDGP "
                        "and the phase methods do not cover: full pictures by paths (the mirror "
                        "itself is not traced: every surface of a room is diffuse)")  # fmt: skip
-    known = {pair: s for pair, s in seconds.items() if demand.fine or pair[0] in BLURRED}
-    data = "" if demand.fine else "a system has only a Klems matrix that blurs the sun; "
-    near = {pair for pair in known if ERRORS[pair] <= demand.dgp_error}
+    known = {pair: s for pair, s in seconds.items() if pair in demand.errors}
+    near = {pair for pair in known if demand.errors[pair] <= demand.dgp_error}
     quick = {pair for pair in known if known[pair] <= demand.time_budget}
     if near & quick:
         allowed, words = near & quick, f"{len(near & quick)} of {len(known)} meet error and time"
@@ -77,19 +67,19 @@ def choose(demand: Demand, calibration: Calibration) -> MethodChoice:
     else:
         quickest = min(known, key=known.get)
         allowed, words = {quickest}, "none is quick enough: the quickest"
-    best = min(ERRORS[pair] for pair in allowed)
-    equals = [pair for pair in allowed if ERRORS[pair] < best + EQUAL]
+    best = min(demand.errors[pair] for pair in allowed)
+    equals = [pair for pair in allowed if demand.errors[pair] < best + EQUAL]
     least = SLACK * min(known[pair] for pair in equals)
     equals = [pair for pair in equals if known[pair] <= least]
     taken = min(equals, key=lambda pair: (pair[1] != "DGP", known[pair]))
-    return _choice(taken, seconds, demand, data + words)
+    return _choice(taken, seconds, demand, words)
 
 
 def _choice(pair, seconds: dict, demand: Demand, words: str) -> MethodChoice:
     method, metric = pair
-    time, error = seconds[pair], ERRORS[pair]
+    time, error = seconds[pair], demand.errors[pair]
     why = (
-        f"{words}; expected error of DGP {100 * error:.0f} % (asked {100 * demand.dgp_error:.0f} %)"
+        f"{words}; expected error of DGP {100 * error:.2g} % (asked {100 * demand.dgp_error:.0f} %)"
         f", predicted {spoken_time(time)} (budget {spoken_time(demand.time_budget)}) for "
         f"{demand.work.scenes} room(s) x {demand.work.systems} system(s) x "
         f"{demand.work.steps} steps"
@@ -98,4 +88,6 @@ def _choice(pair, seconds: dict, demand: Demand, words: str) -> MethodChoice:
         why += "; OVER the time budget"
     if error > demand.dgp_error:
         why += "; NOT the error asked for"
+    if demand.origin:
+        why += f"; {demand.origin}"
     return MethodChoice(method, metric, time, error, why)

@@ -16,6 +16,7 @@ SENSOR_COLUMNS = {  # column of a run: (column of the library, factor)
     "udi_100_300": ("udi_100_300", 100.0),
     "udi_300_3000": ("udi_300_3000", 100.0),
     "udi_above_3000": ("udi_above_3000", 100.0),
+    "udi_100_2000": ("udi_100_2000", 100.0),
     "mean_illuminance_lx": ("mean_illuminance_lx", 1.0),
 }
 ROOM_COLUMNS = {

@@ -1,29 +1,43 @@
-"""The methods of the cases that leave theirs open, chosen by this machine's costs."""
+"""The methods of the cases that leave theirs open, by measured errors and this machine's costs."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from mitsuba_cfs.bsdf.klems_peak import through_peak
+from bim.model import Building, Space
+from bim.sensors import view_point
+from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.calibration.choice import Demand, MethodChoice, choose
 from scenes.calibration.costs import Calibration, Workload
+from scenes.calibration.errors import MeasuredErrors, measured_errors
 from scenes.calibration.shipped import this_machines_costs
-from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.calibration.traits import Traits, hidden_sky, sun_in_view, system_traits
+from scenes.fenestration.systems import read_system
 from scenes.run.inputs import read_weather
 from scenes.study.case import AUTO, Case, with_method
 from scenes.study.one_case import case_systems
 from scenes.study.plan import StudyPlan
 from scenes.study.study_file import Study
 
+SHINING = 50.0  # [W/m2] normal to the sun, from which it counts as shining
 
-def settled(study: Study, plan: StudyPlan, calibration: Calibration | None = None) -> StudyPlan:
+
+def settled(
+    study: Study,
+    plan: StudyPlan,
+    calibration: Calibration | None = None,
+    measured: MeasuredErrors | None = None,
+) -> StudyPlan:
     """The plan with a method for every case; those of rooms with mirrors have their own.
 
-    Args: calibration: this machine's by default, measured or scaled.
+    Args:
+        calibration: this machine's by default, measured or scaled.
+        measured: the errors that ship with the program by default.
 
     Raises: `DataError` for a calibration of this machine that cannot be read.
     """
@@ -32,11 +46,20 @@ def settled(study: Study, plan: StudyPlan, calibration: Calibration | None = Non
         return plan
     calibration = calibration or this_machines_costs()
     calibration = calibration.scaled(study.options.picture_size)
+    measured = measured or measured_errors()
     chosen: dict[bool, MethodChoice] = {}
     for specular in {case.specular for case in open_cases}:
         cases = [case for case in open_cases if case.specular == specular]
         budget = study.auto.time_budget * len(cases) / len(open_cases)
-        demand = Demand(work_of(cases), budget, study.auto.dgp_error, _fine(cases, plan), specular)
+        traits = case_traits(cases, plan)
+        demand = Demand(
+            work_of(cases),
+            budget,
+            study.auto.dgp_error,
+            measured.of_all(traits),
+            specular,
+            measured.origin(traits),
+        )
         choice = choose(demand, calibration)
         chosen[specular] = replace(choice, why=f"{choice.why}; {calibration.origin}")
     cases = []
@@ -65,20 +88,39 @@ def work_of(cases: list[Case]) -> Workload:
     return Workload(scenes, systems, round(rated), round(lit))
 
 
-def _fine(cases: list[Case], plan: StudyPlan) -> bool:
-    """Whether every system is known finely enough for the sun's disc."""
-    files = {case.bsdf.path for case in cases if case.bsdf is not None}
-    systems = [read_system(path) for path in files]
+def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
+    """What a method's error goes by, of each system in each room under each climate."""
+    rooms: dict[tuple, tuple[float, float]] = {}
+    systems: dict[str | Path, list[tuple[float, float, float]]] = {}
+    found: dict[Traits, None] = {}
     for case in cases:
-        if case.bsdf is None:
-            _, space = plan.rooms[case.scene]
-            systems += [one for states in case_systems(case, space).values() for one in states]
-    return all(map(keeps_the_sun, {id(system): system for system in systems}.values()))
+        building, space = plan.rooms[case.scene]
+        filled = case.scene if case.bsdf is None else case.bsdf.path
+        if filled not in systems:
+            systems[filled] = filled_traits(case, space)
+        seen = (case.scene, case.weather, case.orientation_deg)
+        if seen not in rooms:
+            rooms[seen] = room_traits(case, building, space)
+        found |= {Traits(*one, *rooms[seen]): None for one in systems[filled]}
+    return list(found)
 
 
-def keeps_the_sun(system: FenestrationSystem) -> bool:
-    """A tensor tree, or a Klems matrix that has the straight beam on its diagonal."""
-    if system.tree is not None:
-        return True
-    matrix = system.visible
-    return bool(through_peak(matrix.transmission_front, matrix.basis_in).transmittance.max() > 0)
+def filled_traits(case: Case, space: Space) -> list[tuple[float, float, float]]:
+    """The traits of what fills a case's windows, each in its first state."""
+    if case.bsdf is not None:
+        return [system_traits(read_system(case.bsdf.path).fine)]
+    first = {id(states[0]): states[0] for states in case_systems(case, space).values()}
+    return [system_traits(system.fine) for system in first.values()]
+
+
+def room_traits(case: Case, building: Building, space: Space) -> tuple[float, float]:
+    """Share of the occupied hours with the sun in view, and of the sky that is hidden."""
+    if not space.windows:
+        return 0.0, 0.0
+    weather = read_weather(case.weather.path).turned(case.orientation_deg)
+    suns = sun_directions(weather)
+    rated = working_hours(weather, *case.options.occupancy.hours) & is_up(suns)
+    shining = (weather.direct_normal > SHINING)[rated]
+    groups = window_groups(space)
+    sun = sun_in_view(groups, *view_point(space), suns[rated], shining)
+    return sun, hidden_sky(groups, exterior_surfaces(building, space))

@@ -1,7 +1,7 @@
 r"""The dissertation's Table 2 remade: phase methods against explicit slats, hour by hour.
 
     python -m scenes.evidence.validation.daylight_methods \
-        --weather CITY.epw [--every 10] [--json FILE]
+        --weather CITY.epw [--every 10] [--json FILE] [--series FIGURES_27_TO_30.png]
 
 Room of Table 1 (3.65 x 4.60 x 3.00 m, to the south-west), six sensors in its middle line; double
 glazing by the Roos model, alone and behind an exterior blind of curved slats at 5, 40 and 70
@@ -52,12 +52,21 @@ from scenes.evidence.validation.blind_room import (
     slats,
     test_room,
 )
-from scenes.evidence.validation.glare_room import glazing, known_system
+from scenes.evidence.validation.glare_room import (
+    glazing,
+    known_system,
+    lit_hours,
+    sunny_days,
+)
 
 DIM = 50.0  # [lx] hours below this at the reference count no relative error
 SUBDIVISION = 4
 SAMPLING = Sampling(sensor_samples=262_144, patch_samples=32_768, subdivision=SUBDIVISION)
 FINE = fine_basis(3)  # 1,321 patches
+THRESHOLD = 300.0  # [lx] of daylight autonomy
+DAYS = {"glass": (3, 25), "5 degrees": (4, 6), "40 degrees": (4, 1), "70 degrees": (6, 16)}
+SHOWN = ("slats", "three-phase", "five-phase, Klems", "five-phase, tensor tree",
+         "point in time, Klems", "point in time, tensor tree")  # fmt: skip
 COEFFICIENT_PATHS = 65_536  # of a sensor in each of 16 batches
 
 
@@ -157,6 +166,26 @@ def errors(found: NDArray, reference: NDArray) -> dict[str, float]:
     }
 
 
+def classified(found: NDArray, reference: NDArray) -> dict[str, float]:
+    """Daylight autonomy as a test of two classes, the dissertation's 3.1.1.5 [%].
+
+    Sensitivity: of a sensor's hours with 300 lx and more by the reference, those that the method
+    has too; specificity: of the others, those that it has below; the same of the sensors' mean.
+    """
+    table = {}
+    for name, ours, theirs in (
+        ("", found, reference),
+        (" of the sensors' mean", found.mean(axis=0), reference.mean(axis=0)),
+    ):
+        said, enough = ours >= THRESHOLD, theirs >= THRESHOLD
+        for word, chosen, right in (
+            ("sensitivity", enough, said), ("specificity", ~enough, ~said),
+        ):  # fmt: skip
+            share = 100 * float(right[chosen].mean()) if chosen.any() else None
+            table[f"{word}{name} [%]"] = share
+    return table
+
+
 def one_case(scene: BlindRoom, sky: AnnualSky, tilt_deg: float | None, samples: int) -> dict:
     """All methods against the explicit geometry for one system."""
     exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
@@ -178,8 +207,45 @@ def one_case(scene: BlindRoom, sky: AnnualSky, tilt_deg: float | None, samples: 
         "noise of V, worst sensor [%]": 100 * view_noise,
         "seconds of the reference": round(seconds, 1),
         "hours": reference.shape[1],
-        **{name: errors(values, reference) for name, values in found.items()},
+        "series": {
+            name: values.mean(axis=0).round(1).tolist()
+            for name, values in {"slats": reference, **found}.items()
+        },
+        **{
+            name: errors(values, reference) | classified(values, reference)
+            for name, values in found.items()
+        },
     }
+
+
+def of_a_day(weather: Weather, month: int, day: int) -> tuple[AnnualSky, list[str]]:
+    """The sunniest day within a fortnight of a date: its skies, and its hours."""
+    of_day = sunny_days(weather, month, day, 1)
+    hours = lit_hours(weather, of_day, 1)
+    return annual_sky(weather, SUBDIVISION, hours=hours), [
+        f"{t:%H:%M}" for t in weather.midpoints[hours]
+    ]
+
+
+def write_series(results: dict, path: Path) -> None:
+    """The sensors' mean over the hours of each system's day, as Figures 27 to 30 (PNG)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 6.4), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, (name, result) in zip(figure.subplots(2, 2).flat, results.items(), strict=False):
+        for method, values in result["series"].items():
+            if method in SHOWN:
+                style = "ko-" if method == "slats" else "-"
+                axes.plot(result["times"], values, style, label=method, markersize=3)
+        axes.axhline(THRESHOLD, color="#999", linewidth=0.8)
+        axes.set_title(name, fontsize=9)
+        axes.set_ylabel("mean of six sensors [lx]", fontsize=8)
+        axes.tick_params(labelsize=7)
+        axes.grid(alpha=0.3)
+    figure.axes[0].legend(fontsize=7)
+    figure.savefig(path)
 
 
 def main() -> None:
@@ -190,15 +256,22 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=8192, help="paths of a sensor in a batch")
     parser.add_argument("--only", choices=TILTS, action="append", help="system, all by default")
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--series", type=Path, help="Figures 27 to 30 of a day each, as a picture")
     options = parser.parse_args()
     variants.activate()
-    sky = chosen_hours(read_epw(options.weather), options.every)
+    weather = read_epw(options.weather)
     scene, results = test_room(), {}
     for name in options.only or TILTS:
-        results[name] = one_case(scene, sky, TILTS[name], options.samples)
+        if options.series:
+            sky, times = of_a_day(weather, *DAYS[name])
+        else:
+            sky, times = chosen_hours(weather, options.every), []
+        results[name] = one_case(scene, sky, TILTS[name], options.samples) | {"times": times}
         print(name, json.dumps(results[name], indent=1), flush=True)
     if options.json:
         options.json.write_text(json.dumps(results, indent=1))
+    if options.series:
+        write_series(results, options.series)
 
 
 if __name__ == "__main__":

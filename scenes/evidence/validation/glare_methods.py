@@ -2,7 +2,7 @@ r"""The dissertation's Tables 4, 7 and 10 remade: DGP, eDGP, sDGP of three metho
 
     python -m scenes.evidence.validation.glare_methods \
         --weather CITY.epw --json FILE [--system "5 degrees"]
-    python -m scenes.evidence.validation.glare_methods --table FILE
+    python -m scenes.evidence.validation.glare_methods --table FILE [--series FOLDER]
 
 Hours of sunny days in June and September (the dissertation measured from 3 to 6 June behind blinds
 and on 4 and 5 September without).  The "measurement" is the DGP of a path-traced picture of the
@@ -160,6 +160,33 @@ def table(runs: list[dict]) -> str:
     return "\n".join(lines)
 
 
+def write_series(runs: list[dict], folder: Path) -> None:
+    """DGP of the measurement and of each method's metrics over the hours: Figures 33 to 44 (PNG).
+
+    A picture for each method (36 to 38, 39 to 41, 42 to 44), with the measurement (33 to 35) in it,
+    a row for each system.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for method in METHODS:
+        figure = Figure(figsize=(9, 2.6 * len(runs)), dpi=130, layout="constrained")
+        FigureCanvasAgg(figure)
+        rows = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
+        for axes, run in zip(rows, runs, strict=True):
+            at = np.arange(len(run["times"]))
+            axes.plot(at, run["measured"], "ko-", label="slats as geometry", markersize=3)
+            for metric, style in zip(GLARE, ("-", "--", ":"), strict=True):
+                axes.plot(at, run["methods"][f"{method} {metric}"], style, label=metric)
+            axes.set_xticks(at, run["times"], rotation=60, fontsize=6)
+            axes.set_ylabel("DGP")
+            axes.set_title(f"{run['system']}, {method}", fontsize=9)
+            axes.grid(alpha=0.3)
+        rows[0].legend(fontsize=7)
+        figure.savefig(folder / f"{method}.png")
+
+
 def _cell(found: tuple[float, ...]) -> str:
     bias, square, most, least = found
     return f"{square:g} ({bias:+g}), {least:+g} to {most:+g}"
@@ -178,9 +205,13 @@ def main() -> None:
     parser.add_argument("--levels", type=int, default=5, help="4^levels cells of the tree")
     parser.add_argument("--pictures", type=Path, help="folder for the measurement's pictures")
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--series", type=Path, help="folder for the time series, Figures 33 to 44")
     options = parser.parse_args()
     if options.table:
-        print(table(json.loads(options.table.read_text())))
+        runs = json.loads(options.table.read_text())
+        print(table(runs))
+        if options.series:
+            write_series(runs, options.series)
         return
     if options.weather is None:
         parser.error("--weather is needed")
@@ -194,6 +225,8 @@ def main() -> None:
     found = rated(scene, cases, sampling, options.pictures)
     if options.json:
         options.json.write_text(json.dumps(found, indent=1))
+    if options.series:
+        write_series(found, options.series)
     print(table(found))
 
 

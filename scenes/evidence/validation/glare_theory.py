@@ -2,6 +2,7 @@
 
     python -m scenes.evidence.validation.glare_theory --json FILE [--figure FILE.png]
     python -m scenes.evidence.validation.glare_theory --table FILE
+    python -m scenes.evidence.validation.glare_theory --scales
 
 Bars with slits between them, so small that the eye sees them as one (4 mm apart), are cut parallel
 to the sun's beam, so that it comes at the peak angle.  The slits' height sets the direct-direct
@@ -14,12 +15,14 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.blinds import extrude
+from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
 from mitsuba_cfs.methods import METHODS
 from mitsuba_cfs.methods.sampling import Sampling
@@ -39,6 +42,7 @@ DIFFUSE, DIRECT = 10_000.0, 20_000.0  # [lx] of the sky on the horizontal, of th
 TRANSMITTANCES = (0.01, 0.03, 0.1, 0.3, 0.6)  # at the peak, amplitude AMPLITUDE_DEG
 AMPLITUDES_DEG = (1.25, 2.5, 5.0, 10.0, 20.0, 40.0)  # at the peak transmittance TRANSMITTANCE
 AMPLITUDE_DEG, TRANSMITTANCE = 10.0, 0.03
+SCALES = (1.0, 0.1, 10.0)  # of the bars, Table 12's third series
 EYES = 4  # at different heights behind the slits: an eye sees the sun through a few of them
 ASIDE_DEG = 20.0  # azimuth of the sun from the facade's normal
 TABLE_12 = {  # largest relative error [%] against rtrace_ttree's DGP
@@ -70,6 +74,33 @@ def peaked_slats(
         (plastic("slat", REFLECTANCE),),
         (width, SPACING),
     )
+
+
+def scale_series(samples: int = 4096) -> list[dict]:
+    """The third series of the dissertation's Table 12: the same bars, larger and smaller.
+
+    Hemispherical transmittance [K] at each scale against the first, and the largest difference
+    between two runs of that one, which is noise.
+    """
+    layer, runs = peaked_slats(TRANSMITTANCE, AMPLITUDE_DEG), []
+    for number, scale in enumerate((*SCALES, SCALES[0])):
+        larger = replace(
+            layer,
+            triangles=scale * layer.triangles,
+            period=tuple(scale * side for side in layer.period),
+        )
+        klems = generate_klems(larger, samples=samples, seed=number).bsdf[0]
+        runs.append((scale, klems.direct_hemispherical(klems.transmission_front)))
+    first = runs[0][1]
+    return [
+        {
+            "scale": scale,
+            "noise": number == len(SCALES),
+            "mean": round(float(tau.mean()), 5),
+            "largest difference": round(float(np.abs(tau - first).max()), 5),
+        }
+        for number, (scale, tau) in enumerate(runs)
+    ]
 
 
 def peaked_geometry(group: WindowGroup, transmittance: float, amplitude_deg: float) -> Surfaces:
@@ -205,8 +236,14 @@ def main() -> None:
     parser.add_argument("--levels", type=int, default=5, help="4^levels cells of the tree")
     parser.add_argument("--pictures", type=Path, help="folder for the slats' pictures")
     parser.add_argument("--figure", type=Path)
+    parser.add_argument("--scales", action="store_true", help="the series of scales, alone")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
+    if options.scales:
+        variants.activate()
+        for row in scale_series():
+            print(row)
+        return
     if options.table:
         runs = json.loads(options.table.read_text())
     else:
