@@ -30,8 +30,24 @@ U_MODELS = ("constant", "linear", "gap", "surface", "layers")
 # Films that a shade's face realises at 0 and 20 degC [m2 K/W], R_i inside and R_e outside: of a
 # grey shade 50 mm behind and 100 mm before a low-e argon double glazing 6/16/6
 TYPICAL_FILMS = {"internal": (0.0715, None), "external": (None, 0.0236)}
-# RMSE [K] of air and of the window's inner face, by place and U model: the 128 cases
-ERRORS: dict[str, dict[str, tuple[float, float]]] = {}
+# RMSE [K] of air and of the window's inner face in the 128 cases (docs/thermal.md), by place and U
+# model, "+" with the films that the shade realises; outside: the larger of a blind's and a shade's
+ERRORS: dict[str, dict[str, tuple[float, float]]] = {
+    "none": {
+        "constant": (0.30, 0.42), "linear": (0.61, 0.84), "gap": (0.13, 0.17),
+        "surface": (0.13, 0.16), "layers": (0.17, 0.21),
+    },
+    "external": {
+        "constant": (0.51, 0.83), "constant+": (0.22, 0.32), "linear": (0.45, 0.82),
+        "gap": (0.52, 0.85), "gap+": (0.18, 0.27), "surface+": (0.23, 0.34),
+        "layers+": (0.17, 0.29),
+    },
+    "internal": {
+        "constant": (0.70, 2.83), "constant+": (0.64, 0.74), "linear": (0.37, 2.45),
+        "gap": (0.49, 2.63), "gap+": (0.23, 0.55), "surface+": (0.47, 0.61),
+        "layers+": (0.44, 0.25),
+    },
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,5 +134,7 @@ class Closure:
         shaded = self.unit is not None and place in TYPICAL_FILMS
         films = ", films that the shade realises" if self.states_films or shaded else ""
         known = ERRORS.get(place, {}).get(self.u_model + ("+" if films else ""))
-        error = "" if known is None else f"; {known[0]:g} K of air, {known[1]:g} K of the window"
-        return f"{words}{films}{error}"
+        if known is None:
+            return f"{words}{films}; its error is not known"
+        error = f"{known[0]:.2f} K of air, {known[1]:.2f} K of the window"
+        return f"{words}{films}; in 128 cases {error}"

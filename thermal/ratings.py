@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,7 +143,7 @@ def shade_ratings(
     The light that reaches the room is tau_B tau/(1 - rho_B rho) (EN 13363-1, 5.2).
     """
     tau, rho = transmittance, reflectance
-    formulas = {
+    formulas: dict[str, Callable[..., FloatArray]] = {
         "external": external_shade_g,
         "internal": internal_shade_g,
         "integrated": integrated_shade_g,

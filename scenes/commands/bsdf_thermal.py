@@ -24,15 +24,17 @@ FILE = click.Path(path_type=Path)
     "--kappa", type=click.FloatRange(0, 1), default=0.4, show_default=True,
     help="Of Kuhn's formula for interior shades.",
 )  # fmt: skip
-@click.option("--table", type=FILE, help="CSV file: a row for each state and method.")
-@click.option("--json", "as_json", type=FILE, help="The same as JSON, g by patch with it.")
+@click.option(
+    "--out", type=FILE, help="The rows as CSV; as JSON, g by patch with it, by its suffix."
+)
 @click.option("--toml", type=FILE, help="Write what the heat balance takes, of one state.")
 def thermal(
     states: tuple[Path, ...],
     place: str | None,
     glazing: str | None,
     kappa: float,
-    **outputs: Path | None,
+    out: Path | None,
+    toml: Path | None,
 ) -> None:
     """U, g_tot, tau_e, secondary heat and EN 14501 classes of each STATE of a system.
 
@@ -42,12 +44,11 @@ def thermal(
     """
     from scenes.fenestration.ratings import printed, rated_state, thermal_toml
 
-    table, as_json, toml = (outputs[name] for name in ("table", "as_json", "toml"))
     if (place is None) != (glazing is None):
         raise click.UsageError("--place and --glazing belong together")
     if toml is not None and (len(states) != 1 or place is not None):
         raise click.UsageError("--toml writes the data of one state, not of a shade alone")
-    for option, path in (("--table", table), ("--json", as_json), ("--toml", toml)):
+    for option, path in (("--out", out), ("--toml", toml)):
         if path is not None:
             check_file(path, field=option, inputs=states)
     missing = [path for path in states if not path.is_file()]
@@ -60,13 +61,13 @@ def thermal(
     for note in dict.fromkeys(n for s in found for n in (*s.heat.notes, s.heat.model)):
         if place is None:
             click.echo(f"note: {note}")
-    if table is not None:
-        import pandas as pd
-
-        write_table(pd.DataFrame(rows), table, index=False, float_format="%.4f")
-    if as_json is not None:
+    if out is not None and out.suffix == ".json":
         by_patch = {s.path.stem: [round(float(g), 5) for g in s.heat.g_value] for s in found}
         record = {"rows": rows} if place else {"rows": rows, "g by patch": by_patch}
-        write_text(as_json, json.dumps(record, indent=2) + "\n")
+        write_text(out, json.dumps(record, indent=2) + "\n")
+    elif out is not None:
+        import pandas as pd
+
+        write_table(pd.DataFrame(rows), out, index=False, float_format="%.4f")
     if toml is not None:
         write_text(toml, thermal_toml(found[0]))

@@ -88,7 +88,7 @@ class ClosureTable(TomlTable):
         )  # fmt: skip
 
 
-class SystemTable(ClosureTable):
+class WindowHeatTable(ClosureTable):
     """What else is known of a system: in a study, and beside a BSDF file."""
 
     u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None  # [W/(m2 K)]
@@ -98,7 +98,7 @@ class SystemTable(ClosureTable):
     shading_position: Literal[tuple(TYPICAL_SYSTEMS)] | None = None  # of the shade
 
     @model_validator(mode="after")
-    def _has_one_g(self) -> SystemTable:
+    def _has_one_g(self) -> WindowHeatTable:
         keys = ("g_value_by_angle", "g_value_by_patch")
         if all(getattr(self, key) for key in keys):
             raise ValueError(f"{keys[0]} and {keys[1]} exclude each other")
@@ -117,7 +117,7 @@ class SystemTable(ClosureTable):
         return np.interp(KLEMS_FULL.centres()[0], np.radians(angles), values)
 
 
-class StateTable(SystemTable):
+class StateTable(WindowHeatTable):
     """One shading state: a BSDF file and what else was measured."""
 
     bsdf: Path

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.angular_file import AngularData
-from scenes.fenestration.tables import ByPatch, SystemTable
+from scenes.fenestration.tables import ByPatch, WindowHeatTable
 from scenes.toml_file import Share, read_table, validated
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError
 
 
-class ThermalTable(SystemTable):
+class ThermalTable(WindowHeatTable):
     """The file beside a BSDF: the same as a study's [[system]], and what g was worked out from."""
 
     angular: AngularData | None = None  # of a specular system, visible

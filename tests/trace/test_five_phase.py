@@ -287,7 +287,16 @@ def mirror_glass(back: float):
     return BsdfOptics(KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, np.zeros((K, K)), mirror))
 
 
-def test_windows_reflect_the_light_of_the_room_as_paths_have_it():
+def angular_glass(back: float):
+    """The same transmittance by AngularOptics, its reflection half a mirror's, half a diffuser's."""
+    from mitsuba_cfs.methods.optics import AngularOptics
+
+    half = np.full(64, back / 2)
+    return AngularOptics(np.full(64, 0.55), mirrored=half, reflected=half)
+
+
+@pytest.mark.parametrize("kind", [mirror_glass, angular_glass])
+def test_windows_reflect_the_light_of_the_room_as_paths_have_it(kind):
     """A bright room with a front of glass that reflects 0.4 to it: a tenth of the back's light."""
     from mitsuba_cfs.methods.path_light import PathSystems
     from mitsuba_cfs.methods.phase_light import PhaseSystems
@@ -319,7 +328,7 @@ def test_windows_reflect_the_light_of_the_room_as_paths_have_it():
     few = Sampling(sensor_samples=65_536, patch_samples=8_192, hour_samples=262_144, subdivision=1)
     found = {}
     for back in (0.0, 0.4):
-        system = [[mirror_glass(back)]]
+        system = [[kind(back)]]
         paths = PathSystems(scene, system, few).light(hours).illuminance()
         for five in (False, True):
             light = PhaseSystems(PhaseScene(scene, few, five_phase=five), system).light(hours)

@@ -3,7 +3,8 @@
     python -m scenes.evidence.validation.energyplus --reference DIR --epw DIR --out DIR
 
 Climates outside the reference set are run by EnergyPlus here and now (peer program needed):
-`--climates Reykjavik Sydney Malaga Lyon --orientations S E N W --no-sensitivity`.
+`--climates Reykjavik Sydney Malaga Lyon --orientations S E N W --no-sensitivity`.  Other closures:
+`--closures kuhn gap "gap place"`, see `reference_systems`.
 
 Writes `energyplus.json` (every figure), `cases.csv` (each case) and the figures.
 """
@@ -22,7 +23,11 @@ from pathlib import Path
 import pandas as pd
 
 from mitsuba_cfs.sky.epw import read_epw
-from scenes.evidence.validation import energyplus_figures, energyplus_sensitivity
+from scenes.evidence.validation import (
+    energyplus_figures,
+    energyplus_sensitivity,
+    reference_systems,
+)
 from scenes.evidence.validation.energyplus_cases import ALL_FILES, EPW_FILES, EnergyPlusCase, pairs
 from scenes.evidence.validation.energyplus_statistics import (
     Classification,
@@ -33,19 +38,23 @@ from scenes.evidence.validation.energyplus_statistics import (
 )
 from scenes.evidence.validation.reference_room import ORIENTATIONS
 
-CLOSURES = ("kuhn", "linear", "films")
+CLOSURES = ("kuhn", "linear", "films", "layers")
 BANDS = ("ASHRAE 55 90 %", "ASHRAE 55 80 %")
 
 
 def compare(
-    reference: Path, epw: Path, climates: Sequence[str], orientations: Sequence[str]
+    reference: Path,
+    epw: Path,
+    climates: Sequence[str],
+    orientations: Sequence[str],
+    closures: Sequence[str] = CLOSURES,
 ) -> tuple[pd.DataFrame, dict[str, object]]:
     """One row per case and closure, and the correlations and comfort counts."""
     weathers = {name: read_epw(epw / ALL_FILES[name]) for name in climates}
     rows, kept = [], []
     comfort: dict[tuple[str, str, str], Classification] = {}
     for theirs, ours in pairs(
-        reference, epw, closures=CLOSURES, climates=climates, orientations=orientations
+        reference, epw, closures=closures, climates=climates, orientations=orientations
     ):
         outdoor = weathers[theirs.climate].dry_bulb_c
         for case in ours:
@@ -58,7 +67,7 @@ def compare(
         kept.append((theirs, ours))
     found = {
         "comfort": [_comfort_row(key, counts) for key, counts in comfort.items()],
-        "correlations": _correlations(kept, weathers),
+        "correlations": _correlations(kept, weathers, closures),
     }
     return pd.DataFrame(rows), found
 
@@ -77,10 +86,12 @@ def _comfort_row(key: tuple[str, str, str], counts: Classification) -> dict[str,
 
 
 def _correlations(
-    kept: list[tuple[EnergyPlusCase, list[EnergyPlusCase]]], weathers: dict
+    kept: list[tuple[EnergyPlusCase, list[EnergyPlusCase]]],
+    weathers: dict,
+    closures: Sequence[str],
 ) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
-    for index, model in enumerate(CLOSURES):
+    for index, model in enumerate(closures):
         for position in ("external or none", "internal"):
             chosen = [
                 (theirs, ours[index])
@@ -98,10 +109,11 @@ def study(
     climates: Sequence[str],
     orientations: Sequence[str],
     *,
+    closures: Sequence[str] = CLOSURES,
     sensitivity: bool = True,
 ) -> tuple[pd.DataFrame, dict[str, object]]:
     """All that the command writes: the cases, and the summary as plain data."""
-    cases, summary = compare(reference, epw, climates, orientations)
+    cases, summary = compare(reference, epw, climates, orientations, closures)
     for label, by in (("system", "system"), ("orientation", "orientation"), ("climate", "climate")):
         table = pooled(cases, ["model", by]).reset_index()
         summary[f"by {label}"] = table.to_dict("records")
@@ -130,6 +142,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--climates", nargs="+", default=list(EPW_FILES), choices=list(ALL_FILES))
     parser.add_argument("--orientations", nargs="+", default=list(ORIENTATIONS))
+    parser.add_argument(
+        "--closures", nargs="+", default=list(CLOSURES), choices=reference_systems.CLOSURES
+    )
     parser.add_argument("--no-sensitivity", action="store_true")
     options = parser.parse_args(arguments)
     logging.basicConfig(level=logging.ERROR)
@@ -139,6 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.epw,
         options.climates,
         options.orientations,
+        closures=options.closures,
         sensitivity=not options.no_sensitivity,
     )
     summary["seconds"] = time.perf_counter() - start

@@ -15,7 +15,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 QUANTITIES = ("air", "wall", "window")
-COLOURS = {"kuhn": "#b8b8b8", "linear": "#8aa4c8", "films": "#1f5fa8"}
+COLOURS = {"kuhn": "#b8b8b8", "linear": "#8aa4c8", "films": "#1f5fa8", "layers": "#0b2f5b"}
 # dissertation, 4.5.1: RMSE of air and walls for all systems, and of the window by system
 PRINTED_AIR_WALL = 0.6
 PRINTED_WINDOW = {"dgu": 0.8, "ext_blind": 1.0, "ext_shade": 1.2, "int_shade": 2.8}
