@@ -72,9 +72,7 @@ def packed(manifold: manifold3d.Manifold) -> PackedSolid:
 
 def unpacked(solid: PackedSolid) -> manifold3d.Manifold:
     """The solid of these arrays."""
-    mesh = manifold3d.Mesh64(
-        np.ascontiguousarray(solid.vertices), np.ascontiguousarray(solid.faces, dtype=np.uint64)
-    )
+    mesh = manifold3d.Mesh64(np.array(solid.vertices), np.array(solid.faces, dtype=np.uint64))
     return manifold3d.Manifold(mesh).as_original()
 
 
