@@ -56,6 +56,26 @@ def solid_of(triangles: NDArray[np.float64]) -> Solid | None:
     return None
 
 
+@dataclass(frozen=True, slots=True)
+class PackedSolid:
+    """A solid as arrays that another process can unpack, vertex for vertex."""
+
+    vertices: NDArray[np.float64]  # [V, 3] [m]
+    faces: NDArray[np.uint64]  # [T, 3]
+
+
+def packed(manifold: manifold3d.Manifold) -> PackedSolid:
+    """The solid as arrays."""
+    mesh = manifold.to_mesh64()
+    return PackedSolid(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))
+
+
+def unpacked(solid: PackedSolid) -> manifold3d.Manifold:
+    """The solid of these arrays."""
+    mesh = manifold3d.Mesh64(np.array(solid.vertices), np.array(solid.faces, dtype=np.uint64))
+    return manifold3d.Manifold(mesh).as_original()
+
+
 def _manifold(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> manifold3d.Manifold | None:

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import os
 import pickle
+import queue
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import connection, get_context, parent_process
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 Told = Callable[[str], None]
+TOLD, DONE = "told ", "done"  # how lines of a process apart begin
+MOST_ENDED = 5  # items that end their process, one after the other, before the rest is given up
 
 
 class ProcessEnded(RuntimeError):
@@ -32,17 +38,21 @@ def process_pool(processes: int) -> ProcessPoolExecutor:
     A worker of `concurrent.futures` waits for work for ever once its parent was killed; these end.
     """
     return ProcessPoolExecutor(
-        processes, mp_context=get_context("spawn"), initializer=_end_with_parent
+        processes, mp_context=get_context("spawn"), initializer=_end_with_pool
     )
 
 
-def _end_with_parent() -> None:
+def _end_with_pool() -> None:
     parent = parent_process()
-    if parent is None:
-        return
+    if parent is not None:
+        _end_after(lambda: connection.wait([parent.sentinel]))
+
+
+def _end_after(parent_left: Callable[[], object]) -> None:
+    """End this process when a call returns that waits on a pipe which the parent alone holds."""
 
     def watch() -> None:
-        connection.wait([parent.sentinel])
+        parent_left()
         os._exit(1)
 
     threading.Thread(target=watch, name="end-with-parent", daemon=True).start()
@@ -51,45 +61,113 @@ def _end_with_parent() -> None:
 def answer_apart(
     function: Callable, *arguments: Any, limit_s: float, told: Told | None = None
 ) -> Any:
-    """What `function(*arguments, tell)` returns in a fresh interpreter that may die or be stopped.
+    """What `function(*arguments, tell)` returns in an interpreter that may die or be stopped.
 
     For native libraries that end a process by a signal, or work for hours, on some inputs. Unlike
-    a process pool it does not run the main module again, so that a script needs no guard.
+    a process pool it does not run the main module again, so that a script needs no guard. The
+    interpreter stays for the next call, until it dies or this process ends.
 
     Args:
         function: of a module; `tell(text)`, its last argument, sends one line to `told` here.
         limit_s: seconds until it is stopped.
     Raises: `ProcessEnded` where it was stopped or died; what the function raises otherwise.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        task, answer = Path(folder) / "task", Path(folder) / "answer"
-        task.write_bytes(pickle.dumps((function, arguments)))
-        code = f"from {__name__} import _work; _work({str(task)!r}, {str(answer)!r})"
-        paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-c", code], env=os.environ | {"PYTHONPATH": paths},
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-        )  # fmt: skip
-        stopped = threading.Event()
-        timer = threading.Timer(limit_s, lambda: (stopped.set(), process.kill()))
-        timer.start()
-        last = ""
-        try:
-            for line in process.stdout or ():
-                last = line.rstrip("\n")
-                if told is not None:
-                    told(last)
-            process.wait()
-        finally:
-            timer.cancel()
-            process.kill()
-            process.communicate()
-        if not answer.is_file():
-            raise ProcessEnded(_reason(process.returncode, stopped.is_set(), limit_s), last)
-        value, error = pickle.loads(answer.read_bytes())
+    apart = _Apart.idle.pop() if _Apart.idle else _Apart()
+    try:
+        value, error = apart.answer((function, arguments), limit_s, told or (lambda text: None))
+    except BaseException:
+        apart.end()
+        raise
+    _Apart.idle.append(apart)
     if error is not None:
         raise error
     return value
+
+
+class _Apart:
+    """An interpreter that does one task after the other."""
+
+    idle: ClassVar[list[_Apart]] = []
+
+    def __init__(self) -> None:
+        paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", f"from {__name__} import _work; _work()"],
+            env=os.environ | {"PYTHONPATH": paths}, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, text=True,
+        )  # fmt: skip
+
+    def end(self) -> None:
+        """Kill it, if it has not died."""
+        self._process.kill()
+        self._process.communicate()
+
+    def answer(self, task: object, limit_s: float, told: Told) -> tuple[Any, Exception | None]:
+        """Value and error of a task; `ProcessEnded` where it was stopped or died."""
+        process, stopped = self._process, threading.Event()
+        timer = threading.Timer(limit_s, lambda: (stopped.set(), process.kill()))
+        timer.start()
+        last, done = "", False
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                (Path(folder) / "task").write_bytes(pickle.dumps(task))
+                with contextlib.suppress(BrokenPipeError):  # it died while it had nothing to do
+                    print(folder, file=process.stdin, flush=True)
+                for line in process.stdout or ():
+                    done = line.startswith(DONE)
+                    if done:
+                        break
+                    if line.startswith(TOLD):
+                        last = line.removeprefix(TOLD).rstrip("\n")
+                        told(last)
+            finally:
+                timer.cancel()
+            if not done or stopped.is_set():
+                self.end()
+                raise ProcessEnded(_reason(process.returncode, stopped.is_set(), limit_s), last)
+            return pickle.loads((Path(folder) / "answer").read_bytes())
+
+
+@atexit.register
+def _end_idle() -> None:
+    while _Apart.idle:
+        _Apart.idle.pop().end()
+
+
+def each_apart(function: Callable, items: Sequence, *, limit_s: float) -> list[Any]:
+    """What `function` gives for each item, computed in one process of its own (`answer_apart`).
+
+    An item that ends the process gets the `ProcessEnded` in place of an answer, and the others are
+    computed anew; so do all that are left after `MOST_ENDED` of these, or when the time is over.
+
+    Args: function: of a module, of one item; what it raises is raised.
+    """
+    results: list[Any] = [None] * len(items)
+    left, until, ended = list(range(len(items))), time.monotonic() + limit_s, 0
+    while left:
+        try:
+            given = [items[index] for index in left]
+            rest_s = max(until - time.monotonic(), 0.0)
+            for index, value in zip(
+                left, answer_apart(_each, function, given, limit_s=rest_s), strict=True
+            ):
+                results[index] = value
+            break
+        except ProcessEnded as error:
+            ended += 1
+            over = ended > MOST_ENDED or time.monotonic() >= until or not error.last
+            for index in left if over else [left[int(error.last)]]:
+                results[index] = error
+            left = [] if over else [i for n, i in enumerate(left) if n != int(error.last)]
+    return results
+
+
+def _each(function: Callable, items: Sequence, tell: Told) -> list[Any]:
+    results = []
+    for number, item in enumerate(items):
+        tell(str(number))
+        results.append(function(item))
+    return results
 
 
 def _reason(code: int, stopped: bool, limit_s: float) -> str:
@@ -100,21 +178,27 @@ def _reason(code: int, stopped: bool, limit_s: float) -> str:
     return f"its process ended with code {code}"
 
 
-def _work(task: str, answer: str) -> None:
-    """In the process of its own: do the task, and end where the parent has."""
-    # descriptor 0 itself: a thread inside sys.stdin's lock would hold up the interpreter's end
-    threading.Thread(target=lambda: (os.read(0, 1), os._exit(1)), daemon=True).start()
-    function, arguments = pickle.loads(Path(task).read_bytes())
-    value, error = None, None
-    try:
-        value = function(*arguments, _tell)
-    except Exception as raised:  # raised again by the parent, whatever it is
-        error = raised
-    part = Path(answer + ".part")
-    part.write_bytes(pickle.dumps((value, error)))
-    part.rename(answer)
+def _work() -> None:
+    """In the process of its own: do the tasks of the folders that stdin names."""
+    folders: queue.Queue[str] = queue.Queue()
+
+    def read() -> None:
+        with open(0, encoding="utf-8", closefd=False) as lines:
+            for line in lines:
+                folders.put(line.rstrip("\n"))
+
+    _end_after(read)
+    while True:
+        folder = Path(folders.get())
+        function, arguments = pickle.loads((folder / "task").read_bytes())
+        value, error = None, None
+        try:
+            value = function(*arguments, _tell)
+        except Exception as raised:  # raised again by the parent, whatever it is
+            error = raised
+        (folder / "answer").write_bytes(pickle.dumps((value, error)))
+        print(DONE, flush=True)
 
 
 def _tell(text: str) -> None:
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    print(f"{TOLD}{text}", flush=True)

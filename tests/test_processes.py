@@ -1,4 +1,4 @@
-"""A pool's processes end with the one that started them."""
+"""Processes of our own end with the one that started them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
-BUSY = """
+import pytest
+
+POOL = """
 import os, time
 from mitsuba_cfs.processes import process_pool
 
@@ -17,12 +20,29 @@ if __name__ == "__main__":
     print(pool.submit(os.getpid).result(), flush=True)
     time.sleep(600)
 """
+APART = """
+from mitsuba_cfs.processes import answer_apart
+from tests.test_processes import sleeps
+
+answer_apart(sleeps, limit_s=600, told=lambda line: print(line, flush=True))
+"""
 
 
-def test_workers_end_where_their_parent_is_killed(tmp_path):
+def sleeps(tell):
+    """Tells its process and stays at work."""
+    tell(str(os.getpid()))
+    time.sleep(600)
+
+
+@pytest.mark.parametrize("busy", [POOL, APART], ids=["pool", "apart"])
+def test_workers_end_where_their_parent_is_killed(tmp_path, busy):
     script = tmp_path / "busy.py"
-    script.write_text(BUSY)
-    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True) as process:
+    script.write_text(busy)
+    root = str(Path(__file__).parents[1])
+    environment = os.environ | {"PYTHONPATH": root}
+    with subprocess.Popen(
+        [sys.executable, script], stdout=subprocess.PIPE, text=True, env=environment
+    ) as process:
         worker = int(process.stdout.readline())
         os.kill(process.pid, signal.SIGKILL)
         process.wait()

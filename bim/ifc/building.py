@@ -13,6 +13,7 @@ import shapely
 
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
 from bim.coarser import coarser
+from bim.guarded import RoomBoundary, room_boundaries
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
 from bim.ifc.defects import model_defects
@@ -31,11 +32,11 @@ from bim.model import Building, Element, Problem, Space
 from bim.outdoors import lifted_sites, unblinded
 from bim.planes import SMALLEST_AREA
 from bim.rays import RayMesh, ray_mesh
-from bim.rooms import Attachment, room_pieces
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import triangles_of
 from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.wall_middles import area_to_wall_middles
+from mitsuba_cfs.errors import RoomError
 
 STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
 SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
@@ -81,13 +82,23 @@ def read_ifc(
     )
     problems += [*glass.problems, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
+    own = [[a for a in glass.attachments if a.room == r.guid] for r in records]
+    boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, own, strict=True)])
     spaces = []
-    for index, record in enumerate(records):
+    for index, (record, boundary) in enumerate(zip(records, boundaries, strict=True)):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
-        own = [a for a in glass.attachments if a.room == record.solid.guid]
         try:
+<<<<<<< HEAD
             space, more = _space(index, own, records, around, elements=elements, finishes=finishes)
         except (shapely.errors.ShapelyError, ValueError, RuntimeError) as error:
+=======
+            if isinstance(boundary, RoomError):
+                raise boundary
+            space, more = _space(
+                index, boundary, records, around, elements=elements, reflectances=reflectances
+            )
+        except RoomError as error:
+>>>>>>> whole
             what = f"room {record.solid.name}: its boundary cannot be built"
             problems.append(Problem(record.solid.guid, what, f"left out: {error}", "room"))
             continue
@@ -170,7 +181,7 @@ def _surroundings(
 
 def _space(
     index: int,
-    attachments: Sequence[Attachment],
+    boundary: RoomBoundary,
     records: Sequence[SpaceRecord],
     around: Surroundings,
     *,
@@ -179,8 +190,11 @@ def _space(
 ) -> tuple[Space, list[Problem]]:
     """The room of a record with its faces and windows, checked to be closed."""
     record = records[index]
-    pieces, volume, problems = room_pieces(record.solid, attachments)
-    pieces = cut_by_neighbours(record.solid, pieces, [other.solid for other in records])
+    others = [other.solid for other in records]
+    try:
+        pieces = cut_by_neighbours(record.solid, boundary.pieces, others)
+    except shapely.errors.ShapelyError as error:
+        raise RoomError(f"its neighbours cannot be cut out: {error}") from error
     beyond = [
         Beyond((), "outside") if piece.role == "glass" else what_lies_beyond(piece, around, index)
         for piece in pieces
@@ -193,11 +207,12 @@ def _space(
         middles = area_to_wall_middles(body, pieces, beyond, elements)
         middles = middles if _agree(middles, record.stated_area) else None
     space = Space(
-        record.solid.guid, record.name, record.storey, volume, area, tuple(faces), tuple(windows),
+        record.guid, record.name, record.storey, boundary.volume, area, tuple(faces),
+        tuple(windows),
         record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
         record.type_name, record.raised,
     )  # fmt: skip
-    return space, problems + _assumptions(record, assumed) + _soundness(space)
+    return space, boundary.problems + _assumptions(record, assumed) + _soundness(space)
 
 
 def _agree(drawn: float, stated: float) -> bool:

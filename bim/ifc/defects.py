@@ -9,10 +9,12 @@ import ifcopenshell
 import numpy as np
 
 from bim.apertures import main_direction
+from bim.guarded import gaps_between
 from bim.ifc.shapes import Shape
 from bim.model import Problem
 from bim.planes import area_vectors
-from bim.solids import Solid, solid_of
+from bim.solids import PackedSolid, Solid, packed, solid_of
+from mitsuba_cfs.processes import ProcessEnded
 
 SAME_PLACE = 0.002  # boxes that agree to this are one element drawn twice [m]
 SAME_AREA = 0.3  # if their surfaces agree to this share: only one may have its openings cut
@@ -121,15 +123,32 @@ def walls_apart(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> 
         normal = main_direction(shape.triangles) if shape.ifc_class.startswith("IfcWall") else None
         if solid is not None and normal is not None:
             box = solid.manifold.bounding_box()
-            walls.append((shape, solid.manifold, normal, np.array(box[:3]), np.array(box[3:])))
-    problems = []
+            body = packed(solid.manifold)
+            walls.append((shape, body, normal, np.array(box[:3]), np.array(box[3:])))
+    near = []
     for i, (one, body, normal, low, high) in enumerate(walls):
-        for other, its_body, its_normal, its_low, its_high in walls[i + 1 :]:
-            if np.any(its_low > high + WIDEST_JOINT) or np.any(low > its_high + WIDEST_JOINT):
-                continue
-            if abs(normal @ its_normal) > ACROSS:
-                continue
-            gap = body.min_gap(its_body, WIDEST_JOINT)
+        others = [
+            (other, its_body)
+            for other, its_body, its_normal, its_low, its_high in walls[i + 1 :]
+            if np.all(its_low <= high + WIDEST_JOINT)
+            and np.all(low <= its_high + WIDEST_JOINT)
+            and abs(normal @ its_normal) <= ACROSS
+        ]
+        if others:
+            near.append((one, body, others))
+    return _gap_problems(near)
+
+
+def _gap_problems(near: Sequence[tuple[Shape, PackedSolid, list]]) -> list[Problem]:
+    """Walls, each with its neighbours: those that do not meet."""
+    bodies = [(body, [its_body for _, its_body in others]) for _, body, others in near]
+    problems = []
+    for (one, _, others), gaps in zip(near, gaps_between(bodies, WIDEST_JOINT), strict=True):
+        if isinstance(gaps, ProcessEnded):
+            what = f"{one.ifc_class} {one.name}: its distance to other walls: {gaps}"
+            problems.append(Problem(one.guid, what, "not measured"))
+            continue
+        for (other, _), gap in zip(others, gaps, strict=True):
             if CLOSEST < gap < WIDEST_JOINT:
                 what = f"walls {one.name} and {other.name} do not meet: {gap * 1000:.0f} mm apart"
                 done = "harmless to rooms drawn as spaces; closed where rooms have to be found"

@@ -15,6 +15,7 @@ from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
 from scenes.room.daylight import illuminance_table
 from scenes.room.glare import glare_table
+from scenes.run.csv_text import csv_text
 
 
 def write_results(result: RunResult, folder: ResultFolder, write_report=None) -> None:
@@ -61,7 +62,7 @@ def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
 
 def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:
     """A table with six significant digits, the same in every run."""
-    write_table(table, path, index=index, float_format="%.6g")
+    write_text(path, csv_text(table, index=index))
 
 
 def _problems(result: RunResult) -> pd.DataFrame:

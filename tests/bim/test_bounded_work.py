@@ -11,18 +11,22 @@ import numpy as np
 import pytest
 
 import bim.enclosure
+import bim.guarded
+import bim.ifc.building
 import bim.ifc.found_rooms
 import bim.ifc.head
 import bim.ifc.survey
 from bim.enclosure import rooms_enclosed_by
+from bim.guarded import _boundary as boundary
 from bim.ifc.building import read_ifc
 from bim.ifc.found_rooms import first_rooms_enclosed as search
 from bim.ifc.survey import _surveyed as survey_one
 from bim.mesh_repair import closed_faces
+from bim.rooms import room_pieces
 from bim.solids import solid_of
-from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.processes import ProcessEnded, answer_apart
-from tests.bim.small_ifc import box_room
+from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.processes import ProcessEnded, answer_apart, each_apart
+from tests.bim.small_ifc import HEIGHT, WIDTH, box_model, box_room
 from tests.bim.test_enclosure import box, room
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -43,6 +47,10 @@ def adds(a, b, tell) -> int:
     if b is None:
         raise ValueError("no second number")
     return a + b
+
+
+def number_of_process(tell) -> int:
+    return os.getpid()
 
 
 def dies_of_a_post(elements, attempts, tell):
@@ -69,6 +77,78 @@ def test_process_apart_answers_raises_dies_and_is_stopped():
     assert died.value.last == "7 of 9"
     with pytest.raises(ProcessEnded, match="not finished after 4 s"):
         answer_apart(works_for_ever, limit_s=4)
+
+
+def dies_of_three(number):
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return 10 * number
+
+
+def test_item_that_ends_its_process_costs_no_other_item():
+    first, third, last = each_apart(dies_of_three, [1, 3, 5], limit_s=60)
+    assert (first, last) == (10, 50)
+    assert isinstance(third, ProcessEnded) and "SIGSEGV" in str(third)
+
+
+def test_process_apart_stays_for_the_next_task():
+    assert answer_apart(number_of_process, limit_s=60) == answer_apart(
+        number_of_process, limit_s=60
+    )
+    assert answer_apart(number_of_process, limit_s=60) != os.getpid()
+
+
+def dies_of_a_recess(room, attachments):
+    """Stands for a library that ends its process where a window's recess is united with a room."""
+    if attachments:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return room_pieces(room, attachments)
+
+
+def boundary_that_dies(item):
+    bim.guarded.room_pieces = dies_of_a_recess
+    return boundary(item)
+
+
+def gaps_that_die(item):
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def test_room_whose_booleans_end_the_process_is_named_and_the_others_stay(tmp_path, monkeypatch):
+    monkeypatch.setattr(bim.guarded, "_boundary", boundary_that_dies)
+    small, _ = box_model(space=False)
+    for name, y in (("A", 0.0), ("B", 3.0)):
+        small.box("IfcSpace", name, (0.0, y, 0.0), (WIDTH, 3.0, HEIGHT))
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    assert [space.name for space in building.spaces] == ["B"]
+    (named,) = [p for p in building.problems if "SIGSEGV" in p.consequence]
+    assert named.what == "room A: its boundary cannot be built" and named.lost == "room"
+
+
+def test_walls_whose_distance_ends_the_process_are_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(bim.guarded, "_gaps", gaps_that_die)
+    path = tmp_path / "model.ifc"
+    box_room().write(str(path))
+    building = read_ifc(path)
+    assert len(building.spaces) == 1
+    assert any("its distance to other walls" in p.what for p in building.problems)
+
+
+@pytest.mark.parametrize(("error", "left_out"), [(RoomError, True), (ValueError, False)])
+def test_only_a_room_error_leaves_a_room_out(tmp_path, monkeypatch, error, left_out):
+    def fails(*arguments):
+        raise error("planted")
+
+    monkeypatch.setattr(bim.ifc.building, "faces_and_windows", fails)
+    path = tmp_path / "model.ifc"
+    box_room().write(str(path))
+    if left_out:
+        assert read_ifc(path).spaces == ()
+    else:
+        with pytest.raises(ValueError, match="planted"):
+            read_ifc(path)
 
 
 def without_number(corners):
@@ -116,7 +196,7 @@ def test_element_that_ends_the_search_is_named_and_the_rest_gives_the_room(tmp_p
 
 
 def test_search_that_takes_too_long_is_stopped_and_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(bim.ifc.found_rooms, "LIMIT_S", 0.1)
+    monkeypatch.setattr(bim.ifc.found_rooms, "LIMIT_S", 0.01)
     path = tmp_path / "model.ifc"
     box_room(space=False).write(str(path))
     building = read_ifc(path)
