@@ -88,17 +88,12 @@ def read_ifc(
     for index, (record, boundary) in enumerate(zip(records, boundaries, strict=True)):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
         try:
-<<<<<<< HEAD
-            space, more = _space(index, own, records, around, elements=elements, finishes=finishes)
-        except (shapely.errors.ShapelyError, ValueError, RuntimeError) as error:
-=======
             if isinstance(boundary, RoomError):
                 raise boundary
             space, more = _space(
-                index, boundary, records, around, elements=elements, reflectances=reflectances
+                index, boundary, records, around, elements=elements, finishes=finishes
             )
         except RoomError as error:
->>>>>>> whole
             what = f"room {record.solid.name}: its boundary cannot be built"
             problems.append(Problem(record.solid.guid, what, f"left out: {error}", "room"))
             continue
