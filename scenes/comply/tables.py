@@ -63,10 +63,10 @@ def _compared(level: LevelTable, value: float | None) -> tuple[str, str]:
     """What a level compares over the rooms; its value and its limit."""
     if level.over == "area mean":
         need = level.needs[0]
-        return f"{need.words}; mean over the floor area", f"{shown(need, value)} {limit_of(need)}"
+        return f"{need.words}; mean over the floor area", f"{shown(need, value)} ({limit_of(need)})"
     number = MISSING if value is None else f"{rounded(100 * value, 0)} %"
     limit = 100.0 if level.share is None else 100 * level.share
-    return OVER, f"{number} ≥ {limit:g} %"
+    return OVER, f"{number} (≥ {limit:g} %)"
 
 
 def without_rooms(result: Compliance, rule: str) -> tuple[str, ...]:
