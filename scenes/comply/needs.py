@@ -80,31 +80,33 @@ class ReachedLux(Need):
 
 
 class ReachedFactor(Need):
-    """EN 17037, method 1: daylight factor of a share of the area over the target's."""
+    """EN 17037, method 1: daylight factor of a share of the area, times the median diffuse light.
+
+    The standard's limits of the daylight factor are D_T = E_T/E_v,d,med.
+    """
 
     what: Literal["reached_factor"]
     area: Share
-    lux: Positive
 
     parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    digits: ClassVar[int] = 2
+    unit: ClassVar[str] = "lx"
 
     @property
     def words(self) -> str:
         """The quantity in words."""
         return (
-            f"daylight factor of {100 * self.area:g} % of the reference plane over that which "
-            f"gives {self.lux:g} lx under the site's median diffuse sky"
+            f"daylight factor reached on {100 * self.area:g} % of the reference plane, times the "
+            "site's median diffuse illuminance"
         )
 
     def value(self, room: Findings) -> float | None:
-        """Ratio of the daylight factors."""
+        """Illuminance [lx]."""
         if room.light is None or room.median_diffuse is None:
             return None
         factor = room.light.factor
         weights = np.full(len(factor), 1 / len(factor))
         reached = float(reached_on_area(factor[None], weights, self.area)[0])
-        return reached * room.median_diffuse / self.lux
+        return reached * room.median_diffuse
 
 
 class ViewShare(Need):

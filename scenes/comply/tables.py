@@ -6,18 +6,14 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from scenes.comply.assess import NOT_FOR_IT
+from scenes.comply.assess import NOT_FOR_IT, RoomVerdict
 from scenes.comply.needs import Need
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import LevelTable
 from scenes.report.numbers import MISSING, rounded
 from scenes.report.tables import Column, Table
 
-OVER = {
-    "room": "share of the floor area whose rooms meet it",
-    "each room": "share of the floor area whose rooms meet it, all are to",
-    "area of rooms": "share of the floor area whose rooms meet it",
-}
+OVER = "share of the floor area whose rooms meet it"
 COLUMNS = (
     "room", "guid", "use", "floor_area_m2", "rule", "edition", "clause", "criterion", "level",
     "quantity", "value", "limit", "unit", "met",
@@ -45,34 +41,32 @@ def yes_or_no(met: bool | None) -> str:
 
 
 def building_table(result: Compliance, rule: str) -> Table:
-    """The building against the criteria of a rule, level by level."""
-    columns = [_text("Criterion"), _text("Clause"), _text("Level"), _text("What is compared")]
-    columns += [Column("Value"), Column("Limit"), _text("Met"), Column("Rooms")]
+    """The building against the criteria of a rule."""
+    columns = [_text("Criterion"), _text("Clause"), _text("What is compared")]
+    columns += [_text("By level"), _text("Reached"), Column("Rooms")]
     rows = []
     for verdict in result.verdicts:
         if verdict.rule != rule or not verdict.rooms:
             continue
         one = verdict.criterion
-        for level, value, met in zip(one.level, verdict.values, verdict.met, strict=True):
-            what, number, limit = _compared(level, value)
-            rows.append(
-                (one.title, one.clause, level.name, what, number, limit, yes_or_no(met),
-                 str(verdict.rooms))
-            )  # fmt: skip
+        compared = [
+            _compared(level, value) for level, value in zip(one.level, verdict.values, strict=True)
+        ]
+        names = (level.name for level in one.level)
+        levels = "; ".join(f"{n}: {text}" for n, (_, text) in zip(names, compared, strict=True))
+        words = ", ".join(dict.fromkeys(what for what, _ in compared))
+        rows.append((one.title, one.clause, words, levels, verdict.reached, str(verdict.rooms)))
     return Table("The building", tuple(columns), tuple(rows))
 
 
-def _compared(level: LevelTable, value: float | None) -> tuple[str, str, str]:
-    """What a level compares over the rooms, its value and its limit."""
+def _compared(level: LevelTable, value: float | None) -> tuple[str, str]:
+    """What a level compares over the rooms; its value and its limit."""
     if level.over == "area mean":
         need = level.needs[0]
-        words = f"{need.words}; mean over the floor area"
-        return words, shown(need, value), limit_of(need)
+        return f"{need.words}; mean over the floor area", f"{shown(need, value)} ({limit_of(need)})"
     number = MISSING if value is None else f"{rounded(100 * value, 0)} %"
-    limit = {"each room": "≥ 100 %", "room": "–"}.get(
-        level.over, f"≥ {100 * (level.share or 0):g} %"
-    )
-    return OVER[level.over], number, limit
+    limit = 100.0 if level.share is None else 100 * level.share
+    return OVER, f"{number} (≥ {limit:g} %)"
 
 
 def without_rooms(result: Compliance, rule: str) -> tuple[str, ...]:
@@ -99,21 +93,31 @@ def rooms_table(result: Compliance, rule: str) -> Table:
 
 
 def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:
-    """A room against the criteria of a rule: every need with its value, limit and clause."""
-    columns = [_text("Criterion"), _text("Clause"), _text("Level"), _text("Quantity")]
-    columns += [Column("Value"), Column("Limit"), _text("Met")]
+    """A room against the criteria of a rule: every quantity with its limits and its clause."""
+    columns = [_text("Criterion"), _text("Clause"), _text("Quantity"), Column("Value")]
+    columns += [_text("Limits by level"), _text("Reached")]
     rows = []
     for verdict in room.verdicts:
         if verdict.rule != rule or not verdict.applies:
             continue
-        one = verdict.criterion
-        for level, values in zip(one.level, verdict.values, strict=True):
-            rows += [
-                (one.title, one.clause, level.name, need.words, shown(need, value), limit_of(need),
-                 yes_or_no(need.met(value)))
-                for need, value in zip(level.needs, values, strict=True)
-            ]  # fmt: skip
+        first = True
+        for words, (value, limits) in _quantities(verdict).items():
+            one = verdict.criterion
+            head = (one.title, one.clause) if first else ("", "")
+            last = verdict.reached if first else ""
+            rows.append((*head, words, value, "; ".join(limits), last))
+            first = False
     return Table(result.rules[rule].title, tuple(columns), tuple(rows))
+
+
+def _quantities(verdict: RoomVerdict) -> dict[str, tuple[str, list[str]]]:
+    """The quantities of a criterion in words: value, and limit by level."""
+    found: dict[str, tuple[str, list[str]]] = {}
+    for level, values in zip(verdict.criterion.level, verdict.values, strict=True):
+        for need, value in zip(level.needs, values, strict=True):
+            _, limits = found.setdefault(need.words, (shown(need, value), []))
+            limits.append(f"{level.name} {limit_of(need)}")
+    return found
 
 
 def openings_table(room: CheckedRoom) -> Table | None:

@@ -46,6 +46,28 @@ def _thermal(_study, *_others):
     return (room,), ()
 
 
+def _compliance(options, *_others):
+    from scenes.comply.findings import calendar_of
+    from scenes.comply.results import Compliance
+    from scenes.comply.sunlight import sun_day
+    from scenes.run.building import read_building
+    from scenes.run.inputs import read_weather
+
+    weather, building = read_weather(options.weather), read_building(options.building)
+    rooms = tuple(_checked(space) for space in building.spaces)
+    return Compliance(
+        building, {}, rooms, (), calendar_of(weather), weather, sun_day(weather, 3, 21, 11.0),
+        (), (), (), {},
+    )  # fmt: skip
+
+
+def _checked(space):
+    from scenes.comply.results import CheckedRoom
+    from scenes.comply.uses import RoomUse
+
+    return CheckedRoom(space, RoomUse("office", True, "made up"), (), None, None, None)
+
+
 def _pv(_building, weather, _study, **_options):
     yields = pd.DataFrame(
         {"subsystem": ["roof"], "modules": [1], "peak_kw": [1.0], "yield_kwh": [900.0],
@@ -132,6 +154,7 @@ def _study_report(_result, path):
 WORK = {
     "scenes.run.run.run_job": _run_job,
     "scenes.heat.study.run_study": _thermal,
+    "scenes.comply.comply.check_building": _compliance,
     "scenes.photovoltaics.study.run_pv": _pv,
     "scenes.photovoltaics.picture.view_directions": lambda _result: [],
     "scenes.year_of_glare.year.read_year": _read_year,
@@ -152,6 +175,7 @@ def quick_work(give: Callable[[object, str, object], object] = setattr, among: s
     """
     needs = {
         "run": "scenes.run", "demo": "scenes.run", "thermal": "scenes.heat.study", "pv": "photovol",
+        "comply": "scenes.comply",
         "dgp": "year_of_glare", "picture": "view_picture", "calibrate": "calibration",
         "bench": "benchmarks", "bsdf": "bsdf_generation", "study": "scenes.study",
     }  # fmt: skip

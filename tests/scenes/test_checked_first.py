@@ -99,6 +99,11 @@ def _dgp(*words: object, building: object = "house.ifc") -> list:
     return ["dgp", building, "--weather", WEATHER, "--out", "out", *words]
 
 
+def _comply(*words: object, building: object = "house.ifc") -> list:
+    more = ["--weather", WEATHER, "--standard", "en17037", "--out", "out"]
+    return ["comply", building, *more, *words]
+
+
 def _picture(*words: object, building: object = "house.ifc", at: str = "06-21 12:00") -> list:
     more = ["--weather", WEATHER, "--at", at, "--out", "a.hdr"]
     return ["picture", building, *more, *words]
@@ -212,6 +217,16 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "dgp, --space": (lambda p: _dgp("--space", ""), "--space: expected the name"),
     "dgp, folder": (lambda p: _dgp("--out", p.folder), "--out: "),
     "dgp, no weather": (lambda p: ["dgp", "house.ifc", "--out", "out"], "--weather: give the EPW"),
+    "comply, head": (lambda p: _comply(building="word.ifc"), "word.ifc: not an IFC file"),
+    "comply, weather": (lambda p: _comply("--weather", "short.epw"), SHORT),
+    "comply, rule": (lambda p: _comply("--standard", "en17073"), "--standard: no rule 'en17073'"),
+    "comply, BSDF": (lambda p: _comply("--cfs", "bad.xml"), "bad.xml: is not well-formed"),
+    "comply, --closed": (lambda p: _comply("--closed", "bad.xml"), "bad.xml: is not well-formed"),
+    "comply, --uses": (lambda p: _comply("--uses", "pv.toml"), "pv.toml: module: no such key"),
+    "comply, --day": (lambda p: _comply("--day", "12-21"), "expected a day from 02-01 to 03-21"),
+    "comply, --space": (lambda p: _comply("--space", ""), "--space: expected the name"),
+    "comply, --write-ifc": (lambda p: _comply("--write-ifc", "none/a.ifc"), "no such folder"),
+    "comply, folder": (lambda p: _comply("--out", p.folder), "--out: "),
     "picture, no weather": (
         lambda p: ["picture", "house.ifc", "--at", "06-21 12:00", "--out", "a.hdr"],
         "--weather: give the EPW",

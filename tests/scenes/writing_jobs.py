@@ -65,6 +65,13 @@ JOBS = {
     "thermal": Job(
         lambda inputs, out: ["thermal", thermal_file(inputs, ""), "--out", out], folder=True
     ),
+    "comply": to_folder("comply", OFFICE, "--weather", WEATHER, "--standard", "en17037"),
+    "comply --write-ifc": Job(
+        lambda inputs, out: [
+            "comply", OFFICE, "--weather", WEATHER, "--standard", "en17037",
+            "--out", inputs / "results", "--write-ifc", out,
+        ], "out.ifc",
+    ),
     "pv": to_folder("pv", OFFICE, "--weather", WEATHER, "--study", PV_STUDY),
     "dgp": to_folder("dgp"),
     "study": Job(_study, folder=True),
