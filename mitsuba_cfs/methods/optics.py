@@ -155,7 +155,8 @@ class AngularOptics:
         """See `SystemOptics`."""
         if not (self._mirrored.any() or self._reflected.any()):
             return None
-        back = self._klems().reflection_back * KLEMS_FULL.projected_solid_angles()
+        even = self._patch_means(self._reflected) / np.pi
+        back = np.tile(even, (KLEMS_FULL.size, 1)) * KLEMS_FULL.projected_solid_angles()
         return back + np.diag(self._patch_means(self._mirrored))
 
     def _klems(self) -> KlemsBsdf:
