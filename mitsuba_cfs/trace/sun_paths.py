@@ -67,15 +67,17 @@ class ReflectingPlaces:
     places: Places  # [q]
 
 
-def reflecting_places(tracer: TracedScene, start: Places, seed: int) -> ReflectingPlaces:
+def reflecting_places(
+    tracer: TracedScene, start: Places, seed: int, bounces: int = BOUNCES
+) -> ReflectingPlaces:
     """The surfaces that one path from each place meets, one after the other."""
     path, weight, places = np.arange(start.size), np.ones(start.size), start
     paths, weights, met = [np.empty(0, dtype=np.int64)], [np.empty(0)], []
     key = dr.opaque(mi.UInt32, (seed ^ 0x2545F491) & 0xFFFFFFFF)
-    for bounce in range(BOUNCES):
+    for bounce in range(bounces):
         if not len(path):
             break
-        number = mi.UInt32((path * BOUNCES + bounce).astype(np.uint32))
+        number = mi.UInt32((path * bounces + bounce).astype(np.uint32))
         kept, places, rho, luck = _next(tracer, places, path_generator(number, key))
         path, weight = path[kept], weight[kept] * rho
         paths.append(path)
@@ -133,3 +135,14 @@ def place_and_hour(
     towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), lane - place * count)
     point = dr.gather(mi.Point3f, places.points(), place)
     return point, dr.gather(mi.Vector3f, places.normals(), place), on_disc_of(towards, place)
+
+
+def sunlight(
+    outside: TracedScene, places: Places, suns: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Cosine of the sun at places outdoors where it shines, else 0 [m, h]."""
+    point, normal, to_sun = place_and_hour(places, suns)
+    cosine = dr.dot(normal, to_sun)
+    lit = cosine > 0
+    lit &= ~outside.met_outdoors(point, to_sun, lit)[0].is_valid()
+    return dr.select(lit, cosine, 0.0).numpy().reshape(places.size, len(suns))
