@@ -37,7 +37,7 @@ SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
         "by_name", "glare", "optics", "path_light", "phase_light", "phase_scene",
-        "straight_views", "view_cache", "window_reflection",
+        "reflected_sun", "straight_views", "view_cache", "window_reflection",
     )
 )  # fmt: skip
 IFC = ("bim/ifc/", "scenes/demo/")

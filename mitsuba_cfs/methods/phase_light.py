@@ -14,6 +14,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
 from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.methods.subdivision import coarse_sky
 from mitsuba_cfs.methods.window_reflection import WindowReflection
@@ -42,6 +43,7 @@ class PhaseSystems:
         self.traced, self.systems = traced, systems
         self._seen: dict[tuple[int, ...], tuple[PictureSun, OutdoorCoefficients]] = {}
         self.straight = StraightViews(traced, systems)
+        self.reflected_sun = ReflectedSun(traced, systems, self.straight)
         self.mirrored = WindowReflection(traced)
 
     @property
@@ -272,11 +274,22 @@ class PhaseLight:
         )
         return found
 
+    @cached_property
+    def _reflected_sun(self) -> ReflectedSunLight | None:
+        """The sun that diffuse surfaces reflect; None where some mirror it: then by patches."""
+        scene = self._traced.scene
+        if scene.interior.glossy or scene.exterior.glossy:
+            return None
+        return self.filled.reflected_sun.light(self.sky)
+
     def _sensor_light(self, g: int, j: int, exact: list[Estimate | None]) -> SensorLight:
         diffuse = sum(self._diffuse_light(q, g, j) for q in self._traced.parts.of(g))
         diffuse = diffuse + self.filled.straight.light(g, j, self.sky)
         if not self._traced.five_phase:
             return SensorLight(diffuse, None, 0.0)
+        if self._reflected_sun is not None:
+            beams = (self.windows[q][j].beam is not None for q in self._traced.parts.of(g))
+            diffuse += self._reflected_sun.sensors(g, j, beam=any(beams))
         sun, shining = np.zeros_like(diffuse), self._shining()
         if exact[j] is None:
             return SensorLight(diffuse, sun, 0.0)
@@ -293,9 +306,12 @@ class PhaseLight:
         if not traced.five_phase:
             return three_phase
         three_phase = three_phase - traced.direct_sensors[:, q] @ window.sun
-        if window.beam is not None:
-            reflected = view - traced.direct_sensors[:, q]
-            three_phase += reflected @ (window.beam_at_sun - window.beam)
+        reflected = view - traced.direct_sensors[:, q]
+        more, beam = self._reflected_sun, window.beam
+        if beam is not None:
+            three_phase += reflected @ (window.beam_at_sun - beam if more is None else -beam)
+        if more is not None and more.windows is not None:
+            three_phase += view @ (self.filled.systems[g][j].transmission @ more.windows[q])
         return three_phase
 
     def _exact_sun(self) -> list[Estimate | None]:

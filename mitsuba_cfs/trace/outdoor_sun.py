@@ -11,16 +11,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.trace.picture_sun import LANES
 from mitsuba_cfs.trace.scene import TracedScene
-from mitsuba_cfs.trace.sun_paths import Places, place_and_hour, reflecting_places
-from mitsuba_cfs.trace.sun_ways import sun_ways
+from mitsuba_cfs.trace.sun_paths import Places, reflecting_places, sunlight
 
 GATHERED = 16  # places at most in each tile that what other surfaces reflect is taken from
 
@@ -80,23 +77,15 @@ class OutdoorSun:
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
             strength = illuminance[hours].astype(np.float32)
-            found[:, hours] = self._pixels @ (self._sunlight(self._places, suns[hours]) * strength)
+            found[:, hours] = self._pixels @ (
+                sunlight(self._outside, self._places, suns[hours]) * strength
+            )
             if self._reflecting.size:
-                light = self._sunlight(self._reflecting, suns[hours]) * strength
+                light = sunlight(self._outside, self._reflecting, suns[hours]) * strength
                 irradiance[:, hours] += self._gather @ light
         found += self._tiles @ irradiance
         for hour, luminance in zip(values, found.T, strict=True):
             hour[self._shown] += luminance
-
-    def _sunlight(self, places: Places, suns: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Cosine of the sun at places where it shines, also out of mirrors, else 0 [m, h]."""
-        light = mi.Float(0)
-        for way in sun_ways(self._outside):
-            point, normal, to_sun = place_and_hour(places, way.turned(suns))
-            cosine = dr.dot(normal, to_sun)
-            share = way.reaching(mi.Ray3f(point, to_sun), cosine > 0)
-            light += dr.select(cosine > 0, cosine * share, 0.0)
-        return light.numpy().reshape(places.size, len(suns))
 
 
 def _reflecting(

@@ -57,37 +57,23 @@ def straight_view_matrix(
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
     inside, outside = TracedScene(interior, groups), TracedScene(exterior, groups)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
-    place = mi.Point3f((points - inside.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
         matrix = dr.zeros(mi.Float64, S * sky.size)
-        count = dr.opaque(mi.UInt32, n)
-        lane = dr.arange(mi.UInt32, S * n)
-        sensor = lane // count
-        stream = mi.sample_tea_32(sensor, key ^ mi.UInt32(0x510E527F + g))[0]
-        target = inside.sample_group(g, lattice_2d(lane - sensor * count, stream, 0))
-        start = dr.gather(mi.Point3f, place, sensor)
-        to_target = target - start
-        distance = dr.norm(to_target)
-        omega = mi.Vector3f(to_target / distance)
-        local = inside.to_group(g, omega)
-        cosine = dr.dot(dr.gather(mi.Vector3f, normal, sensor), omega)
-        seen = (cosine > 0) & (local.z > 1e-4)
-        shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
-        seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
-        weight = cosine * local.z / dr.square(distance) * way.through(local)
-        step = mi.Vector3f(*map(float, groups[g].frame[2])) * outside.epsilon
+        stream = key ^ mi.UInt32(0x510E527F + g)
+        sensor, start, omega, weight = straight_rays(
+            inside, g, way, (points, directions), n, stream
+        )
         starts = PathStarts(
             sensor,
-            mi.Point3f(target + step),
+            start,
             omega,
-            path_generator(lane, key),
+            path_generator(dr.arange(mi.UInt32, S * n), key),
             dr.opaque(mi.UInt32, max_depth),
-            seen & (weight > 0),
+            weight > 0,
         )
         add_daylight_paths(outside, sky, matrix, starts, weight)
-        return matrix.numpy().reshape(S, sky.size) * (groups[g].area / n)
+        return matrix.numpy().reshape(S, sky.size) / n
 
     def batch(number: int) -> NDArray[np.float64]:
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
@@ -106,3 +92,39 @@ def straight_view_matrix(
             subdivision, n, max_depth, seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
+
+
+def straight_rays(
+    inside: TracedScene,
+    group: int,
+    way: Scattering,
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+    samples: int,
+    key: mi.UInt32,
+) -> tuple[mi.UInt32, mi.Point3f, mi.Vector3f, mi.Float]:
+    """Rays of sensors [S * samples] through a window group that go straight on.
+
+    Args: sensors: positions and normals [S, 3].
+
+    Returns: sensor, start just outdoors, direction; the light [sr, projected] that a ray stands
+    for, times the samples, or 0 where the sensor does not see the window there.
+    """
+    place, normal = (np.atleast_2d(v) for v in sensors)
+    count = dr.opaque(mi.UInt32, samples)
+    lane = dr.arange(mi.UInt32, len(place) * samples)
+    sensor = lane // count
+    stream = mi.sample_tea_32(sensor, key)[0]
+    target = inside.sample_group(group, lattice_2d(lane - sensor * count, stream, 0))
+    start = dr.gather(mi.Point3f, mi.Point3f((place - inside.centre).T.astype(np.float32)), sensor)
+    to_target = target - start
+    distance = dr.norm(to_target)
+    omega = mi.Vector3f(to_target / distance)
+    local = inside.to_group(group, omega)
+    cosine = dr.dot(dr.gather(mi.Vector3f, mi.Vector3f(normal.T.astype(np.float32)), sensor), omega)
+    seen = (cosine > 0) & (local.z > 1e-4)
+    shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
+    seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
+    weight = cosine * local.z / dr.square(distance) * way.through(local)
+    weight *= float(inside.groups[group].area)
+    beyond = mi.Point3f(target + inside.outward(mi.Int32(group), mi.Bool(True)))
+    return sensor, beyond, omega, dr.select(seen, weight, 0.0)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
 from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sun_ways import sun_ways
 
 BOUNCES = 5  # surfaces that a path meets at most
 ROULETTE = 0.5  # share of light below which paths are thinned out
@@ -70,15 +71,17 @@ class ReflectingPlaces:
     first: int  # of these, how many the paths meet first; the others come after them
 
 
-def reflecting_places(tracer: TracedScene, start: Places, seed: int) -> ReflectingPlaces:
+def reflecting_places(
+    tracer: TracedScene, start: Places, seed: int, bounces: int = BOUNCES
+) -> ReflectingPlaces:
     """The surfaces that one path from each place meets, one after the other."""
     path, weight, places = np.arange(start.size), np.ones(start.size), start
     paths, weights, met = [np.empty(0, dtype=np.int64)], [np.empty(0)], []
     key = dr.opaque(mi.UInt32, (seed ^ 0x2545F491) & 0xFFFFFFFF)
-    for bounce in range(BOUNCES):
+    for bounce in range(bounces):
         if not len(path):
             break
-        number = mi.UInt32((path * BOUNCES + bounce).astype(np.uint32))
+        number = mi.UInt32((path * bounces + bounce).astype(np.uint32))
         kept, places, rho, luck = _next(tracer, places, path_generator(number, key))
         path, weight = path[kept], weight[kept] * rho
         paths.append(path)
@@ -138,3 +141,16 @@ def place_and_hour(
     towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), lane - place * count)
     point = dr.gather(mi.Point3f, places.points(), place)
     return point, dr.gather(mi.Vector3f, places.normals(), place), on_disc_of(towards, place)
+
+
+def sunlight(
+    outside: TracedScene, places: Places, suns: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Cosine of the sun at places outdoors where it shines, also out of mirrors, else 0 [m, h]."""
+    light = mi.Float(0)
+    for way in sun_ways(outside):
+        point, normal, to_sun = place_and_hour(places, way.turned(suns))
+        cosine = dr.dot(normal, to_sun)
+        share = way.reaching(mi.Ray3f(point, to_sun), cosine > 0)
+        light += dr.select(cosine > 0, cosine * share, 0.0)
+    return light.numpy().reshape(places.size, len(suns))

@@ -1,0 +1,199 @@
+"""The sun that surfaces outdoors reflect to windows, and to sensors straight through them.
+
+    L[row] = sum over places m of share[row, m] E_sun[m]
+
+Paths find the surfaces that a row has light from; a few thousand of the places they meet stand for
+all, and a shadow ray from each to the sun gives its irradiance hour by hour.  No path has to find
+the sun by itself: of a window patch's paths that a surface reflects one in five hundred does.
+
+Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun; the places
+stand for others near by as the virtual lights of Keller 1997, "Instant radiosity".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.direct_sun import Scattering
+from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.straight_view import straight_rays
+from mitsuba_cfs.trace.sun_paths import (
+    Places,
+    face_places,
+    reflecting_places,
+    sunlight,
+)
+
+BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
+PLACES = 2048  # that stand for all that paths meet, at most
+FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
+MORTON_BITS = 12  # along each axis
+LANES = 2**22  # shadow rays at once
+
+
+@dataclass(frozen=True, slots=True)
+class SunShares:
+    """Places that reflect the sun, and what rows have of their irradiance."""
+
+    places: Places  # [m]
+    share: sparse.csr_array  # [rows, m]
+
+    @classmethod
+    def of(cls, met: Sequence[_Met], rows: int, seed: int) -> SunShares:
+        """From what paths met: one of each run of near places, drawn by weight, stands for all."""
+        places = Places.joined([m.places for m in met])
+        row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
+        weight = np.concatenate([np.empty(0), *(m.weight for m in met)])
+        if not len(weight):
+            return cls(places, sparse.csr_array((rows, 0)))
+        run, chosen = _runs(places, weight, np.random.default_rng(seed))
+        few = places.some(chosen)
+        share = sparse.csr_array(sparse.coo_array((weight, (row, run)), shape=(rows, len(chosen))))
+        return cls(few, share)
+
+
+@dataclass(frozen=True, slots=True)
+class _Met:
+    """Places that paths met, the row that each gives light to, and how much of its irradiance."""
+
+    row: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    places: Places
+
+
+def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunShares:
+    """What window patches have of the sun on surfaces outdoors; rows [Q * K], radiance.
+
+    Args: samples: paths of each patch.
+    """
+    bins, met = DirectionBins(KLEMS_FULL), []
+    K = bins.size
+    for q in range(len(outside.groups)):
+        path = dr.arange(mi.UInt32, K * samples)
+        patch = path // dr.opaque(mi.UInt32, samples)
+        sample = path - patch * dr.opaque(mi.UInt32, samples)
+        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + q) & 0xFFFFFFFF)
+        stream = mi.sample_tea_32(patch, key)[0]
+        way = outside.to_world(q, bins.sample(patch, lattice_2d(sample, stream, 0)))
+        position = outside.sample_group(q, lattice_2d(sample, stream, 2))
+        weight = dr.full(mi.Float, 1.0 / samples, K * samples)
+        met.append(_met(outside, q * K + patch, weight, position, way, seed * 1_000_003 + q))
+    return SunShares.of(met, len(outside.groups) * K, seed)
+
+
+def view_shares(
+    inside: TracedScene,
+    outside: TracedScene,
+    group: int,
+    way: Scattering,
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+    *,
+    samples: int,
+    seed: int = 0,
+) -> SunShares:
+    """What sensors see of the sun on surfaces outdoors through a group's beam; rows [S].
+
+    Args:
+        sensors: positions and normals [S, 3].
+        samples: points on the group for each sensor.
+    """
+    key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+    sensor, target, omega, weight = straight_rays(inside, group, way, sensors, samples, key)
+    met = _met(outside, sensor, weight / samples, target, omega, seed)
+    return SunShares.of([met], len(sensors[0]), seed)
+
+
+def outdoor_light(
+    shares: SunShares,
+    outside: TracedScene,
+    suns: NDArray[np.float64],
+    strength: NDArray[np.float64],
+) -> NDArray[np.float32]:
+    """Light of the rows [rows, h] from surfaces outdoors in the sun.
+
+    Args: suns: [h, 3]; strength: [h] irradiance normal to it.
+    """
+    found = np.zeros((shares.share.shape[0], len(suns)), dtype=np.float32)
+    for hours in _blocks(shares.places.size, len(suns)):
+        light = sunlight(outside, shares.places, suns[hours])
+        found[:, hours] = shares.share @ light * strength[hours]
+    return found
+
+
+def _met(
+    outside: TracedScene,
+    row: mi.UInt32,
+    weight: mi.Float,
+    origin: mi.Point3f,
+    way: mi.Vector3f,
+    seed: int,
+) -> _Met:
+    """The surfaces that paths from windows meet, with what they reflect [1/sr]."""
+    active = mi.Bool(weight > 0)
+    hit, origin = outside.met_outdoors(origin, way, active)
+    found = active & hit.is_valid()
+    rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, found)
+    places = face_places(outside, origin, way, hit, found)
+    value = (weight * rho * dr.inv_pi).numpy().astype(float)
+    kept = np.flatnonzero(found.numpy() & (value > 0))
+    first, value, row = places.some(kept), value[kept], row.numpy()[kept].astype(np.int64)
+    later = reflecting_places(outside, first, seed, BOUNCES)
+    return _Met(
+        np.concatenate([row, row[later.path]]),
+        np.concatenate([value, value[later.path] * later.weight]),
+        Places.joined([first, later.places]),
+    )
+
+
+def _runs(
+    places: Places, weight: NDArray[np.float64], random: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The run of near places, even in weight, that each is of; the one that stands for each run.
+
+    Runs follow Morton's curve over the places of one of 26 directions.
+    """
+    side = np.unique(np.round(FACING * places.normal), axis=0, return_inverse=True)[1].ravel()
+    order = np.lexsort((_morton(places.point), side))
+    side, weight = side[order], weight[order]
+    climbed, total = np.cumsum(weight), np.bincount(side, weight)
+    number = np.ceil(PLACES * total / total.sum()).astype(np.int64)
+    within = (climbed - 0.5 * weight - (np.cumsum(total) - total)[side]) / total[side]
+    run = np.clip((within * number[side]).astype(np.int64), 0, number[side] - 1)
+    run = np.unique((np.cumsum(number) - number)[side] + run, return_inverse=True)[1]
+    of_run = np.bincount(run, weight)
+    marks = np.cumsum(of_run) - random.random(len(of_run)) * of_run
+    drawn = np.clip(
+        np.searchsorted(climbed, marks),
+        np.searchsorted(run, np.arange(len(of_run))),
+        np.searchsorted(run, np.arange(len(of_run)), side="right") - 1,
+    )
+    found = np.empty_like(run)
+    found[order] = run
+    return found, order[drawn]
+
+
+def _morton(point: NDArray[np.float32]) -> NDArray[np.int64]:
+    """The place of points [m, 3] along Morton's curve through the box that holds them."""
+    low, size = point.min(axis=0), max(float(np.ptp(point, axis=0).max()), 1e-6)
+    cell = np.minimum((point - low) / size * 2**MORTON_BITS, 2**MORTON_BITS - 1).astype(np.int64)
+    found = np.zeros(len(point), dtype=np.int64)
+    for bit in range(MORTON_BITS):
+        for axis in range(3):
+            found |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return found
+
+
+def _blocks(places: int, hours: int) -> list[slice]:
+    """Hours in blocks of so many shadow rays as are traced at once."""
+    step = max(1, LANES // max(places, 1))
+    return [slice(start, start + step) for start in range(0, hours if places else 0, step)]
