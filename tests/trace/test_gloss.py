@@ -417,3 +417,17 @@ def test_the_sun_on_a_rough_facade_is_seen_through_the_window():
     whole = np.isclose(values[0], f * SUN[1] * 50_000.0, rtol=0.03)
     lit = values[0] > 0.2 * values[0].max()
     assert lit.sum() > 20 and whole[lit].mean() > 0.8  # the others lie on the window's edges
+
+
+def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
+    """In a black room: of what meets the floor first it keeps 0.6, the walls and the ceiling 0.4."""
+    from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
+    from mitsuba_cfs.trace.estimate import Stopping
+
+    black, floor = black_room(mirror(0.4))
+    _, groups = rooms.test_room()
+    options = {"samples": 512, "stopping": Stopping(batches=2)}
+    dull, mirrored = (absorption_matrix(r, groups, **options).values[0] for r in (black, floor))
+    np.testing.assert_allclose(mirrored[:, 0], 0.6 * dull[:, 0], rtol=1e-5)
+    np.testing.assert_allclose(mirrored.sum(axis=1), 1.0, rtol=1e-5)
+    assert mirrored[:, 1].sum() > dull[:, 1].sum()  # the ceiling has it
