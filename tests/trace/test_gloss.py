@@ -420,7 +420,7 @@ def test_the_sun_on_a_rough_facade_is_seen_through_the_window():
 
 
 def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
-    """In a black room: of what meets the floor first it keeps 0.6, the walls and the ceiling 0.4."""
+    """In a black room: the floor keeps 0.6 of what meets it first, the others 0.4."""
     from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
     from mitsuba_cfs.trace.estimate import Stopping
 
