@@ -27,6 +27,13 @@ def facade(gloss, diffuse: float = 0.0) -> Surfaces:
     return Surfaces(NORTH, np.full(2, diffuse), np.zeros(2, dtype=int), (), (gloss,))
 
 
+def hidden_sun(gloss) -> Surfaces:
+    """The facade, and behind the house a black wall that the sun stands behind."""
+    behind = NORTH + np.array([0.0, 40.0, 0.0])
+    numbers = np.array([0, 0, 1, 1])
+    return Surfaces(np.concatenate([NORTH, behind]), np.zeros(4), numbers, (), (gloss, None))
+
+
 def black_room(gloss) -> tuple[Surfaces, Surfaces]:
     """The black test room, without and with a gloss of its floor."""
     room, _ = rooms.test_room(scale=0.0)
@@ -297,6 +304,7 @@ def test_the_sun_in_a_mirror_is_a_sun_to_the_direct_matrix():
     assert alone.min() > 0
     np.testing.assert_allclose(seen, 0.8 * alone, rtol=2e-3)
     assert not matrix(rooms.NOTHING, SUN).any()
+    assert not matrix(hidden_sun(mirror(0.8)), SUN).any()
 
 
 def test_a_mirror_behind_the_windows_sends_them_no_sun():
@@ -362,11 +370,12 @@ def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
     from mitsuba_cfs.trace.lit_room import LitRoom
     from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 
-    lit = LitRoom(black_room(None)[0], facade(mirror(0.8)), rooms.test_room()[1], [clear()])
     sky = lit_by(np.zeros(146), SUN, 50_000.0 / SUN_SOLID_ANGLE)
     view = fisheye(EYE, (0.0, -1.0, 0.0), 32)
-    picture = point_in_time_picture(lit, sky, view, samples=4, disc=False)
-    assert normal_illuminance(picture, view) == pytest.approx(IMAGE, rel=0.01)
+    for outdoors, expected in ((facade(mirror(0.8)), IMAGE), (hidden_sun(mirror(0.8)), 0.0)):
+        lit = LitRoom(black_room(None)[0], outdoors, rooms.test_room()[1], [clear()])
+        picture = point_in_time_picture(lit, sky, view, samples=4, disc=False)
+        assert normal_illuminance(picture, view) == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize("indoors", [False, True])
@@ -417,3 +426,17 @@ def test_the_sun_on_a_rough_facade_is_seen_through_the_window():
     whole = np.isclose(values[0], f * SUN[1] * 50_000.0, rtol=0.03)
     lit = values[0] > 0.2 * values[0].max()
     assert lit.sum() > 20 and whole[lit].mean() > 0.8  # the others lie on the window's edges
+
+
+def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
+    """In a black room: the floor keeps 0.6 of what meets it first, the others 0.4."""
+    from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
+    from mitsuba_cfs.trace.estimate import Stopping
+
+    black, floor = black_room(mirror(0.4))
+    _, groups = rooms.test_room()
+    options = {"samples": 512, "stopping": Stopping(batches=2)}
+    dull, mirrored = (absorption_matrix(r, groups, **options).values[0] for r in (black, floor))
+    np.testing.assert_allclose(mirrored[:, 0], 0.6 * dull[:, 0], rtol=1e-5)
+    np.testing.assert_allclose(mirrored.sum(axis=1), 1.0, rtol=1e-5)
+    assert mirrored[:, 1].sum() > dull[:, 1].sum()  # the ceiling has it
