@@ -17,13 +17,13 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
     disc_parts,
     disc_rays,
     disc_reach,
 )
+from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene

@@ -236,7 +236,7 @@ def _elements(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], int]:
     places = hits.places
     if not places.size:
         return np.empty(0, dtype=np.int64), 0
-    cube = np.floor(places.point * (0.5 ** -hits.halvings / edge)[:, None]).astype(np.int64)
+    cube = np.floor(places.point * (0.5**-hits.halvings / edge)[:, None]).astype(np.int64)
     side = np.round(places.normal * FACE_STEPS).astype(np.int64)
     table = np.concatenate([cube, side, hits.halvings[:, None]], axis=1)
     table -= table.min(axis=0)
@@ -245,9 +245,7 @@ def _elements(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], int]:
     return element, len(found)
 
 
-def _chosen(
-    element: NDArray[np.int64], count: int, points: int, seed: int
-) -> NDArray[np.int64]:
+def _chosen(element: NDArray[np.int64], count: int, points: int, seed: int) -> NDArray[np.int64]:
     """Some places of each element, again where it has fewer [count * points]."""
     if not count:
         return np.empty(0, dtype=np.int64)
