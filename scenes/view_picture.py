@@ -68,7 +68,7 @@ def room_picture(
             hours=[hour],
             sun_model=options.sun_model,
             ground=options.sky_ground,
-        )  # fmt: skip
+        )
     )
     view, steps, rated = viewed.scene.view, part(progress, 0.4, 1.0, "picture"), None
     if rates_glare(view):

@@ -13,8 +13,13 @@ from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.weather import Weather
 
 COLUMNS = {
-    "dgp": "dgp", "dgp_standard_error": "dgp_standard_error", "ev": "Ev", "dgi": "dgi", "ugr": "ugr", "sources": "sources",
-}  # fmt: skip
+    "dgp": "dgp",
+    "dgp_standard_error": "dgp_standard_error",
+    "ev": "Ev",
+    "dgi": "dgi",
+    "ugr": "ugr",
+    "sources": "sources",
+}
 
 
 def glare_by_state(
