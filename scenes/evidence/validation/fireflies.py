@@ -73,7 +73,8 @@ class Found:
         return (
             f"{len(self.worst)} hours, {self.pixels:,} pixels | worst {self.worst.max():.2f} | "
             f"{self.beyond.sum()} beyond {LIMIT} in {(self.beyond > 0).sum()} hours, "
-            f"{self.bright.sum()} of them above {BRIGHT:.0f} cd/m2 | noise of the neighbourhood {100 * self.noise.mean():.1f} %"
+            f"{self.bright.sum()} of them above {BRIGHT:.0f} cd/m2 | "
+            f"noise of the neighbourhood {100 * self.noise.mean():.1f} %"
         )
 
 
