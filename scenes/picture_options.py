@@ -23,4 +23,8 @@ class PictureOptions:
     eye_height: float = 1.2  # [m] above the floor, where no view is given
     size: int = 800  # [px] of the longer side
     samples: int = 16  # paths of a pixel
+    glare_sources: str = "evalglare"  # bright pixels grouped so, or each of the "pixels"
+    glare_sun: str = "source"  # the sun's disc: a source of its own, or part of its "pixels"
+    sun_model: str = "spa"  # see `mitsuba_cfs.sky.sun`
+    sky_ground: str = "reflected"  # see `mitsuba_cfs.sky.ground`
     seed: int = 0

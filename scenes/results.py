@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
+from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 
 
@@ -18,7 +19,8 @@ class LuminancePicture:
 
     hour: int  # index into the times of the result
     luminance: NDArray[np.float32]  # [ny, nx] [cd/m2]
-    glare: dict[str, float]  # dgp, ev [lx], dgi, ugr, vcp, cgi, sources (a count)
+    # dgp, dgp_standard_error, ev [lx], dgi, ugr, vcp, cgi, sources (a count)
+    glare: dict[str, float]
     # [n, ny, nx] boolean masks are big: the pixels of all glare sources together
     source_mask: NDArray[np.bool_] | None = None  # [ny, nx]
 
@@ -56,6 +58,7 @@ class GlareResults:
 
     view: View
     pictures: tuple[LuminancePicture, ...]
+    rule: str = ""  # what their glare sources are
 
     @property
     def worst(self) -> float:
@@ -116,7 +119,7 @@ class RoomYear:
     seconds: dict[str, float]  # by stage
     operation: OperationResult | None = None  # None: one state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
-    dgp: NDArray[np.float64] | None = None  # [n] of the metric and hours asked for
+    dgp: AnnualGlare | None = None  # [n] by the metric and in the hours asked for
     problems: tuple[Problem, ...] = ()  # that tracing found
     template: str = ""  # name of the equal room that was computed; "": this one
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.sensors import view_point
 from mitsuba_cfs import variants
-from mitsuba_cfs.glare.evaluation import GlareResult
+from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
 from mitsuba_cfs.methods.glare import rated_pictures
@@ -63,11 +63,18 @@ def room_picture(
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
     light = PathSystems(viewed.scene, viewed.optics, sampling).light(
-        annual_sky(weather, sampling.subdivision, hours=[hour])
+        annual_sky(
+            weather,
+            sampling.subdivision,
+            hours=[hour],
+            sun_model=options.sun_model,
+            ground=options.sky_ground,
+        )
     )
     view, steps, rated = viewed.scene.view, part(progress, 0.4, 1.0, "picture"), None
     if rates_glare(view):
-        [(luminance, rated)] = rated_pictures(light, [0], progress=steps)
+        rating = GlareOptions(grouping=options.glare_sources, sun=options.glare_sun)
+        [(luminance, rated)] = rated_pictures(light, [0], options=rating, progress=steps)
     else:
         luminance = light.picture(0, progress=steps)
     notes = (*viewed.notes(), *weather.notes)

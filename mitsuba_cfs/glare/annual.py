@@ -19,6 +19,7 @@ from scipy import sparse
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import replacing
+from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
@@ -27,7 +28,10 @@ from mitsuba_cfs.progress import Progress, silent
 
 BATCH_BYTES = 128 * 2**20  # of the pictures of a batch of hours
 ROW_BYTES = 16 * 2**20  # of a matrix that lies on disk, read at a time
-FIGURES = ("dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance")
+FIGURES = (
+    "dgp", "Ev", "dgi", "ugr", "cgi", "vcp", "sources", "background_luminance",
+    "dgp_standard_error",
+)  # fmt: skip
 MAGIC = b"\x93NUMPY"  # first bytes of a file of ratings
 
 log = logging.getLogger(__name__)
@@ -91,6 +95,7 @@ class AnnualGlare:
     vcp: NDArray[np.float64]  # [%]
     sources: NDArray[np.float64]  # number of glare sources
     background_luminance: NDArray[np.float64]  # [cd/m2]
+    dgp_standard_error: NDArray[np.float64]  # from the noise of the pictures; NaN: not known
     rule: str = GlareOptions().rule  # what its sources are
 
     def worst(self, count: int) -> NDArray[np.int64]:
@@ -203,17 +208,27 @@ def annual_glare(
         known = options if own is None else replace(options, illuminance=float(own[hour]))
         return figures(evaluate(picture, geometry, options=known, disc=disc))
 
+    def made(batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
+        if options.sun == "source":
+            return pictures.without_disc(batch)
+        return pictures.values(batch), [None] * len(batch)
+
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         for start in range(0, len(left), size):
             batch = left[start : start + size]
-            discs: list[SunDisc | None] = [None] * len(batch)
-            if options.sun == "source":
-                values, discs = pictures.without_disc(batch)
-            else:
-                values = pictures.values(batch)
-            table[batch] = list(pool.map(rated, values, discs, batch))
+            table[batch] = list(pool.map(rated, *made(batch), batch))
             _save(keep, table)
             progress("glare", (len(table) - len(left) + start + len(batch)) / len(table))
+        dgp, errors = table[:, 0], []
+        by_halves = hours_by_halves(dgp)
+        for start in range(0, len(by_halves), size):
+            batch = by_halves[start : start + size]
+            (values, discs), noise = made(batch), pictures.noise(batch)
+            halves = (np.maximum(values + noise, 0), np.maximum(values - noise, 0))
+            one, other = (np.array(list(pool.map(rated, h, discs, batch)))[:, 0] for h in halves)
+            errors.extend(np.abs(one - other) / 2)
+    table[:, FIGURES.index("dgp_standard_error")] = dgp_errors(dgp, by_halves, np.array(errors))
+    _save(keep, table)
     return AnnualGlare(**dict(zip(FIGURES, table.T, strict=True)), rule=options.rule)
 
 

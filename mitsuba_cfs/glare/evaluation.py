@@ -104,6 +104,7 @@ class GlareResult:
     dgr: float
     contrast: float = field(repr=False, default=0.0)  # sum L^2 omega/P^2
     disc: SunDisc | None = None  # that is a source of its own, the last
+    dgp_standard_error: float = np.nan  # from the noise of the picture; NaN: not known
 
     @cached_property
     def sdgp(self) -> float:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare import indices
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, annual_glare, figures, full_picture
+from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import View
@@ -121,6 +122,7 @@ def rated_pictures(
     found, geometry = [], GlareView(_view(light))
     for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
         steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
+        halves: list[NDArray[np.float32]] = []
         if isinstance(light, PathLight):
             bare, disc = light.picture(hour, now, disc=False, progress=steps), light.disc(hour, now)
             shown = light.with_disc(bare, hour, now)
@@ -129,10 +131,20 @@ def rated_pictures(
             values, discs = of_hour.without_disc(np.array([0]))
             bare, disc = full_picture(values[0], of_hour.pixels, of_hour.view), discs[0]
             shown = full_picture(of_hour.values(np.array([0]))[0], of_hour.pixels, of_hour.view)
+            noise = of_hour.noise(np.array([0]))[0]
+            halves = [
+                full_picture(np.maximum(values[0] + side * noise, 0), of_hour.pixels, of_hour.view)
+                for side in (1, -1)
+            ]
         apart = options.sun == "source"
-        rated = evaluate(
-            bare if apart else shown, geometry, options=options, disc=disc if apart else None
-        )
+        own = {"options": options, "disc": disc if apart else None}
+        rated = evaluate(bare if apart else shown, geometry, **own)
+        if halves:
+            one, other = (
+                evaluate(half + (0 if apart else shown - bare), geometry, **own).dgp
+                for half in halves
+            )
+            rated = replace(rated, dgp_standard_error=abs(one - other) / 2)
         found.append((shown, rated))
         steps("pictures", 1.0)
     return found
@@ -155,16 +167,23 @@ def _of_paths(
     if metric == "sDGP":
         eye = [light.eye(int(h), now) for h, now in zip(hours, rows.T, strict=True)]
         return _simplified(np.array(eye))
-    geometry, found = GlareView(light.filled.scene.view), []
-    for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
-        known, depth = options, {}
+    geometry, apart = GlareView(light.filled.scene.view), options.sun == "source"
+
+    def rated(i: int, **seed: int) -> list[float]:
+        hour, now, known, depth = int(hours[i]), rows[:, i], options, {}
         if metric == "eDGP":
             known = replace(options, illuminance=light.eye(hour, now))
             depth = {"max_depth": DIRECT_DEPTH}
-        apart = options.sun == "source"
-        picture = light.picture(hour, now, disc=not apart, **depth)
+        picture = light.picture(hour, now, disc=not apart, **depth, **seed)
         disc = light.disc(hour, now) if apart else None
-        found.append(figures(evaluate(picture, geometry, options=known, disc=disc)))
+        return figures(evaluate(picture, geometry, options=known, disc=disc))
+
+    found = []
+    for i in range(len(hours)):
+        found.append(rated(i))
         progress("glare", (i + 1) / len(hours))
     table = np.array(found, dtype=float).reshape(len(hours), len(FIGURES)).T
+    again = hours_by_halves(table[0])
+    other = np.array([rated(i, seed=light.filled.sampling.seed + 1)[0] for i in again])
+    table[-1] = dgp_errors(table[0], again, np.abs(table[0, again] - other) / np.sqrt(2))
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)

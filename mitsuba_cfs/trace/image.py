@@ -78,9 +78,9 @@ def picture_part_blocks(
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
     """Blocks of the view matrix of a picture in three parts [3, n, G, K], of the same paths.
 
-    The first holds the windows that a pixel shows, the second what surfaces that it shows reflect of
-    the windows' light, the last what comes after more reflections.  Pixels (row * width + column)
-    that show nothing are left out.  Results do not depend on the block size.
+    The first holds the windows that a pixel shows, the second what surfaces that it shows reflect
+    of the windows' light, the last what comes after more reflections.  Pixels that show nothing
+    (row * width + column) are left out.  Results do not depend on the block size.
 
     Args:
         samples: paths for each pixel, at as many places within it.

@@ -17,13 +17,13 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
     disc_parts,
     disc_rays,
     disc_reach,
 )
+from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
@@ -39,7 +39,8 @@ class PictureSun:
     """What a view shows of the sun, without any reflection but the pixel's own.
 
     Every pixel is looked at through its middle, and the sun's beam falls on it or not; only pixels
-    at the edge of a shadow are looked at in several places.  The sun's disc itself is cut into small pieces, so that it has its solid angle whatever the pixels' size.
+    at the edge of a shadow are looked at in several places.  The sun's disc itself is cut into
+    small pieces, so that it has its solid angle whatever the pixels' size.
     """
 
     def __init__(
@@ -208,8 +209,9 @@ class PictureSun:
         return dr.select(tau > 0, value, 0.0)
 
     def _look_again(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
-        """Put the mean over its places into each pixel of surfaces [h, m] that a shadow's edge
-        crosses: where the sun falls on its middle and not on a neighbour's, or the reverse.
+        """Put the mean over its places into each pixel [h, m] that the edge of a shadow crosses.
+
+        That is where the sun falls on its middle and not on a neighbour's, or the reverse.
         """
         hour, column = edge_pixels(found > 0, self.pixels[self._surface], self._view)
         step = LANES // EDGE_PLACES

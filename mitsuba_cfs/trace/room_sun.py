@@ -6,10 +6,11 @@ Elements are small parts of the surfaces; the sun on them is found by shadow ray
 few paths from a tile of pixels would meet the window's patch with the sun once or never, and make
 the tile white or dark.
 
-What lies far from a place lights it much as the places beside it, and many tiles share it.  What is
-near (the wall that meets the floor in a corner) does not: it is taken by rays of each tile's own, to
-elements as small as they are near.  The weight of a place at distance d from a surface that is D
-from the eye goes over from one to the other between d = NEAR D / 2 and NEAR D.
+What lies far from a place lights it much as the places beside it, and many tiles share it.  What
+is near (the wall that meets the floor in a corner) does not: it is taken by rays of each tile's
+own, to elements as small as they are near.  The weight of a place at distance d from a surface
+that is D from the eye goes over from one to the other between d = N D / 2 and N D, N the angle
+of `NEAR_TILES`.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ class _Look:
         number: NDArray[np.int64],
         samples: int,
     ) -> _Hits:
-        """What rays of pixels, each with its number in its row, find near; stratified over a row."""
+        """What rays of pixels find near, stratified over the pixels of a row by their number."""
         shown = self._shown(pixels, samples)
         of_row, sample = row[shown.ray], number[shown.ray] * samples + shown.sample
         stream = mi.UInt32((of_row + self._seed * 1_000_003 & 0xFFFFFFFF).astype(np.uint32))

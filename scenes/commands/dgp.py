@@ -12,6 +12,8 @@ from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     eye_height_option,
     furniture_option,
+    glare_sources_option,
+    glare_sun_option,
     join_option,
     method_option,
     out_folder_option,
@@ -19,8 +21,10 @@ from scenes.commands.room_options import (
     samples_option,
     seed_option,
     size_option,
+    sky_ground_option,
     space_option,
     subdivide_option,
+    sun_option,
     system_option,
     view_option,
     weather_option,
@@ -68,6 +72,10 @@ _DEFAULT = YearOptions(Path(), Path())
 )  # fmt: skip
 @click.option("--hdr", is_flag=True, help="These pictures as .hdr too.")
 @subdivide_option
+@glare_sources_option
+@glare_sun_option
+@sun_option
+@sky_ground_option
 @seed_option
 @quick_option
 def command(
@@ -111,10 +119,17 @@ def command(
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
         f"{year.room}: {len(table)} view(s), {len(year.sky.lit)} hours with the sun up.  Highest "
-        f"{year.options.metric} {worst['highest_dgp']:.2f} ({worst['view']}, {worst['worst_hour']})"
+        f"{year.options.metric} {worst['highest_dgp']:.2f}{_error(worst)} "
+        f"({worst['view']}, {worst['worst_hour']})"
     )
     for level, count in table["protection_en17037"].value_counts().items():
         click.echo(f"protection {level}: {count} view(s)")
     for note in year.notes:
         click.echo(f"note: {note}")
     click.echo(f"{out / 'views.csv'}")
+
+
+def _error(row) -> str:
+    """The standard error of a view's highest DGP, where it is known."""
+    error = row["highest_dgp_standard_error"]
+    return "" if error != error else f" ± {error:.3f}"

@@ -12,12 +12,16 @@ from scenes.commands.parameters import IFC_FILE
 from scenes.commands.room_options import (
     eye_height_option,
     furniture_option,
+    glare_sources_option,
+    glare_sun_option,
     join_option,
     room_files,
     samples_option,
     seed_option,
     size_option,
+    sky_ground_option,
     space_option,
+    sun_option,
     system_option,
     view_option,
     weather_option,
@@ -40,6 +44,10 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @size_option("size", 800, "as evalglare wants them")
 @samples_option(16, "for the one hour")
 @click.option("--tone", is_flag=True, help="PNG tone-mapped for the eye, not in falsecolour.")
+@glare_sources_option
+@glare_sun_option
+@sun_option
+@sky_ground_option
 @seed_option
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), multiple=True, required=True,

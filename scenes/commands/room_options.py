@@ -11,8 +11,10 @@ from pathlib import Path
 
 import click
 
+from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
 from scenes.commands.parameters import FILE
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.room.options import GLARE_SOURCES, GLARE_SUN
 
 Option = Callable[[Callable], Callable]
 
@@ -51,6 +53,23 @@ seed_option = click.option(
 subdivide_option = click.option(
     "--subdivide", "window_parts", type=click.IntRange(0, 64), default=0, show_default=True,
     help="Parts of each window group; 0: as many as what stands outdoors asks for.",
+)  # fmt: skip
+glare_sources_option = click.option(
+    "--glare-sources", type=click.Choice(GLARE_SOURCES), default=GLARE_SOURCES[0],
+    show_default=True,
+    help="Bright pixels grouped as evalglare has them, or each for itself.",
+)  # fmt: skip
+glare_sun_option = click.option(
+    "--glare-sun", type=click.Choice(GLARE_SUN), default=GLARE_SUN[0], show_default=True,
+    help="The sun's disc: a glare source of its own, or part of its pixels.",
+)  # fmt: skip
+sun_option = click.option(
+    "--sun-model", type=click.Choice(SUN_MODELS), default=SUN_MODELS[0], show_default=True,
+    help="Sun position: NREL's SPA, or Radiance's formula as gendaymtx has it.",
+)  # fmt: skip
+sky_ground_option = click.option(
+    "--sky-ground", type=click.Choice(GROUNDS), default=GROUNDS[0], show_default=True,
+    help="Luminance of the ground to the horizon: of a plain that reflects, or gendaylit's.",
 )  # fmt: skip
 no_cache_option = click.option(
     "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."

@@ -12,6 +12,8 @@ from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     furniture_option,
+    glare_sources_option,
+    glare_sun_option,
     join_option,
     method_option,
     needed_weather_option,
@@ -19,8 +21,10 @@ from scenes.commands.room_options import (
     out_folder_option,
     seed_option,
     size_option,
+    sky_ground_option,
     space_option,
     subdivide_option,
+    sun_option,
     system_option,
     u_option,
 )
@@ -65,6 +69,10 @@ _DEFAULT = RoomOptions()
 )  # fmt: skip
 @click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
 @subdivide_option
+@glare_sources_option
+@glare_sun_option
+@sun_option
+@sky_ground_option
 @seed_option
 @no_cache_option
 @quick_option

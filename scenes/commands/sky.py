@@ -14,8 +14,9 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table
 from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
 from mitsuba_cfs.sky.cie import KINDS
-from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_MODELS, SUN_PATCHES
+from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_PATCHES
 from mitsuba_cfs.sky.patches import SUBDIVISIONS
+from scenes.commands.room_options import sun_option
 
 if TYPE_CHECKING:
     from mitsuba_cfs.sky.weather import Weather
@@ -27,10 +28,6 @@ out_argument = click.argument("out", type=click.Path(path_type=Path, dir_okay=Fa
 subdivision_option = click.option(
     "-m", "--subdivision", type=click.Choice([str(mf) for mf in SUBDIVISIONS]), default="1",
     show_default=True, help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
-)  # fmt: skip
-sun_option = click.option(
-    "--sun-model", type=click.Choice(SUN_MODELS), default="spa", show_default=True,
-    help="Sun position: NREL's SPA, or Radiance's formula as gendaymtx has it.",
 )  # fmt: skip
 format_option = click.option(
     "-f", "--format", "kind", type=click.Choice(list(FORMATS)), default="float",

@@ -65,7 +65,10 @@ def run_study(
     notes |= dict.fromkeys(heat.model for heat in heats)
     variants.activate()
     options, trace = study.options, study.trace
-    skies, cache = skies_for(weather, options.method, options.sampling), MatrixCache.of_user()
+    skies, cache = (
+        skies_for(weather, options.method, options.sampling, **options.sky),
+        MatrixCache.of_user(),
+    )
     rooms, radiants = [], []
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)

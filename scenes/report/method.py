@@ -59,7 +59,8 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
             "standard error: two times out of three the exact value is nearer than this, 19 times "
             f"out of 20 nearer than twice this. For the annual mean illuminance it is {mean} % as "
             f"a mean over all sensors and {worst} % at the worst. It covers the tracing only: not "
-            f"the weather file, the sky model, the reflectances taken, {blurred}.",
+            f"the weather file, the sky model, the reflectances taken, {blurred}."
+            f"{_glare_error(result)}",
         ),
     ]
     if any("ase1000_250" in room.daylight.room_metrics for room in rooms):
@@ -88,6 +89,25 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
     return found
 
 
+def _glare_error(result: RunResult) -> str:
+    """The standard error of DGP from the noise of pictures, where it is known."""
+    errors = [p.glare["dgp_standard_error"] for r in result.spaces for p in r.glare.pictures]
+    errors += [
+        float(error)
+        for room in result.spaces
+        if room.annual_glare is not None
+        for error in room.annual_glare["dgp_standard_error"].dropna()
+    ]
+    known = np.array([error for error in errors if not np.isnan(error)])
+    if not len(known):
+        return ""
+    typical = np.sqrt(np.mean(known**2))
+    return (
+        f" The standard error of DGP, from pictures of halves of the paths, is {typical:.4f} "
+        f"(root mean square of the hours) and at most {known.max():.4f}."
+    )
+
+
 def _sources(result: RunResult) -> str:
     """Where each system comes from; empty where that is not known."""
     tables = [values for room in result.spaces for values in room.heat.fenestration]
@@ -106,6 +126,9 @@ def _glare(result: RunResult) -> str:
         f"{PICTURES[result.method]}; bright areas found in them and the light at the eye give the "
         "daylight glare probability (Wienold and Christoffersen 2006)."
     )
+    rule = next((room.glare.rule for room in result.spaces if room.glare.rule), "")
+    if rule:
+        text += f" {rule[0].upper()}{rule[1:]}."
     if any(room.annual_glare is not None for room in result.spaces):
         text += (
             " The same was done for every hour with the sun up; EN 17037 asks that DGP exceeds its "

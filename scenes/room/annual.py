@@ -6,20 +6,30 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.weather import Weather
 
-COLUMNS = {"dgp": "dgp", "ev": "Ev", "dgi": "dgi", "ugr": "ugr", "sources": "sources"}
+COLUMNS = {
+    "dgp": "dgp",
+    "dgp_standard_error": "dgp_standard_error",
+    "ev": "Ev",
+    "dgi": "dgi",
+    "ugr": "ugr",
+    "sources": "sources",
+}
 
 
-def glare_by_state(light: PhaseLight, progress: Progress) -> NDArray[np.float64]:
+def glare_by_state(
+    light: PhaseLight, rating: GlareOptions, progress: Progress
+) -> NDArray[np.float64]:
     """DGP of every hour in every state [J, H], 0 in the dark."""
     J, count = light.filled.states, len(light.sky.lit)
     lit = [
         hourly_glare(
-            light, "DGP", np.full(count, j),
+            light, "DGP", np.full(count, j), options=rating,
             progress=part(progress, j / J, (j + 1) / J, "glare control"),
         ).dgp
         for j in range(J)
@@ -28,10 +38,17 @@ def glare_by_state(light: PhaseLight, progress: Progress) -> NDArray[np.float64]
 
 
 def glare_of_year(
-    light: PhaseLight, state: NDArray[np.int64], weather: Weather, progress: Progress
+    light: PhaseLight,
+    state: NDArray[np.int64],
+    weather: Weather,
+    *,
+    rating: GlareOptions,
+    progress: Progress,
 ) -> pd.DataFrame:
     """Glare of every hour [H] with the state [L] that holds in it; NaN in the dark."""
-    rated = hourly_glare(light, "DGP", state, progress=part(progress, 0.0, 1.0, "annual glare"))
+    rated = hourly_glare(
+        light, "DGP", state, options=rating, progress=part(progress, 0.0, 1.0, "annual glare")
+    )
     table = np.full((light.sky.hours, len(COLUMNS)), np.nan)
     table[light.sky.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
     frame = pd.DataFrame(table, index=weather.midpoints, columns=list(COLUMNS))

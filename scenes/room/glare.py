@@ -6,16 +6,23 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.glare import rated_pictures
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.progress import Progress
 from scenes.results import GlareResults, LuminancePicture
+from scenes.room.options import Outputs
 from scenes.room.picture_hours import hour_index
 
 DEFAULT_DAYS = ("03-21", "06-21", "12-21")
 DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
+
+
+def rating_of(outputs: Outputs) -> GlareOptions:
+    """How glare is rated."""
+    return GlareOptions(grouping=outputs.glare_sources, sun=outputs.glare_sun)
 
 
 def default_hours(
@@ -43,6 +50,8 @@ def room_glare(
     view: View,
     state: NDArray[np.int64],
     hours: list[int],
+    *,
+    rating: GlareOptions,
     progress: Progress,
 ) -> GlareResults:
     """Pictures of the chosen hours of the year and their glare.
@@ -52,11 +61,12 @@ def room_glare(
     progress("pictures", 0.0)
     columns = np.searchsorted(light.sky.lit, hours)
     rated = []
-    made = rated_pictures(light, columns, state, progress=progress)
+    made = rated_pictures(light, columns, state, options=rating, progress=progress)
     for hour, (luminance, result) in zip(hours, made, strict=True):
         glare = {
             "ev": result.Ev,
             "dgp": result.dgp,
+            "dgp_standard_error": result.dgp_standard_error,
             "dgp_simplified": result.sdgp,
             "dgi": result.dgi,
             "ugr": result.ugr,
@@ -67,7 +77,7 @@ def room_glare(
         }
         rated.append(LuminancePicture(hour, luminance, glare, result.labels > 0))
     progress("pictures", 1.0)
-    return GlareResults(view, tuple(rated))
+    return GlareResults(view, tuple(rated), rating.rule)
 
 
 def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:

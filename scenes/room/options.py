@@ -11,6 +11,10 @@ from typing import Any, get_type_hints
 
 from mitsuba_cfs.methods import METHODS
 from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
+
+GLARE_SOURCES = ("evalglare", "pixels")  # see `mitsuba_cfs.glare.evaluation.GROUPINGS`
+GLARE_SUN = ("source", "pixels")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +44,8 @@ class Outputs:
     picture_count: int = 10  # at most, where no hours are asked for
     picture_size: int = 600  # pixels of a side of the fisheye picture
     annual_glare: bool = False  # rate every lit hour, not only the pictures
+    glare_sources: str = "evalglare"  # one of GLARE_SOURCES
+    glare_sun: str = "source"  # its disc: a source of its own, or part of its pixels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,12 +59,24 @@ class RoomOptions:
     outputs: Outputs = field(default_factory=Outputs)
     heat_step_s: float = 600.0  # of the heat balance; a whole fraction of an hour
     infiltration_ach: float = 0.5  # [1/h]
+    sun_model: str = "spa"  # of the sun's position, see `mitsuba_cfs.sky.sun`
+    sky_ground: str = "reflected"  # luminance of the ground, see `mitsuba_cfs.sky.ground`
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise ValueError(f"method: expected one of {METHODS}, got {self.method!r}")
+        for name, choices in CHOICES.items():
+            part, key = NAMES[name]
+            value = getattr(getattr(self, part) if part else self, key)
+            if value not in choices:
+                raise ValueError(f"{name}: expected one of {choices}, got {value!r}")
         if self.outputs.annual_glare and self.method == "point-in-time":
             raise ValueError("annual glare needs the three-phase or the five-phase method")
+
+    @property
+    def sky(self) -> dict[str, str]:
+        """The choices about sun and sky, as `annual_sky` calls them."""
+        return {"sun_model": self.sun_model, "ground": self.sky_ground}
 
     @classmethod
     def of(cls, **choices: Any) -> RoomOptions:
@@ -110,6 +128,10 @@ NAMES = {
     "sun_points": ("sampling", "sun_points"),
     "window_parts": ("sampling", "window_parts"),
     "annual_glare": ("outputs", "annual_glare"),
+    "glare_sources": ("outputs", "glare_sources"),
+    "glare_sun": ("outputs", "glare_sun"),
+    "sun_model": ("", "sun_model"),
+    "sky_ground": ("", "sky_ground"),
     "path_samples": ("sampling", "hour_samples"),
     "heat_step_s": ("", "heat_step_s"),
     "infiltration_ach": ("", "infiltration_ach"),
@@ -118,6 +140,14 @@ NAMES = {
     "floor_per_person": ("occupancy", "floor_per_person"),
     "occupied": ("occupancy", "hours"),
     "seed": ("sampling", "seed"),
+}
+
+# What the choices that are words may be, by their names
+CHOICES = {
+    "glare_sources": GLARE_SOURCES,
+    "glare_sun": GLARE_SUN,
+    "sun_model": SUN_MODELS,
+    "sky_ground": GROUNDS,
 }
 
 

@@ -23,6 +23,7 @@ from bim.model import Building, Problem, Space
 from bim.to_thermal import ThermalRoom, thermal_room
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.errors import RoomError
+from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
@@ -41,7 +42,7 @@ from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYe
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.room.control import shading_states
 from scenes.room.daylight import room_daylight, room_scene
-from scenes.room.glare import default_hours, room_glare
+from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.holes import hole_problems
 from scenes.room.operation import Operation
 from scenes.room.operation_hours import OperationHours
@@ -60,10 +61,13 @@ T = TypeVar("T")
 WORST = 4  # pictures of an annual glare without hours asked for
 
 
-def skies_for(weather: Weather, method: str, sampling: Sampling) -> AnnualSky:
-    """The year's skies as a method needs them; the same for every room."""
+def skies_for(weather: Weather, method: str, sampling: Sampling, **choices: str) -> AnnualSky:
+    """The year's skies as a method needs them; the same for every room.
+
+    Args: choices: `RoomOptions.sky`.
+    """
     with_sun = method != "three-phase"
-    return annual_sky(weather, sampling.subdivision, sun=with_sun, solar=True)
+    return annual_sky(weather, sampling.subdivision, sun=with_sun, solar=True, **choices)
 
 
 def compute_room(
@@ -109,7 +113,7 @@ def compute_room(
     hours = wanted_hours(outputs.picture_hours, weather.midpoints, skies.lit)
     daylight = room.timed("daylight", lambda: room.daylight)
     holes = room.timed("holes", room.holes)
-    year, rated = None, GlareResults(room.scene.view, ())
+    year, rated = None, GlareResults(room.scene.view, (), rating_of(outputs).rule)
     if outputs.annual_glare:
         year = room.timed("annual glare", room.annual_glare)
     if pictures:
@@ -148,7 +152,9 @@ class RoomSimulation:
         self.operation, self.cache, self.progress = operation, cache, progress
         self.grids = tuple(grids) or (options.grid,)
         self.skies = (
-            skies_for(weather, options.method, options.sampling) if skies is None else skies
+            skies_for(weather, options.method, options.sampling, **options.sky)
+            if skies is None
+            else skies
         )
         self.windows = room_windows(space, systems)
         self.seconds: dict[str, float] = {}
@@ -206,7 +212,7 @@ class RoomSimulation:
             self.windows.states,
             irradiance=lambda: self.sun.irradiance,
             eye=lambda: self.skies.whole_year(self.eye()),
-            dgp=lambda: glare_by_state(self.light, self.progress),
+            dgp=lambda: glare_by_state(self.light, rating_of(self.outputs), self.progress),
         )
 
     @property
@@ -238,15 +244,19 @@ class RoomSimulation:
 
     def annual_glare(self) -> pd.DataFrame:
         """Glare of every hour."""
-        return glare_of_year(self.light, self.lit_state, self.weather, self.progress)
+        return glare_of_year(
+            self.light, self.lit_state, self.weather,
+            rating=rating_of(self.outputs), progress=self.progress,
+        )  # fmt: skip
 
-    def rated(self, metric: str, hours: NDArray[np.int64]) -> NDArray[np.float64]:
+    def rated(self, metric: str, hours: NDArray[np.int64]) -> AnnualGlare:
         """A glare metric in some hours of the year with the sun up [n]."""
         columns = np.searchsorted(self.skies.lit, hours)
         steps = part(self.progress, 0.0, 1.0, "annual glare")
         return hourly_glare(
-            self.pictured, metric, self.lit_state, hours=columns, progress=steps
-        ).dgp
+            self.pictured, metric, self.lit_state, hours=columns,
+            options=rating_of(self.outputs), progress=steps,
+        )  # fmt: skip
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
@@ -256,7 +266,10 @@ class RoomSimulation:
             eye = self.eye()[self.lit_state, np.arange(len(self.skies.lit))]
             count = self.outputs.picture_count
             hours = default_hours(self.weather.midpoints, self.skies.lit, eye, count)
-        return room_glare(self.pictured, self.scene.view, self.lit_state, hours, self.progress)
+        return room_glare(
+            self.pictured, self.scene.view, self.lit_state, hours,
+            rating=rating_of(self.outputs), progress=self.progress,
+        )  # fmt: skip
 
     @cached_property
     def outdoors(self) -> PhaseScene:

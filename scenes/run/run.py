@@ -100,7 +100,7 @@ def run_inputs(
     variant = variants.activate()
     progress("sky", 0.0)
     room = options.room
-    skies = skies_for(weather, room.method, room.sampling)
+    skies = skies_for(weather, room.method, room.sampling, **room.sky)
     progress("sky", 1.0)
     results, problems, notes = _rooms(inputs, skies, options, progress, on_room)
     if not results:

@@ -14,6 +14,7 @@ from bim.ifc.building import read_ifc
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, protection_level
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.sampling import Sampling
@@ -27,6 +28,7 @@ from scenes.heat.box import box_building
 from scenes.results import RoomYear
 from scenes.room.drawn_shades import traced_building
 from scenes.room.operation import check_states, read_operation
+from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room, skies_for
 from scenes.run.inputs import read_weather
 from scenes.study.case import Case, InputFile, program_version
@@ -59,12 +61,15 @@ def _computed(case: Case) -> CaseResult:
     systems = case_systems(case, space)
     building = traced_building(building, systems)
     weather = _weather(case.weather, case.orientation_deg)
-    skies = _skies(case.weather, case.orientation_deg, case.options.method, case.options.sampling)
+    chosen = case.options
+    skies = _skies(
+        case.weather, case.orientation_deg, chosen.method, chosen.sampling, *chosen.sky.items()
+    )
     cache = MatrixCache.of_user()
     operation = None if case.operation is None else read_operation(case.operation.path)
     if operation is not None:
         check_states(operation, max(map(len, systems.values())))
-    hours = _rated_hours(weather, case.options.occupancy.hours)
+    hours = _rated_hours(weather, case.options)
     room = compute_room(
         building, space, systems, weather, case.options,
         operation=operation,
@@ -73,9 +78,10 @@ def _computed(case: Case) -> CaseResult:
     )  # fmt: skip
     figures, arrays = room_figures(room)
     if room.dgp is not None:
-        figures |= glare_figures(room.dgp, weather, case.options.occupancy.hours)
+        figures |= glare_figures(room.dgp.dgp, weather, case.options.occupancy.hours)
+        figures |= rating_figures(room.dgp)
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
-        arrays["dgp"][hours] = room.dgp
+        arrays["dgp"][hours] = room.dgp.dgp
     if case.bsdf is None:  # else the table says it: names are no part of a case's key
         used = systems if operation is not None else {guid: s[:1] for guid, s in systems.items()}
         figures["fenestration"] = " ".join(source_notes(window_sources(space.windows, used)))
@@ -106,8 +112,10 @@ def _weather(source: InputFile, angle: float) -> Weather:
 
 
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
-def _skies(source: InputFile, angle: float, method: str, sampling: Sampling) -> AnnualSky:
-    return skies_for(_weather(source, angle), method, sampling)
+def _skies(
+    source: InputFile, angle: float, method: str, sampling: Sampling, *sky: tuple[str, str]
+) -> AnnualSky:
+    return skies_for(_weather(source, angle), method, sampling, **dict(sky))
 
 
 def case_systems(case: Case, space: Space) -> dict[str, States]:
@@ -120,10 +128,10 @@ def case_systems(case: Case, space: Space) -> dict[str, States]:
     return fill_windows(space.windows, Given(states, ask="a [[system]]"), file)
 
 
-def _rated_hours(weather: Weather, occupied: tuple[int, int]) -> NDArray[np.int64]:
+def _rated_hours(weather: Weather, options: RoomOptions) -> NDArray[np.int64]:
     """Hours of the year whose glare counts: occupied, and the sun up."""
-    used = working_hours(weather, *occupied)
-    return np.flatnonzero(used & is_up(sun_directions(weather)))
+    used = working_hours(weather, *options.occupancy.hours)
+    return np.flatnonzero(used & is_up(sun_directions(weather, model=options.sun_model)))
 
 
 def glare_figures(
@@ -145,6 +153,16 @@ def glare_figures(
     found["dgp_mean"] = float(np.mean(dgp)) if len(dgp) else 0.0
     found["dgp_5_percent"] = hour_not_exceeded(every)
     found["glare_protection"] = protection_level(every)
+    return found
+
+
+def rating_figures(rated: AnnualGlare) -> dict[str, float | str]:
+    """What a glare source is, and the standard error of DGP: root mean square, and of the worst."""
+    dgp, error = rated.dgp, rated.dgp_standard_error
+    found: dict[str, float | str] = {"glare_rule": rated.rule}
+    if len(dgp) and not np.isnan(error).any():
+        found["dgp_standard_error"] = float(np.sqrt(np.mean(error**2)))
+        found["dgp_max_standard_error"] = float(error[np.argmax(dgp)])
     return found
 
 

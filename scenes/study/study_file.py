@@ -15,7 +15,7 @@ from scenes.heat.study_file import BoxTable
 from scenes.quick import ROOM, picks
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import Hours
-from scenes.room.options import RoomOptions, named_types
+from scenes.room.options import CHOICES, RoomOptions, named_types
 from scenes.toml_file import TomlTable, read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")
@@ -81,6 +81,8 @@ def _options_table() -> type[BaseModel]:
     for name, default in RoomOptions().named().items():
         if name not in OF_THE_GRID:
             kind = OF_TABLES.get(name, kinds[name])
+            if name in CHOICES:
+                kind = Literal[CHOICES[name]]
             if kind in (int, float):
                 kind = Annotated[kind, Field(ge=0)]
             columns[name] = (kind, default)

@@ -32,5 +32,9 @@ class YearOptions:
     worst: int = 3  # pictures of each view's worst hours
     hdr: bool = False  # the pictures as .hdr too
     window_parts: int = 0  # of each group; 0: as many as what stands outdoors asks for
+    glare_sources: str = "evalglare"  # bright pixels grouped so, or each of the "pixels"
+    glare_sun: str = "source"  # the sun's disc: a source of its own, or part of its "pixels"
+    sun_model: str = "spa"  # see `mitsuba_cfs.sky.sun`
+    sky_ground: str = "reflected"  # see `mitsuba_cfs.sky.ground`
     seed: int = 0
     quick: bool = False  # said in the results; what it chooses is in `scenes.quick`

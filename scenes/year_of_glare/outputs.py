@@ -25,7 +25,7 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import format_view
 from scenes.figures.carpet import day_grid
 from scenes.pictures import write_check_picture, write_falsecolour
-from scenes.year_of_glare.year import GlareYear, ViewYear, used_dgp
+from scenes.year_of_glare.year import GlareYear, ViewYear, rating_of, used_dgp
 
 KEPT = "ratings"  # folder of the finished ratings, inside that of the results
 LOWEST, HIGHEST = 0.15, 0.60  # ends of the heat map's scale
@@ -56,7 +56,7 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
     """What a year of a view comes to; shares are of the hours of use."""
     dgp = used_dgp(year, rated.ratings.dgp.to_numpy())
     view = rated.view.view
-    hours = class_hours(dgp)
+    hours, errors = class_hours(dgp), rated.ratings.dgp_standard_error
     x, y, z = view.position
     return {
         "view": rated.view.name, "x": x, "y": y, "z": z,
@@ -67,6 +67,8 @@ def view_row(year: GlareYear, rated: ViewYear) -> dict[str, object]:
         "dgp_exceeded_in_5_percent": hour_not_exceeded(dgp),
         "protection_en17037": protection_level(dgp),
         "highest_dgp": float(rated.ratings.dgp.max()),
+        "highest_dgp_standard_error": float(errors[rated.ratings.dgp.idxmax()]),
+        "dgp_standard_error": float(np.sqrt(np.mean(errors**2))),
         "worst_hour": str(rated.ratings.dgp.idxmax()),
         "seconds": round(rated.seconds, 1),
         "VIEW": format_view(view),
@@ -120,6 +122,7 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
         "room": year.room,
         "options": {name: _plain(getattr(options, name)) for name in options.__slots__},
         "inputs": year.digest,
+        "glare_rule": rating_of(options).rule,
         "fenestration": list(year.fenestration),
         "notes": list(year.notes),
         "hours_with_sun": len(year.sky.lit),

@@ -17,7 +17,7 @@ from bim.ifc.corrections import corrections_file
 from bim.model import Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
-from mitsuba_cfs.glare.evaluation import GlareResult
+from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.view import View, format_view
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.matrices.cache import digest as content_digest
@@ -92,10 +92,14 @@ def read_year(
     )  # fmt: skip
     variants.activate()
     sampling = sampling_of(options)
-    sky = annual_sky(weather, sampling.subdivision, sun=options.method == "five-phase")
+    sky = annual_sky(
+        weather, sampling.subdivision, sun=options.method == "five-phase",
+        sun_model=options.sun_model, ground=options.sky_ground,
+    )  # fmt: skip
     progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
-    chosen += [options.window_parts, options.furniture]
+    chosen += [options.window_parts, options.glare_sources, options.glare_sun]
+    chosen += [options.sun_model, options.sky_ground, options.furniture]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     corrections = corrections_file(options.building)
     hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
@@ -120,6 +124,11 @@ def sampling_of(options: YearOptions) -> Sampling:
     )  # fmt: skip
 
 
+def rating_of(options: YearOptions) -> GlareOptions:
+    """How glare is rated."""
+    return GlareOptions(grouping=options.glare_sources, sun=options.glare_sun)
+
+
 def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iterator[ViewYear]:
     """Rate one view after the other; what lies in the folder `kept` is not computed again."""
     options = year.options
@@ -141,8 +150,9 @@ def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iter
         filled = PhaseSystems(traced, year.optics)
         light = filled.light(year.sky)
         found = found or hourly_glare(
-            light, options.metric, keep=keep, progress=part(steps, 0.3, 1.0)
-        )
+            light, options.metric, options=rating_of(options), keep=keep,
+            progress=part(steps, 0.3, 1.0),
+        )  # fmt: skip
         table = pd.DataFrame(
             {name: getattr(found, name) for name in FIGURES}, index=times.rename("time")
         )
@@ -159,7 +169,8 @@ def _pictures(
     if not len(hours) or year.options.metric == "sDGP":
         return {}
     times = year.weather.midpoints[year.sky.lit[hours]]
-    return dict(zip(times, rated_pictures(light, hours), strict=True))
+    made = rated_pictures(light, hours, options=rating_of(year.options))
+    return dict(zip(times, made, strict=True))
 
 
 def used_dgp(year: GlareYear, dgp: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -77,6 +77,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path):
 
     class Watched:
         view, pixels, hours = VIEW, pictures.pixels, pictures.hours
+        noise = pictures.noise
 
         @staticmethod
         def without_disc(batch):
@@ -84,7 +85,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path):
             return pictures.without_disc(batch)
 
     again = annual_glare(Watched, keep=file)
-    assert asked == [3, 4, 5]
+    assert asked[:3] == [3, 4, 5]  # then the hours that are rated by halves
     assert again.dgp == pytest.approx(whole.dgp, rel=1e-6)  # BLAS rounds by the batch's size
 
 

@@ -230,7 +230,7 @@ def test_a_group_with_fewer_states_ends_with_its_last(corner):
 
 
 def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
-    """V T D s - V_d T D_d s_d + the beam at its own angle, its straight view, C_ds s_sun."""
+    """V T D s - V_d T D_d s_d - the reflected beam's patches + itself, straight views, C_ds s_sun."""
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
     from mitsuba_cfs.trace.estimate import Stopping
@@ -246,13 +246,16 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     view, direct_view = matrices.sensors.values, matrices.direct_sensors
     expected = phases.three_phase(view, t, matrices.daylight.values, sky.whole)
     expected -= phases.three_phase(direct_view, t, matrices.direct_daylight, sky.sun)
-    by_patch, at_sun = phases.sun_beams(
+    by_patch, _ = phases.sun_beams(
         t, patch_beams(ways, KLEMS_FULL),
         through_beams(scene.groups, ways, sky.direction), matrices.direct_daylight, sky.sun,
     )  # fmt: skip
-    expected += np.einsum("sgk,gkh->sh", view - direct_view, at_sun - by_patch)
-    straight = PhaseSystems(matrices, [[one] for one in chosen]).straight
-    expected += straight.light(0, 0, sky)
+    filled = PhaseSystems(matrices, [[one] for one in chosen])
+    straight, more = filled.straight, filled.reflected_sun.light(sky)
+    expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
+    expected += more.room(0, 0)
+    expected += sum(view[:, g] @ (t[g] @ more.windows[g]) for g in range(2))
+    expected += straight.light(0, 0, sky) + more.straight(0, 0)
     assert straight.matrix(1, 0) is None  # the diffuser has no beam
     expected += exact.values * sky.illuminance / SUN_SOLID_ANGLE
     assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision

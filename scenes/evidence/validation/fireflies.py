@@ -34,6 +34,7 @@ from scenes.run.inputs import chosen_spaces
 LIMIT = 1.5  # times the brightest of the neighbourhood
 FINER = 2  # times as many pixels across in the pictures by paths
 LEAST_BEAM = 5000.0  # [lx] normal to the sun, of the hours that are drawn
+BRIGHT = 2000.0  # [cd/m2] evalglare's threshold
 DARK = 0.1  # [cd/m2] below it nothing shines
 GLASS = [0.0, 0.6, 0.6, 0.6, 0.6]  # transmittance at even steps of the cosine
 
@@ -63,6 +64,7 @@ class Found:
 
     worst: NDArray[np.float64]  # [H] the largest ratio of each
     beyond: NDArray[np.int64]  # [H] pixels above the limit
+    bright: NDArray[np.int64]  # [H] of these, the ones that evalglare might take for a source
     pixels: int  # in all hours together
     noise: NDArray[np.float64]  # [H] of the neighbourhoods' brightest, its mean over pixels
 
@@ -70,7 +72,8 @@ class Found:
         """The row of the table."""
         return (
             f"{len(self.worst)} hours, {self.pixels:,} pixels | worst {self.worst.max():.2f} | "
-            f"{self.beyond.sum()} beyond {LIMIT} in {(self.beyond > 0).sum()} hours | "
+            f"{self.beyond.sum()} beyond {LIMIT} in {(self.beyond > 0).sum()} hours, "
+            f"{self.bright.sum()} of them above {BRIGHT:.0f} cd/m2 | "
             f"noise of the neighbourhood {100 * self.noise.mean():.1f} %"
         )
 
@@ -134,7 +137,7 @@ def held(lit: LitScene, hours: int, *, samples: int, seed: int = 0) -> Found:
     finer = replace(view, width=FINER * view.width, height=FINER * view.height)
     paths = cfs.PathSystems(replace(lit.scene, view=finer), lit.systems).light(sky)
     pictures = light.pictures(np.arange(len(sky.lit)), [0] * len(lit.systems))
-    worst, beyond, noise = [], [], []
+    worst, beyond, bright, noise = [], [], [], []
     for hour in range(len(sky.lit)):
         values = pictures.without_disc(np.array([hour]))[0][0]
         ours = full_picture(values, pictures.pixels, view)
@@ -149,9 +152,10 @@ def held(lit: LitScene, hours: int, *, samples: int, seed: int = 0) -> Found:
         ratio = np.where(ours > DARK, ours / np.maximum(top, DARK), 0.0)
         worst.append(float(ratio.max()))
         beyond.append(int((ratio > LIMIT).sum()))
+        bright.append(int((ours[ratio > LIMIT] > BRIGHT).sum()))
         print(f"{lit.name} hour {sky.lit[hour]}: {worst[-1]:.2f}, {beyond[-1]}", file=sys.stderr)
     count = len(pictures.pixels) * len(sky.lit)
-    return Found(np.array(worst), np.array(beyond), count, np.array(noise))
+    return Found(*map(np.array, (worst, beyond, bright)), count, np.array(noise))
 
 
 def brightest(finer: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -184,7 +188,9 @@ def main(arguments: list[str] | None = None) -> None:
     rows = {}
     for lit in scenes:
         found = held(lit, options.hours, samples=options.samples, seed=options.seed)
-        rows[lit.name] = {"worst": found.worst.tolist(), "beyond": found.beyond.tolist()}
+        rows[lit.name] = {
+            name: getattr(found, name).tolist() for name in ("worst", "beyond", "bright", "noise")
+        }
         print(f"| {lit.name} | {found.line()} |", flush=True)
     if options.json:
         options.json.write_text(json.dumps(rows))

@@ -1,0 +1,68 @@
+"""The standard error that is stated of DGP, against the spread over seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import f
+
+from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
+from mitsuba_cfs.images.view import fisheye
+from tests.glare.test_outdoor_pictures import sky
+from tests.trace import rooms
+
+SEEDS = 8
+HOURS = 5
+
+
+def test_hours_by_halves_are_spread_over_the_order_of_dgp() -> None:
+    dgp = np.random.default_rng(2).random(400)
+    hours = hours_by_halves(dgp)
+    assert len(hours) == 24
+    ranks = np.searchsorted(np.sort(dgp), dgp[hours])
+    assert ranks[0] == 0 and ranks[-1] == 399
+    assert np.diff(ranks).max() <= 18
+    assert len(hours_by_halves(dgp[:3])) == 3
+
+
+def test_errors_of_all_hours_follow_those_of_some() -> None:
+    """An error that grows with DGP comes back, out of estimates of one degree of freedom."""
+    random = np.random.default_rng(3)
+    dgp = random.random(4000)
+    hours = hours_by_halves(dgp)
+    truth = 0.001 + 0.01 * dgp
+    found = [
+        dgp_errors(dgp, hours, np.abs(random.normal(0, truth[hours]))) ** 2 for _ in range(400)
+    ]
+    middle = (dgp > 0.1) & (dgp < 0.9)
+    mean = np.sqrt(np.mean(found, axis=0))
+    # 400 times: the mean square is good to 7 %, and the means over neighbours bend by 2 %
+    np.testing.assert_allclose(mean[middle], truth[middle], rtol=0.12)
+    assert np.isnan(dgp_errors(dgp[:0], hours[:0], dgp[:0])).all()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("variant")
+@pytest.mark.parametrize("five_phase", [True, False])
+def test_the_stated_error_is_the_spread_over_seeds(five_phase: bool) -> None:
+    """Behind clear glass, eye to the window; the ratio of both variances by the F distribution."""
+    import mitsuba_cfs as cfs
+
+    room, groups = rooms.test_room()
+    view = fisheye((1.8, 2.5, 1.2), (0.5, -1.0, 0.0), 64)
+    scene = cfs.DaylightScene(room, rooms.NOTHING, groups, view=view)
+    glass = cfs.AngularOptics([0.0, 0.3, 0.3, 0.3, 0.3])
+    rated, stated = [], []
+    for seed in range(SEEDS):
+        sampling = cfs.Sampling(view_samples=2, seed=seed)
+        traced = cfs.PhaseScene(scene, sampling, five_phase=five_phase)
+        light = cfs.PhaseSystems(traced, [[glass]]).light(sky(HOURS))
+        glare = cfs.hourly_glare(light)
+        rated.append(glare.dgp)
+        stated.append(glare.dgp_standard_error)
+    variance = np.var(rated, axis=0, ddof=1).mean()
+    ratio = np.mean(np.square(stated)) / variance
+    # the hours share their matrices: no more degrees of freedom than one hour has, 8 and 7
+    low, high = f.ppf([0.005, 0.995], SEEDS, SEEDS - 1)
+    assert variance > 0
+    assert low < ratio < high, f"{np.sqrt(variance):.2g}, {np.sqrt(ratio):.2g} times"
