@@ -16,6 +16,9 @@ from .results import (
     RoomYear as RoomYear,
     ThermalResult as ThermalResult,
 )
+from .comply.comply import check_building as check_building
+from .comply.options import ComplyOptions as ComplyOptions
+from .comply.results import Compliance as Compliance
 from .simulation import SimulatedYear as SimulatedYear, simulate as simulate
 from .study.store import CaseResult as CaseResult
 from .study.study import StudyResult as StudyResult, run_study as run_study

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -47,6 +48,8 @@ def check_building(
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
     files = files or read_files(options)
+    if options.building is None:
+        raise ValueError("a check of a file needs its building")
     steps = part(progress, 0.1, 1.0)
     building = read_building(options.building, join=options.join, progress=steps)
     return check_rooms(building, options, files, progress)
@@ -57,7 +60,7 @@ def check_rooms(
 ) -> Compliance:
     """The rooms of a building against the rules of the options."""
     check = Check(building, options, files, progress)
-    spaces = named_spaces(building, options.spaces, options.building)
+    spaces = named_spaces(building, options.spaces, check.file)
     uses = check.uses_of(spaces)
     glazed = [space for space in spaces if space.windows]
     dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
@@ -91,10 +94,11 @@ class Check:
     ) -> None:
         """From what was read."""
         self.options, self.files, self.progress = options, files, progress
+        self.file = options.building or Path(building.name)
         self.parts = frozenset(p for rule in files.rules.values() for p in rule.parts)
         windows = [w for space in building.spaces for w in space.windows]
         if options.spaces:
-            chosen = named_spaces(building, options.spaces, options.building)
+            chosen = named_spaces(building, options.spaces, self.file)
             windows = [w for space in chosen for w in space.windows]
         systems = fill_windows(windows, files.given, building.file) if self.lit else {}
         self.systems: dict[str, States] = {guid: states[:1] for guid, states in systems.items()}

@@ -35,6 +35,8 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
 
     Raises: `DataError` for what cannot be used.
     """
+    if options.building is None or options.weather is None:
+        raise ValueError("a check of files needs a building and a weather")
     check_head(options.building)
     corrections_beside(options.building)
     check_names(options.spaces)

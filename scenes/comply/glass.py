@@ -35,7 +35,7 @@ class SightThrough:
 def sight_through(system: FenestrationSystem) -> SightThrough:
     """What of the light of normal incidence passes, and what straight on, in the visible band."""
     klems = system.visible
-    block = klems.transmission_front
+    block = klems.transmission_matrix() / klems.basis_in.projected_solid_angles()
     straight = through_peak(block, klems.basis_in).transmittance[0]
     return SightThrough(float(klems.direct_hemispherical(block)[0]), float(straight))
 

@@ -54,7 +54,7 @@ def lights_of(room: RoomSimulation, operated: Iterable[int]) -> list[GridLight]:
         if number in operated:
             state = blinds_operated([part.T for part in direct]).astype(np.int64)  # [G, L]
             blinds, closed = year(light.illuminance(state)[own]), sky.whole_year(state).T > 0
-        sun = sum(direct) if direct else np.zeros_like(opened[own])
+        sun = np.sum(direct, axis=0) if direct else np.zeros_like(opened[own])
         found.append(
             GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed)
         )

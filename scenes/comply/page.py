@@ -49,7 +49,8 @@ class DossierRoom:
 def dossier_html(result: Compliance, *, quick: bool = False) -> str:
     """The dossier as text: no script, font or picture is fetched from anywhere."""
     pages = environment()
-    pages.loader = jinja2.ChoiceLoader([jinja2.PackageLoader(__package__), pages.loader])
+    own, shared = (jinja2.PackageLoader(p) for p in (__package__, "scenes.report"))
+    pages.loader = jinja2.ChoiceLoader([own, shared])
     rooms = [dossier_room(result, room, i) for i, room in enumerate(result.rooms, 1)]
     style = (TEMPLATES.joinpath("style.css"), STYLE)
     return pages.get_template("dossier.html.j2").render(

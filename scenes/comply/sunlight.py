@@ -90,7 +90,9 @@ def sun_exposure(space: Space, outdoors: OutdoorMesh, day: SunDay) -> SunExposur
     for opening in openings_of(space):
         point = reference_point(opening, space.floor_level)
 
-        def sees(minutes: FloatArray, point=point, normal=opening.normal) -> NDArray[np.bool_]:
+        def sees(
+            minutes: FloatArray, point: FloatArray = point, normal: FloatArray = opening.normal
+        ) -> NDArray[np.bool_]:
             suns = day.at(minutes)
             lit = (suns[:, 2] >= np.sin(day.least_altitude)) & (suns @ normal > 0)
             rays = suns[lit]

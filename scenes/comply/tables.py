@@ -143,7 +143,7 @@ def values_frame(result: Compliance) -> pd.DataFrame:
     return pd.DataFrame(list(_rows(result)), columns=list(COLUMNS))
 
 
-def _rows(result: Compliance) -> Iterator[tuple]:
+def _rows(result: Compliance) -> Iterator[tuple[object, ...]]:
     for room in result.rooms:
         for verdict in room.verdicts:
             if not verdict.applies:
