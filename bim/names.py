@@ -6,6 +6,7 @@ import difflib
 import re
 import unicodedata
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Protocol, TypeVar
 
 SHOWN = 8  # names that a message lists
@@ -40,6 +41,7 @@ def label_of(name: str, long_name: str, guid: str) -> str:
     return " ".join(part for part in parts if part) or guid
 
 
+@lru_cache(maxsize=4096)  # the same words are looked for in every material of a model
 def plain_text(text: str) -> str:
     """Small letters without the accents of Latin ones, to look for words in: béton is beton."""
     whole = unicodedata.normalize("NFKC", text).replace("ł", "l").replace("Ł", "L")

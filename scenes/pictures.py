@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm, Normalize, hsv_to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
 
 from mitsuba_cfs.files import replacing
@@ -65,7 +65,7 @@ def write_falsecolour(
     bar.ax.tick_params(labelsize=8)
     if logarithmic:
         bar.ax.yaxis.set_major_locator(LogLocator(10, subs=(1.0, 3.0), numticks=20))
-        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+        bar.minorticks_off()  # a quarter of the time of the picture, without a number beside one
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
     _save(figure, path)
 

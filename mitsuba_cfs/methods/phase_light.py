@@ -129,6 +129,7 @@ class PhaseLight:
             raise ValueError("the five-phase method needs the sky's sun")
         self.filled, self.sky, self.progress = filled, sky, progress
         self._traced = filled.traced
+        self._last: tuple[bytes, NDArray[np.float64]] | None = None  # of `_of_all`
 
     @cached_property
     def windows(self) -> list[list[WindowLight]]:
@@ -346,7 +347,18 @@ class PhaseLight:
         return np.flatnonzero(np.any(self.sky.direction @ facing.T > 0, axis=1) & lit)
 
     def _of_all(self, state: State | None) -> NDArray[np.float64]:
-        """Illuminance of sensors and eye [S + 1, L] by all groups."""
+        """Illuminance of sensors and eye [S + 1, L] by all groups; that of the last state is kept.
+
+        A room's sensors and its eye ask for it one after the other.
+        """
+        key = self._state(state).tobytes()
+        if self._last is None or self._last[0] != key:
+            found = self._sum_of_all(state)
+            found.flags.writeable = False
+            self._last = key, found
+        return self._last[1]
+
+    def _sum_of_all(self, state: State | None) -> NDArray[np.float64]:
         rows = list(enumerate(self._state(state)))
         diffuse = sum(self._chosen(g, "diffuse", row) for g, row in rows)
         diffuse = diffuse + self._reflected(state)

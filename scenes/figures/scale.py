@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from matplotlib import colormaps
 from numpy.typing import ArrayLike, NDArray
 
 GRADIENT_STOPS = 16
+STEPS = 256  # of a map of colours
 EQUAL_CONTRAST = 0.05 * (21**0.5 - 1)  # luminance on which black and white contrast alike
+
+
+@cache
+def _table(colours: str) -> NDArray[np.uint8]:
+    """Colours [STEPS, 4] of a map; matplotlib makes it anew at every call, in a millisecond."""
+    return colormaps[colours](np.arange(STEPS), bytes=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +57,8 @@ class ColourScale:
     def rgba(self, values: ArrayLike) -> NDArray[np.uint8]:
         """Colours [..., 4]; NaN is transparent."""
         fraction = np.asarray(self.fraction(values))
-        colours = colormaps[self.colours](np.nan_to_num(fraction), bytes=True)
+        steps = np.minimum((np.nan_to_num(fraction) * STEPS).astype(int), STEPS - 1)
+        colours = _table(self.colours)[steps]
         colours[..., 3] = np.where(np.isnan(fraction), 0, 255)
         return colours
 
