@@ -81,7 +81,7 @@ def _computed(case: Case) -> CaseResult:
         used = systems if operation is not None else {guid: s[:1] for guid, s in systems.items()}
         figures["fenestration"] = " ".join(source_notes(window_sources(space.windows, used)))
     used = [state for states in systems.values() for state in states]
-    heats = {id(system): thermal_system(system).model for system in used}
+    heats = {id(system): thermal_system(system).named_model for system in used}
     figures["window_model"] = " ".join(dict.fromkeys(heats.values()))
     figures["seconds"] = round(time.monotonic() - start, 3)
     return CaseResult(case.key, figures, arrays)
