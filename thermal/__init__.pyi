@@ -36,7 +36,14 @@ from .control import (
 )
 from .errors import ThermalInputError as ThermalInputError
 from .glazing import Gap as Gap, en410_g_value as en410_g_value, en673_u_value as en673_u_value
+from .glazing_unit import (
+    GasGap as GasGap,
+    GlazingLayer as GlazingLayer,
+    GlazingUnit as GlazingUnit,
+    Openings as Openings,
+)
 from .gvalue import ThermalData as ThermalData, thermal_data as thermal_data
+from .iso15099 import Iso15099Data as Iso15099Data, iso15099_data as iso15099_data
 from .zone import (
     Gains as Gains,
     IdealLoads as IdealLoads,

@@ -7,6 +7,7 @@ films belong to the measuring condition and not to a climate.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -136,9 +137,16 @@ def yearly_g_values(
     unit: GlazingUnit, transmittance: ArrayLike, absorptance: ArrayLike
 ) -> FloatArray:
     """g [...] as the Blackbox takes it for a year: the mean of `G_STATES`, films prescribed."""
-    states = [prescribed(*state) for state in G_STATES]
-    found = [iso15099_g_values(unit, state, transmittance, absorptance) for state in states]
-    return np.mean(found, axis=0)
+    tau, alpha = (np.ascontiguousarray(v, dtype=float) for v in (transmittance, absorptance))
+    return np.frombuffer(_yearly_g(unit, tau.tobytes(), alpha.tobytes())).reshape(tau.shape).copy()
+
+
+@lru_cache(maxsize=64)  # half a second for 145 directions, and a study asks for them several times
+def _yearly_g(unit: GlazingUnit, tau: bytes, absorbed: bytes) -> bytes:
+    through = np.frombuffer(tau)
+    alpha = np.frombuffer(absorbed).reshape(len(through), -1)
+    found = [iso15099_g_values(unit, prescribed(*s), through, alpha) for s in G_STATES]
+    return np.mean(found, axis=0).tobytes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +159,7 @@ class Iso15099Data:
     resistance: LayerResistance  # between the two faces
 
 
+@lru_cache(maxsize=64)
 def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Data:
     """U, realised films and R(T_m, dT) of a unit, films prescribed.
 

@@ -81,7 +81,7 @@ def thermal_toml(state: RatedState) -> str:
     """The `.toml` beside the state's file: U and g by patch as the heat balance takes them."""
     values = ", ".join(f"{g:.4f}" for g in state.heat.g_value)
     lines = [
-        f"# {state.heat.model} Written by cfs bsdf thermal",
+        f"# {state.heat.named_model} Written by cfs bsdf thermal",
         f"u_value = {state.heat.fenestration.u_value:.4f}  # [W/(m2 K)]",
         f"g_value = {state.heat.g_value[0]:.4f}  # at normal incidence",
         f"g_value_by_patch = [{values}]",

@@ -38,6 +38,11 @@ class ThermalSystem:
     notes: tuple[str, ...]  # what had to be assumed
     model: str  # the window model by name, and the error to expect
 
+    @property
+    def named_model(self) -> str:
+        """A sentence for results: the window model of the system."""
+        return f"{self.fenestration.name}: window model: {self.model}."
+
 
 def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     """U, g and layer absorptances by direction of a system."""
@@ -68,7 +73,7 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
         back_rho,
         max(1.0 - back_rho - back_tau, 0.0),
         (*data.assumptions, *_unplaced(system, closure)),
-        f"{system.name}: window model: {closure.described(place)}.",
+        closure.described(place),
     )
 
 

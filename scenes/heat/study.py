@@ -62,7 +62,7 @@ def run_study(
     heats = [thermal_system(system) for system in systems]
     noted = (weather, *systems, *heats)
     notes |= dict.fromkeys(note for t in noted for note in t.notes)
-    notes |= dict.fromkeys(heat.model for heat in heats)
+    notes |= dict.fromkeys(heat.named_model for heat in heats)
     variants.activate()
     options, trace = study.options, study.trace
     skies, cache = (

@@ -94,7 +94,7 @@ def run_inputs(
     building, weather = inputs.building, inputs.weather
     used = used_systems(inputs)
     thermal_notes = [
-        note for heat in map(thermal_system, used) for note in (*heat.notes, heat.model)
+        note for heat in map(thermal_system, used) for note in (*heat.notes, heat.named_model)
     ]
     sun = sun_directions(weather)
     variant = variants.activate()

@@ -24,6 +24,7 @@ from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import Given, States, read_system
+from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
 from scenes.results import RoomYear
 from scenes.room.drawn_shades import traced_building
@@ -85,6 +86,9 @@ def _computed(case: Case) -> CaseResult:
     if case.bsdf is None:  # else the table says it: names are no part of a case's key
         used = systems if operation is not None else {guid: s[:1] for guid, s in systems.items()}
         figures["fenestration"] = " ".join(source_notes(window_sources(space.windows, used)))
+    used = [state for states in systems.values() for state in states]
+    heats = {id(system): thermal_system(system).named_model for system in used}
+    figures["window_model"] = " ".join(dict.fromkeys(heats.values()))
     figures["seconds"] = round(time.monotonic() - start, 3)
     return CaseResult(case.key, figures, arrays)
 
