@@ -16,6 +16,7 @@ from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.straight_view import straight_view_matrix
 
 BATCHES = 4
+HELD = 0.98  # share of a beam that T's diagonal has at the least
 SHARE = 4  # paths of a sensor for V, for each that looks straight through a cut group
 
 
@@ -36,10 +37,15 @@ class StraightViews:
         self._found: dict[tuple[int, int, bool], Estimate] = {}
 
     def beam(self, g: int, j: int) -> NDArray[np.float64]:
-        """What of T's diagonal goes straight on, of a group in a state [K]."""
-        optics = self._systems[g][j]
+        """What of T's diagonal goes straight on, of a group in a state [K].
+
+        Nothing where the diagonal holds less than the beam: the cells of a tensor tree lie across
+        patches, and what of a beam T has beside the diagonal would be counted twice.
+        """
+        optics, omega = self._systems[g][j], KLEMS_FULL.projected_solid_angles()
         through = patch_beams([optics.scattering], KLEMS_FULL)[0]
-        return np.minimum(through, np.diag(optics.transmission))
+        held = np.minimum(through, np.diag(optics.transmission))
+        return held if omega @ held >= HELD * (omega @ through) else np.zeros_like(held)
 
     def matrix(self, g: int, j: int, *, direct: bool = False) -> Estimate | None:
         """B of a group in a state [S, P]; None where there is nothing of it.

@@ -18,8 +18,16 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 
 FIELD = 90.0  # [degrees] from the line of sight, that an eye sees
 SKY = ReinhartSky(1)  # directions that stand for the sky
+DARKEST = 3.0  # decades
 LEAST_BEAM = 1e-3  # share: below it there is none
-SCALES = (1.0, 1.0, 0.5, 0.25, 0.5)  # of each trait: a difference that large is as good as another
+SCALES = (
+    1.0,
+    1.0,
+    0.5,
+    0.5,
+    0.25,
+    0.5,
+)  # of each trait: a difference that large is as good as another
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +36,18 @@ class Traits:
 
     beam: float  # decades that the straight beam's share lies above `LEAST_BEAM`: 0 to 3
     spread: float  # [rad] that light is turned by, root mean square of what is scattered
+    dark: float  # decades that the transmittance of diffuse light lies below 1
     tree: float  # 1: a tensor tree is known; 0: Klems matrices alone
     sun: float  # share of the rated hours whose sun shines in a window of the field of view
     obstruction: float  # share of the sky before the windows that is hidden
 
     def place(self) -> NDArray[np.float64]:
-        """The traits over their scales [5]: methods err alike where these lie near."""
+        """The traits over their scales [6]: methods err alike where these lie near."""
         return np.array(astuple(self)) / SCALES
 
 
-def system_traits(bsdf: Bsdf) -> tuple[float, float, float]:
-    """Beam, spread and tree of a system, of diffuse light from outdoors."""
+def system_traits(bsdf: Bsdf) -> tuple[float, float, float, float]:
+    """Beam, spread, dark and tree of a system, of diffuse light from outdoors."""
     tree = isinstance(bsdf, TensorTreeBsdf)
     klems: KlemsBsdf = klems_of(bsdf)
     basis = klems.basis_in
@@ -47,12 +56,14 @@ def system_traits(bsdf: Bsdf) -> tuple[float, float, float]:
     beam, scattered = omega @ peak.transmittance, peak.scattered * omega * omega[:, None]
     whole = beam + scattered.sum()
     if not whole > 0:
-        return 0.0, 0.0, float(tree)
+        return 0.0, 0.0, DARKEST, float(tree)
     turned = basis.outgoing_directions() @ -basis.incident_directions().T
     angle = np.arccos(np.clip(turned, -1, 1))
     spread = np.sqrt((scattered * angle**2).sum() / max(scattered.sum(), 1e-12 * whole))
     spread = float(spread) if scattered.sum() > 1e-3 * whole else 0.0
-    return float(np.log10(max(beam / whole, LEAST_BEAM) / LEAST_BEAM)), spread, float(tree)
+    dark = float(min(np.log10(omega.sum() / whole), DARKEST))
+    above = float(np.log10(max(beam / whole, LEAST_BEAM) / LEAST_BEAM))
+    return above, spread, dark, float(tree)
 
 
 def sun_in_view(

@@ -22,7 +22,7 @@ def plans(room: RoomYear) -> tuple[FloorPlan, ...]:
     eye = (np.asarray(view.position), np.asarray(view.direction)) if room.glare.pictures else None
     frame = plan_frame(room.space, daylight.points, eye)
     pictures = []
-    for names in (("da300", "da_300", "da"), ("udi_100_3000", "udi_100_2000", "udi_useful", "udi")):
+    for names in (("da300", "da_300", "da"), ("udi_100_3000", "udi_300_3000", "udi_useful", "udi")):
         if column := useful_column(room, names):
             q = quantity(column)
             values = daylight.sensor_metrics[column].to_numpy(dtype=float)

@@ -144,7 +144,7 @@ def layers(result: RunResult) -> tuple[ColourLayer, ...]:
     """The colourings that every room has: daylight autonomy, useful illuminance and so on."""
     wanted = [
         sensor_column(result.spaces[0], "da300", "da_300", "da"),
-        useful_column(result.spaces[0], ("udi_100_3000", "udi_100_2000", "udi_useful")),
+        useful_column(result.spaces[0], ("udi_100_3000", "udi_300_3000", "udi_useful")),
         sensor_column(result.spaces[0], "daylight_factor", "df"),
     ]
     found = []

@@ -91,7 +91,7 @@ def work_of(cases: list[Case]) -> Workload:
 def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
     """What a method's error goes by, of each system in each room under each climate."""
     rooms: dict[tuple, tuple[float, float]] = {}
-    systems: dict[str | Path, list[tuple[float, float, float]]] = {}
+    systems: dict[str | Path, list[tuple[float, float, float, float]]] = {}
     found: dict[Traits, None] = {}
     for case in cases:
         building, space = plan.rooms[case.scene]
@@ -105,7 +105,7 @@ def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
     return list(found)
 
 
-def filled_traits(case: Case, space: Space) -> list[tuple[float, float, float]]:
+def filled_traits(case: Case, space: Space) -> list[tuple[float, float, float, float]]:
     """The traits of what fills a case's windows, each in its first state."""
     if case.bsdf is not None:
         return [system_traits(read_system(case.bsdf.path).fine)]

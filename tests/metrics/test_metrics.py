@@ -255,6 +255,11 @@ def test_room_metrics_use_each_standards_schedule():
     assert list(table["daylight_autonomy"]) == [1, 1, 0] and table.index.name == "sensor"
     assert room["en17037_level"] == "none" and room["udi_300_3000"] == pytest.approx(2 / 3)
     assert room_metrics(light, weather).annual_sunlight_exposure is None
+    # 2005's limits: 100 and 2000 lx are useful, 2500 is not, though it is by those of 2012
+    bounds = np.where(ten[:, None], [100.0, 2000.0, 2500.0, 99.0], 0.0)
+    other = room_metrics(bounds, weather)
+    np.testing.assert_array_equal(other.useful_daylight_2005, [1, 1, 0, 0])
+    assert other.of_room()["udi_100_2000"] == 0.5 and other.of_room()["udi_300_3000"] == 0.5
 
 
 def test_room_level_counts_the_daylight_hours():

@@ -366,7 +366,7 @@ def test_auto_chooses_for_the_study_and_says_why(tmp_path):
     machine = Calibration("m", "now", 96, tuple(costs))
     errors = {"three-phase DGP": 0.2, "five-phase DGP": 0.1, "five-phase sDGP": 0.15,
               "point-in-time DGP": 0.1}  # fmt: skip
-    case = MeasuredCase("a room", "a blind", Traits(0.0, 1.0, 0.0, 0.0, 0.0), errors)
+    case = MeasuredCase("a room", "a blind", Traits(0.0, 1.0, 0.5, 0.0, 0.0, 0.0), errors)
     measured = MeasuredErrors("made up", "today", (case,))
     mirrored = BOX.replace('"box"', '"mirrored"').replace(
         "[room.box]", "specular = true\n[room.box]"

@@ -30,7 +30,7 @@ GLASS = 0.88  # transmittance of the pane at normal incidence
 SKIES = (1, 5, 8, 12, 16)
 SUN = np.array([0.0, 0.5, np.sqrt(0.75)])  # 60 degrees high, in the plane of symmetry
 GRAZING = 75.0  # [degrees] incidence from which a sensor's light counts as grazing
-WIDE = 200.0  # [m] of what has no end
+WIDE = 40.0  # [m] of what has no end; more makes the tracer's offsets from surfaces larger
 LOW, HIGH = 0.25, 2.75  # [m] of the lowest and the highest sensor on a wall
 UP, DOWN, INTO = ((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 

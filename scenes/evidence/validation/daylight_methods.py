@@ -234,7 +234,10 @@ def write_series(results: dict, path: Path) -> None:
 
     figure = Figure(figsize=(9, 6.4), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, (name, result) in zip(figure.subplots(2, 2).flat, results.items(), strict=False):
+    places = figure.subplots(2, 2).ravel()
+    for axes in places[len(results) :]:
+        axes.remove()
+    for axes, (name, result) in zip(places, results.items(), strict=False):
         for method, values in result["series"].items():
             if method in SHOWN:
                 style = "ko-" if method == "slats" else "-"
