@@ -52,6 +52,11 @@ class ReflectedSun:
         """Whether anything stands outdoors."""
         return len(self.traced.scene.exterior.triangles) > 0
 
+    @property
+    def room_reflects(self) -> bool:
+        """Whether any surface of the room does."""
+        return bool((self.traced.scene.interior.reflectance > 0).any())
+
     @cached_property
     def inside(self) -> TracedScene:
         """The room."""
@@ -121,7 +126,9 @@ class ReflectedSunLight:
 
         Args: beam: whether the sun's beam passes the group.
         """
-        return self.straight(g, j) + (self.room(g, j) if beam else 0.0)
+        return self.straight(g, j) + (
+            self.room(g, j) if beam and self._found.room_reflects else 0.0
+        )
 
     def straight(self, g: int, j: int) -> Array | float:
         """What is to be added to the straight view of a group in a state [S, L]."""

@@ -230,7 +230,7 @@ def test_a_group_with_fewer_states_ends_with_its_last(corner):
 
 
 def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
-    """V T D s - V_d T D_d s_d - the reflected beam's patches + itself, straight views, C_ds s_sun."""
+    """V T D s - V_d T D_d s_d - the reflected beam by patches + itself, straight views, C_ds s."""
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
     from mitsuba_cfs.trace.estimate import Stopping
@@ -303,7 +303,7 @@ def mirror_glass(back: float):
 
 
 def angular_glass(back: float):
-    """The same transmittance by AngularOptics, its reflection half a mirror's, half a diffuser's."""
+    """A transmittance of 0.55 by AngularOptics; half of its reflection is a mirror's."""
     from mitsuba_cfs.methods.optics import AngularOptics
 
     half = np.full(64, back / 2)
