@@ -106,8 +106,8 @@ def _glare_error(result: RunResult) -> str:
         for error in (np.sqrt(np.mean(known**2)), known.max())
     )
     return (
-        f" The standard error of DGP, from pictures of halves of the paths, is {typical} (root mean "
-        f"square of the hours), at the worst {most}."
+        f" The standard error of DGP, from pictures of halves of the paths, is {typical} (root "
+        f"mean square of the hours), at the worst {most}."
     )
 
 
