@@ -130,6 +130,6 @@ def command(
 
 
 def _error(row) -> str:
-    """The standard error of a view's highest DGP, where it is known."""
+    """The standard error of a view's highest DGP, where it is known, 0.0001 at the least."""
     error = row["highest_dgp_standard_error"]
-    return "" if error != error else f" ± {error:.3f}"
+    return "" if error != error else f" ± {max(error, 1e-4):.1g}"

@@ -101,10 +101,13 @@ def _glare_error(result: RunResult) -> str:
     known = np.array([error for error in errors if not np.isnan(error)])
     if not len(known):
         return ""
-    typical = np.sqrt(np.mean(known**2))
+    typical, most = (
+        f"{error:.4f}" if error >= 5e-5 else "below 0.0001"
+        for error in (np.sqrt(np.mean(known**2)), known.max())
+    )
     return (
-        f" The standard error of DGP, from pictures of halves of the paths, is {typical:.4f} "
-        f"(root mean square of the hours) and at most {known.max():.4f}."
+        f" The standard error of DGP, from pictures of halves of the paths, is {typical} (root "
+        f"mean square of the hours), at the worst {most}."
     )
 
 
