@@ -19,13 +19,13 @@ from bim.planes import area_vectors, plane_through, polygons_of
 from bim.rays import ray_mesh
 from bim.rooms import OVERLAP, RoomSolid, room_solid
 from bim.solids import prism, solid_of, triangles_of, union
-from bim.surroundings import sample_points
 from mitsuba_cfs.processes import Told
 
 LEVEL = 0.99  # z of the normal of a level top
 SAME_HEIGHT = 0.01  # level tops within this of the highest are one [m]
 OPEN_BELOW = 0.5  # share of the plan of the air above that is open to the room, at the least
 COVERED = 0.9  # share of its upper side that lies under something, at the least
+ASKED = 15  # places along each side that are asked for that
 TOUCHING = 0.05  # what covers it is this near [m]
 FINEST = 1e-3  # smaller details of what covers it are smoothed out [m]
 Body = NDArray[np.float64]  # [N, 3, 3] triangles [m]
@@ -56,7 +56,7 @@ def raised_body(rooms: Sequence[Body], lids: Sequence[Body], tell: Told) -> Body
         return "its top has no area"
     beside = [other for other in others if other is not None and _is_over(other, top, outline)]
     for piece in (column - union([*over, *beside])).decompose():
-        if _is_open_to(piece, top) and _is_covered(piece, lids):
+        if _is_open_to(piece, top) and _is_covered(piece, lids, top):
             # the join enters both, so that the union leaves no slit
             join = manifold3d.Manifold.extrude(piece.slice(top + 1.5 * OVERLAP), 3 * OVERLAP)
             whole = union([own, join.translate((0.0, 0.0, top - OVERLAP)), piece])
@@ -98,12 +98,18 @@ def _is_open_to(piece: manifold3d.Manifold, top: float) -> bool:
     return bool(-down[meets].sum() > OPEN_BELOW * piece.project().area())
 
 
-def _is_covered(piece: manifold3d.Manifold, lids: Sequence[Body]) -> bool:
-    facets = [f for f in room_solid("", "", piece).facets if f.plane.normal[2] > 0.1]
-    asked = [sample_points(facet) for facet in facets]
-    shares = [f.polygon.area / len(points) for f, points in zip(facets, asked, strict=True)]
-    areas = np.repeat(shares, [len(points) for points in asked])
-    points = np.concatenate(asked)
+def _is_covered(piece: manifold3d.Manifold, lids: Sequence[Body], top: float) -> bool:
+    """Whether rays up from the room's top leave the air above it where they meet a lid, or nearly.
+
+    The lids' own triangles count, so that one which is no closed solid is still in the way.
+    """
+    low, high = np.array(piece.bounding_box()).reshape(2, 3)
+    x, y = (np.linspace(low[k], high[k], ASKED + 2)[1:-1] for k in (0, 1))
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = np.column_stack([grid, np.full(len(grid), top + 1.5 * OVERLAP)])
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    _, hit = ray_mesh(np.concatenate(lids)).first_hits(points - 0.01 * up, up, TOUCHING)
-    return bool(areas[hit >= 0].sum() >= COVERED * areas.sum())
+    body, _ = triangles_of(piece)
+    leaves, through = ray_mesh(body).first_hits(points, up)
+    within = (through >= 0) & (area_vectors(body)[through, 2] > 0)
+    meets, _ = ray_mesh(np.concatenate(lids)).first_hits(points[within], up[within])
+    return bool(within.any() and np.mean(np.abs(meets - leaves[within]) < TOUCHING) >= COVERED)

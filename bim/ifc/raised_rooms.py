@@ -30,6 +30,7 @@ from mitsuba_cfs.processes import ProcessEnded, answer_apart
 LIDS = ("IfcSlab", "IfcRoof", "IfcCovering", "IfcPlate", "IfcCurtainWall")
 PLENUM = 1.2  # a void above a ceiling that nobody drew is lower [m]
 MOSTLY = 0.5  # share of a room's glass above its top that no such void has
+LEAST_GLASS = 0.1  # above a room's top; less is the rim of a window of the storey above [m2]
 LOWEST_GAIN = 0.1  # what is raised by less stays as it is [m]
 LIMIT_S = 60.0  # for one room
 SAME_HEIGHT = 0.05  # heights stated and drawn that agree to this are one [m]
@@ -50,6 +51,8 @@ def raised_rooms(
         above = sum(
             g.out - g.used for g in glass.glass if g.low is not None and g.low.guid == record.guid
         )
+        if above < LEAST_GLASS:
+            continue
         raised, why = _raised(source, index, result, lids, _share_above(record, above, glass))
         gain = f"{raised.solid.high[2] - record.solid.high[2]:.2f} m"
         what = f"room {record.label}: ends at {record.solid.high[2]:.2f} m, below {above:.2f} m2 of"

@@ -134,16 +134,18 @@ class PhaseLight:
     @cached_property
     def windows(self) -> list[list[WindowLight]]:
         """Luminance of each part [Q] of the window groups in each of its states."""
-        daylight, sky, found = self._traced.daylight.values, self.sky, []
+        # single precision: the noise of D is a hundred thousand times its rounding
+        daylight, sky, found = self._traced.daylight.values.astype(np.float32), self.sky, []
+        whole_sky = sky.whole.astype(np.float32)
         for q, g in enumerate(self._traced.parts.group):
             states = self.filled.systems[g]
-            T, D = [s.transmission for s in states], [daylight[q]] * len(states)
-            whole = phases.room_side_radiance(T, D, sky.whole).astype(np.float32)
+            T = [s.transmission.astype(np.float32) for s in states]
+            whole = phases.room_side_radiance(T, [daylight[q]] * len(states), whole_sky)
             sun: Sequence = [None] * len(states)
             beams: Sequence = [(None, None)] * len(states)
             if self._traced.five_phase:
-                D = [self._traced.direct_daylight[q]] * len(states)
-                sun = phases.room_side_radiance(T, D, sky.sun).astype(np.float32)
+                D = [self._traced.direct_daylight[q].astype(np.float32)] * len(states)
+                sun = phases.room_side_radiance(T, D, sky.sun.astype(np.float32))
                 beams = [self._beams(q, optics) for optics in states]
             lights = zip(whole, sun, beams, strict=True)
             found.append([WindowLight(w, s, *both) for w, s, both in lights])

@@ -100,6 +100,7 @@ class StraightViews:
         """V_d diag(tau) D [S, P], or with a sky's luminance [S, L]."""
         beam, total = self.beam(g, j), 0.0
         for q in self._traced.parts.of(g):
-            outside = daylight[q] if sky is None else daylight[q] @ sky
-            total = total + (self._traced.direct_sensors[:, q] * beam) @ outside
+            ways = [self._traced.direct_sensors[:, q] * beam, daylight[q]]
+            # in the order of least work: few sensors before many hours
+            total = total + np.linalg.multi_dot(ways if sky is None else [*ways, sky])
         return total

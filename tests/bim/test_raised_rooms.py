@@ -89,6 +89,21 @@ def test_stated_ceiling_is_believed(tmp_path, relation):
     assert "kept: " in said(building) and "eiling" in said(building)
 
 
+def test_slab_that_is_no_closed_solid_is_still_between(tmp_path):
+    small, _ = box_model(space_height=LOW)
+    create = small.model.create_entity
+    slab = small.box("IfcSlab", "sheet", (0, 0, 0), (1, 1, 1))
+    z = LOW + 1.3  # under the glass above the space, as the low rim of the opening is
+    ring = [(0.0, 0.7, z), (WIDTH, 0.7, z), (WIDTH, DEPTH, z), (0.0, DEPTH, z)]
+    loop = create("IfcPolyLoop", [create("IfcCartesianPoint", point) for point in ring])
+    face = create("IfcFace", [create("IfcFaceOuterBound", loop, True)])
+    sheet = create("IfcShellBasedSurfaceModel", [create("IfcOpenShell", [face])])
+    slab.Representation.Representations[0].Items = [sheet]
+    slab.Representation.Representations[0].RepresentationType = "SurfaceModel"
+    building = read(tmp_path, small)
+    assert building.spaces[0].raised == 0.0 and building.account.low
+
+
 @pytest.mark.parametrize("case", ["no roof", "most of a roof", "storey above"])
 def test_open_air_and_the_storey_above_are_not_the_room(tmp_path, case):
     small, _ = box_model(space_height=LOW, roof=case == "storey above")
