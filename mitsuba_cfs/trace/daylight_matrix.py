@@ -35,8 +35,8 @@ def add_daylight_paths(
 ) -> None:
     """Follow each path to the sky, where the patch it meets gains the product of reflectances.
 
-    Panes before its own window (a screen behind them) a path passes, as it meets them from the
-    room's side; to what comes back from outdoors windows are black.  A path of one segment may have
+    Where panes stand close before windows (a screen behind them) a path passes those that it meets
+    from the room's side; to what comes back from outdoors windows are black.  A path of one segment may have
     one more by a smooth mirror, which shows the sky and the sun.
     """
     row, position, direction = starts.row, starts.position, starts.direction
@@ -44,6 +44,7 @@ def add_daylight_paths(
     weight = mi.Float(1.0 if weight is None else weight)
     beta = mi.Float(1.0)
     depth = mi.UInt32(0)
+    in_series = tracer.panes_in_series
     while active:
         ray = mi.Ray3f(position, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
@@ -52,7 +53,9 @@ def add_daylight_paths(
         dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
         if active:
-            passed = tracer.leaves(hit, direction, active)
+            passed = mi.Bool(False)
+            if dr.hint(in_series, mode="scalar"):
+                passed = tracer.leaves(hit, direction, active)
             before, face, _ = tracer.surface_at(hit, position, direction, active)
             beyond = mi.Point3f(before - 2 * tracer.epsilon * face)
             after, away, reflectance, mirrored = tracer.bounce(

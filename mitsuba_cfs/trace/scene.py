@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -12,9 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
 from mitsuba_cfs.trace.random_walk import diffuse_direction
+from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.traced_gloss import TracedGloss
 
 OPAQUE = -1  # window index of a triangle that is not glazed
+SERIES_GAP = 1.0  # widest between a screen and its panes [m]
+SERIES_PLACES = 256  # on each window group, from which they are looked for
 
 
 class TracedScene:
@@ -199,6 +203,21 @@ class TracedScene:
         outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
         window = dr.gather(mi.Int32, self.group, hit.prim_index, active) != OPAQUE
         return active & window & (dr.dot(outwards, direction) > 0)
+
+    @cached_property
+    def panes_in_series(self) -> bool:
+        """Whether panes stand close before windows (a screen behind them): both are one way out."""
+        if not self._panes:
+            return False
+        number = dr.arange(mi.UInt32, SERIES_PLACES)
+        for g, group in enumerate(self.groups):
+            u = lattice_2d(number, mi.UInt32(g), 0)
+            out = mi.Vector3f(*map(float, group.frame[2]))
+            start = self.sample_group(g, u) + out * self.epsilon
+            hit = self._met(start, out, number >= 0)
+            if dr.any(self.leaves(hit, out, hit.t < SERIES_GAP)):
+                return True
+        return False
 
     @dr.syntax
     def met_outdoors(
