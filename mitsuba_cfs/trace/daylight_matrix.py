@@ -36,8 +36,8 @@ def add_daylight_paths(
     """Follow each path to the sky, where the patch it meets gains the product of reflectances.
 
     Where panes stand close before windows (a screen behind them) a path passes those that it meets
-    from the room's side; to what comes back from outdoors windows are black.  A path of one segment may have
-    one more by a smooth mirror, which shows the sky and the sun.
+    from the room's side; to what comes back from outdoors windows are black.  A path of one segment
+    may have one more by a smooth mirror, which shows the sky and the sun.
     """
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
