@@ -112,7 +112,8 @@ class _Apart:
             try:
                 (Path(folder) / "task").write_bytes(pickle.dumps(task))
                 with contextlib.suppress(BrokenPipeError):  # it died while it had nothing to do
-                    print(folder, file=process.stdin, flush=True)
+                    process.stdin.write(folder + "\n")
+                    process.stdin.flush()
                 for line in process.stdout or ():
                     done = line.startswith(DONE)
                     if done:
@@ -197,8 +198,13 @@ def _work() -> None:
         except Exception as raised:  # raised again by the parent, whatever it is
             error = raised
         (folder / "answer").write_bytes(pickle.dumps((value, error)))
-        print(DONE, flush=True)
+        _send(DONE)
 
 
 def _tell(text: str) -> None:
-    print(f"{TOLD}{text}", flush=True)
+    _send(f"{TOLD}{text}")
+
+
+def _send(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
+from matplotlib import colormaps
 
 from bim.sensors import sensor_grid
 from bim.shoebox import WindowRectangle, shoebox
@@ -75,6 +76,13 @@ def test_carpet_puts_each_hour_in_its_cell(year) -> None:
     ticks = month_ticks(times)
     assert [t.label + t.rest for t in ticks][:3] == ["Jan", "Feb", "Mar"]
     assert ticks[0].at == pytest.approx(100 * 15.5 / grid.shape[1])
+
+
+@pytest.mark.parametrize("name", ["viridis", "cividis", "turbo"])
+def test_colours_are_those_of_matplotlib(name) -> None:
+    scale = ColourScale(0.0, 10.0, "x", "lx", colours=name)
+    values = np.linspace(-1, 11, 4001)
+    assert np.array_equal(scale.rgba(values), colormaps[name](scale.fraction(values), bytes=True))
 
 
 def test_carpet_of_quarter_hours_and_of_a_few_days() -> None:
