@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
 KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance")
-PAINT_KEYS = ("select", "visible", "solar")
+PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 
 
 @dataclass(frozen=True, slots=True)

@@ -219,19 +219,25 @@ class PictureSun:
             part = slice(start, start + step)
             way = places_in_pixels(self._view, self.pixels[self._surface[column[part]]])
             to_sun = np.repeat(suns[hour[part]], EDGE_PLACES, axis=0)
-            shown = self._beam_seen(way, to_sun).reshape(-1, EDGE_PLACES).mean(axis=1)
+            number = (column[part, None] * EDGE_PLACES + np.arange(EDGE_PLACES)).ravel()
+            shown = self._beam_seen(way, to_sun, number).reshape(-1, EDGE_PLACES).mean(axis=1)
             found[hour[part], column[part]] = shown * light[hour[part]]
 
-    def _beam_seen(self, way: NDArray, suns: NDArray) -> NDArray[np.float32]:
-        """Luminance [r] of surfaces in directions from the eye per unit illuminance of suns."""
+    def _beam_seen(
+        self, way: NDArray, suns: NDArray, number: NDArray[np.int64]
+    ) -> NDArray[np.float32]:
+        """Luminance [r] of surfaces in directions from the eye per unit illuminance of suns.
+
+        Args: number: [r] of the place, that its point on the disc goes by.
+        """
         tracer, direction = self._inside, mi.Vector3f(way.T.astype(np.float32))
         ray = mi.Ray3f(self._eye, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False)
         shown = hit.is_valid()
         place, normal, rho = tracer.surface_at(hit, self._eye, direction, shown)
         shown &= dr.gather(mi.Int32, tracer.group, hit.prim_index, shown) == OPAQUE
-        number = dr.arange(mi.UInt32, len(way))
-        to_sun = on_disc_of(mi.Vector3f(suns.T.astype(np.float32)), number)
+        places = mi.UInt32(number.astype(np.uint32))
+        to_sun = on_disc_of(mi.Vector3f(suns.T.astype(np.float32)), places)
         cosine = dr.dot(normal, to_sun)
         tau = self._straight(place, to_sun, shown & (cosine > 0))
         return dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0).numpy()

@@ -113,7 +113,8 @@ def _flux(
     lane = dr.arange(mi.UInt32, WINDOW_POINTS * len(suns))
     hour = lane // WINDOW_POINTS
     point = lane - hour * WINDOW_POINTS
-    position = inside.sample_group(group, lattice_2d(point, hour, 0))
+    # the same points in all hours: an hour's light does not hang on those computed with it
+    position = inside.sample_group(group, lattice_2d(point, mi.UInt32(group), 0))
     towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), hour)
     to_sun = on_disc_of(towards, point)
     local = inside.to_group(group, to_sun)

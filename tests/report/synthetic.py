@@ -172,7 +172,8 @@ def glare_results(space: Space, hours, illuminance, size: int) -> GlareResults:
         ev = float(illuminance[hour].mean() * 0.7)
         dgp = float(np.clip(5.87e-5 * ev + 0.22 - 0.02 * rank, 0.18, 1.0))
         glare = {"dgp": dgp, "ev": ev, "dgi": 19.2 - rank, "ugr": 21.7 - rank, "vcp": 43.0,
-                 "cgi": 24.1 - rank, "sources": float(3 - min(rank, 2))}  # fmt: skip
+                 "cgi": 24.1 - rank, "sources": float(3 - min(rank, 2)),
+                 "dgp_standard_error": 2e-5}  # fmt: skip
         pictures.append(LuminancePicture(int(hour), luminance, glare, mask))
     return GlareResults(view, tuple(pictures))
 

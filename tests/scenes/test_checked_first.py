@@ -133,7 +133,10 @@ FLOOR = "g: 0.01 is below the solar transmittance 0.154, the least that g can be
 MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "run, head": (lambda p: _run(building="word.ifc"), "word.ifc: not an IFC file"),
     "run, schema": (lambda p: _run(building="old.ifc"), "old.ifc: schema IFC1X5"),
-    "run, corrections": (lambda p: _run(building="corrected.ifc"), "toml: leaveout: expected"),
+    "run, corrections": (
+        lambda p: _run(building="corrected.ifc"),
+        "toml: leaveout: no such key; did you mean leave_out?",
+    ),
     "run, weather": (lambda p: _run(weather="short.epw"), SHORT),
     "run, BSDF": (lambda p: _run(cfs="bad.xml"), "bad.xml: is not well-formed"),
     "run, --space": (lambda p: _run("--space", " "), "--space: expected the name"),

@@ -16,7 +16,7 @@ FEW_RAYS = ["--quick", "--size", "64", "--method", "three-phase"]
 @pytest.fixture
 def holed(monkeypatch) -> list[str]:
     """The biggest triangle of every room is left out of what is traced; the demo's files."""
-    whole = daylight.interior_surfaces
+    whole = daylight.furnished_surfaces
 
     def without(space, band="visible"):
         found = whole(space, band)
@@ -25,7 +25,7 @@ def holed(monkeypatch) -> list[str]:
         return Surfaces(*parts, found.names)
 
     for module in (daylight, holes):
-        monkeypatch.setattr(module, "interior_surfaces", without)
+        monkeypatch.setattr(module, "furnished_surfaces", without)
     return [str(OFFICE), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND), "--space", "A"]
 
 

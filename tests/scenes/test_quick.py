@@ -18,6 +18,7 @@ from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat import study_file as heat_file
 from scenes.room.glare import default_hours
 from scenes.room.options import RoomOptions
+from scenes.run import rooms as rooms_of_a_run
 from scenes.run import run as job
 from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study
@@ -127,8 +128,8 @@ def three_rooms(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Rooms of which the third equals the first, each computed by a stub."""
     rooms = [SimpleNamespace(guid=g, label=g.upper(), template="") for g in ("a", "b", "c")]
     a, b, c = rooms
-    monkeypatch.setattr(job, "template_rooms", lambda spaces: [(a, c), (b,)])
-    monkeypatch.setattr(job, "same_systems", lambda *_: False)
+    monkeypatch.setattr(rooms_of_a_run, "template_rooms", lambda spaces: [(a, c), (b,)])
+    monkeypatch.setattr(rooms_of_a_run, "same_systems", lambda *_: False)
     return SimpleNamespace(spaces=rooms, building=None, systems={}, weather=None, operation=None)
 
 
