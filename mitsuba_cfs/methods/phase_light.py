@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
+from mitsuba_cfs.methods.group_light import SensorLight, WindowLight
 from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
@@ -87,25 +87,6 @@ class PhaseSystems:
                 seed=chosen.seed,
             )  # fmt: skip
         return self._seen[state]
-
-
-@dataclass(frozen=True, slots=True)
-class WindowLight:
-    """The luminance of a part of a window group towards the room in one state."""
-
-    whole: NDArray[np.float32]  # [K, L] T D s [cd/m2]
-    sun: NDArray[np.float32] | None  # [K, L] T D_d s_d, the sun alone
-    beam: NDArray[np.float32] | None  # [K, L] what of this goes straight on
-    beam_at_sun: NDArray[np.float32] | None  # [K, L] the same at the sun's own angle
-
-
-@dataclass(frozen=True, slots=True)
-class SensorLight:
-    """What a window group in one state gives to the sensors, the eye last [lx]."""
-
-    diffuse: NDArray[np.float64]  # [S, L] V T D s - V_d T D_d s_d + the reflected beam's own angle
-    sun: NDArray[np.float64] | None  # [S, L] C_ds s_sun
-    sun_error: NDArray[np.float64] | float  # [S] standard error of its sum over the hours
 
 
 class PhaseLight:

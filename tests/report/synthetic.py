@@ -124,7 +124,8 @@ def operation_result(times, beam, daylight) -> OperationResult:
 def annual_glare(times, sun, beam) -> pd.DataFrame:
     """Glare that follows the sun on the facade, missing at night."""
     dgp = np.where(sun[:, 2] > 0, 0.2 + 0.35 * beam, np.nan)
-    return pd.DataFrame({"dgp": dgp, "ev": (dgp - 0.184) / 6.22e-5}, index=times)
+    columns = {"dgp": dgp, "dgp_standard_error": 0 * dgp + 2e-5, "ev": (dgp - 0.184) / 6.22e-5}
+    return pd.DataFrame(columns, index=times)
 
 
 def daylight_result(space: Space, outside, beam, rng) -> DaylightResult:

@@ -7,14 +7,16 @@ from types import SimpleNamespace
 import scenes.run.run
 from bim.ifc.building import read_ifc
 from scenes.commands.run import _print_account
-from tests.bim.small_ifc import box_model
+from tests.bim.small_ifc import DEPTH, WIDTH, box_model
 
 
 def test_run_begins_with_the_account_and_notes_a_model_that_will_not_do(
     tmp_path, monkeypatch, capsys
 ):
     path = tmp_path / "model.ifc"
-    box_model(space_height=1.2, roof=False)[0].model.write(str(path))
+    small, _ = box_model(space_height=1.2)
+    small.box("IfcCovering", "ceiling", (0.0, 0.0, 1.2), (WIDTH, DEPTH, 0.05))
+    small.model.write(str(path))
     building = read_ifc(path)
     said: list[str] = []
 

@@ -27,7 +27,7 @@ from tests.scenes.writing_jobs import JOBS, Job, Place, heavy_ones_slow, refused
 
 pytestmark = pytest.mark.early
 
-WRITES_NOTHING = {"doctor", "bsdf check", "bsdf info", "bsdf eval"}
+WRITES_NOTHING = {"doctor", "bsdf check", "bsdf info", "bsdf eval", "ifc query"}
 SHOWN = ("thermal", "sky wea")  # of those that need a process of their own, the rest slow
 PROCESSES = [pytest.param(n, marks=() if n in SHOWN else pytest.mark.slow) for n in JOBS]
 PIPES = [pytest.param(n, marks=() if n == "sky wea" else pytest.mark.slow) for n in JOBS]

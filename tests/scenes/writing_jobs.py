@@ -95,6 +95,12 @@ JOBS = {
         lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out],
         "out.png",
     ),
+    "bsdf thermal": Job(
+        lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--out", out], "out.csv"
+    ),
+    "bsdf thermal --toml": Job(
+        lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--toml", out], "out.toml"
+    ),
     "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
     "bsdf combine": Job(
         lambda _, out: ["bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", out], "out.xml"
@@ -123,7 +129,7 @@ JOBS = {
     "bench": Job(lambda _, out: ["bench", "--json", out], "out.json"),
 }  # fmt: skip
 # they take ten seconds and more; the same code writes for the others, which stay quick
-HEAVY = ("study", "study --write-ifc", "demo", "pv", "ifc survey")
+HEAVY = ("study", "study --write-ifc", "demo", "pv", "ifc survey", "comply", "comply --write-ifc")
 
 
 def heavy_ones_slow(names: Iterable[str]) -> list[ParameterSet]:
