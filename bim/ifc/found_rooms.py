@@ -92,9 +92,7 @@ class _Search:
     ) -> tuple[int, list[manifold3d.Manifold]]:
         """Number of the first attempt (bodies besides, gap) that finds rooms, and their solids."""
         for _ in range(MOST_LEFT_OUT + 1):
-            left = self._until - time.monotonic()
-            if left <= 0:
-                break
+            left = max(self._until - time.monotonic(), 0.0)  # where none is left, that is said
             meshes = [body for *_, body in self._bodies]
             try:
                 number, found = answer_apart(
