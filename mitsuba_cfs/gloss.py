@@ -147,7 +147,7 @@ def radiance_material(name: str, reflectance: float, gloss: Gloss | None = None)
 
 
 def pane_shares(
-    cosine: ArrayLike, index: float, transmissivity: float
+    cosine: ArrayLike, index: ArrayLike, transmissivity: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Transmittance and reflectance [..] of a pane at cosines of incidence, unpolarised light."""
     tau, rho = polarised_shares(cosine, index, transmissivity)
@@ -155,13 +155,13 @@ def pane_shares(
 
 
 def polarised_shares(
-    cosine: ArrayLike, index: float, transmissivity: float
+    cosine: ArrayLike, index: ArrayLike, transmissivity: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Transmittance and reflectance [2, ..] of a pane for either polarisation.
 
     t = (1 - r)2 a / (1 - r2 a2), rho = r + r t a.
     """
-    cosine = np.asarray(cosine, dtype=float)
+    cosine, index = np.asarray(cosine, dtype=float), np.asarray(index, dtype=float)
     inner = np.sqrt(1 - (1 - cosine**2) / index**2)
     a = np.clip(transmissivity, 1e-12, 1.0) ** (1 / inner)
     r = _fresnel(cosine, index)
@@ -169,7 +169,9 @@ def polarised_shares(
     return tau, r + r * a * tau
 
 
-def _fresnel(cosine: NDArray[np.float64], index: float) -> NDArray[np.float64]:
+def _fresnel(
+    cosine: NDArray[np.float64], index: NDArray[np.float64] | float
+) -> NDArray[np.float64]:
     """Fresnel's reflectances [2, ..] of both polarisations at the surface of a dense body."""
     inner = np.sqrt(1 - (1 - cosine**2) / index**2)
     return np.stack(

@@ -7,10 +7,11 @@ Imaging System", 3.1.
 from __future__ import annotations
 
 import numpy as np
+import shapely
 import trimesh
 from numpy.typing import NDArray
 
-from bim.planes import newell_normal, plane_through
+from bim.planes import newell_normal, plane_through, triangulated
 from bim.radiance.primitives import Primitive
 
 SIDES = 32  # of a circle
@@ -44,48 +45,15 @@ def triangles_of(primitive: Primitive) -> NDArray[np.float64]:
 
 
 def polygon_triangles(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A plane polygon [n, 3] as triangles, concave or with holes on seams, by cutting ears."""
+    """A plane polygon [n, 3] as triangles, concave or with holes on seams."""
     area = newell_normal(corners)
-    size = float(np.linalg.norm(area))
-    if not size > 0:
+    if not np.linalg.norm(area) > 0:
         return np.empty((0, 3, 3))
     plane = plane_through(corners[0], area)
-    flat = plane.to_plane(corners)[:, :2]
-    return corners[np.array(_ears(flat), dtype=np.int64).reshape(-1, 3)]
-
-
-def _ears(flat: NDArray[np.float64]) -> list[tuple[int, int, int]]:
-    """Corners of the triangles of a counter-clockwise ring [n, 2] that may touch itself."""
-    left, found = list(range(len(flat))), []
-    smallest = 1e-12 * float(np.ptp(flat, axis=0).max()) ** 2
-    while len(left) > 2:
-        ring = flat[left]
-        before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
-        turn = _cross(ring - before, after - ring)
-        order = np.argsort(np.abs(turn) > smallest, kind="stable")  # corners on a line go first
-        for k in order:
-            a, b, c = before[k], ring[k], after[k]
-            if abs(turn[k]) <= smallest:
-                del left[k]
-                break
-            if turn[k] > 0 and not _any_within(ring, (a, b, c)):
-                found.append((left[k - 1], left[k], left[(k + 1) % len(left)]))
-                del left[k]
-                break
-        else:
-            return found  # crosses itself; what is left has no inside
-    return found
-
-
-def _any_within(points: NDArray[np.float64], corners: tuple[NDArray[np.float64], ...]) -> bool:
-    inside = np.ones(len(points), dtype=bool)
-    for start, end in zip(corners, (*corners[1:], corners[0]), strict=True):
-        inside &= _cross(end - start, points - start) > 1e-12
-    return bool(inside.any())
-
-
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    whole = shapely.make_valid(shapely.Polygon(plane.to_plane(corners)[:, :2]))
+    parts = [part for part in shapely.get_parts(whole) if part.geom_type == "Polygon"]
+    flat = np.concatenate([np.empty((0, 3, 2)), *map(triangulated, parts)])
+    return plane.to_world(flat.reshape(-1, 2)).reshape(-1, 3, 3)
 
 
 def sphere(centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.en410 import solar_value, visible_value
 from mitsuba_cfs.bsdf.glazing import BRONZE_SHAPE, CLEAR_ABOVE, CLEAR_SHAPE
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import pane_shares
 
 FloatArray = NDArray[np.float64]
 EMISSIVITY = 0.84  # of glass, where a file states none
@@ -252,19 +253,8 @@ def _uncoated(tau: FloatArray, rho: FloatArray, theta: FloatArray) -> tuple[Floa
     root = np.sqrt(np.clip(surface, 1e-9, 0.9))
     index = (1 + root) / (1 - root)
     inner = np.where(rho > 1e-6, (rho - surface) / np.maximum(surface * tau, 1e-12), tau)
-    inner = np.clip(inner, 1e-9, 1.0)
-    c = np.cos(np.minimum(theta, np.radians(89.999)))[None, :]
-    ci = np.sqrt(1 - (1 - c**2) / index**2)
-    path = inner ** (1 / ci)
-    taus, rhos = [], []
-    for r in (
-        ((c - index * ci) / (c + index * ci)) ** 2,
-        ((index * c - ci) / (index * c + ci)) ** 2,
-    ):
-        t = (1 - r) ** 2 * path / (1 - (r * path) ** 2)
-        taus.append(t)
-        rhos.append(r * (1 + path * t))
-    tau, rho = np.mean(taus, axis=0), np.mean(rhos, axis=0)
+    cosine = np.cos(np.minimum(theta, np.radians(89.999)))[None, :]
+    tau, rho = pane_shares(cosine, index, np.clip(inner, 1e-9, 1.0))
     return tau, rho, rho
 
 

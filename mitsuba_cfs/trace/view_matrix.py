@@ -81,27 +81,16 @@ def view_matrix(
         _add_direct(tracer, bins, matrix, place, normal, samples=n, key=key)
         values = matrix.numpy().reshape(S, -1)
         for block, sensors in enumerate(blocks if max_depth > 1 else []):
+            chosen = mi.UInt32(sensors)
+            here = [dr.gather(type(of), of, chosen) for of in (place, normal)]
+            block_key = mi.sample_tea_32(key, mi.UInt32(block))[0]
             hits, paths = shares(len(sensors), n)
-            rows = indirect_rows(
-                tracer,
-                bins,
-                dr.gather(mi.Point3f, place, mi.UInt32(sensors)),
-                dr.gather(mi.Vector3f, normal, mi.UInt32(sensors)),
-                hits=hits,
-                paths=paths,
-                max_depth=max_depth,
-                key=mi.sample_tea_32(key, mi.UInt32(block))[0],
+            values[sensors] += indirect_rows(
+                tracer, bins, *here, hits=hits, paths=paths, max_depth=max_depth, key=block_key
             )
-            values[sensors] += rows
             if tracer.gloss is not None:
                 values[sensors] += mirrored_rows(
-                    tracer,
-                    bins,
-                    dr.gather(mi.Point3f, place, mi.UInt32(sensors)),
-                    dr.gather(mi.Vector3f, normal, mi.UInt32(sensors)),
-                    samples=n,
-                    max_depth=max_depth,
-                    key=mi.sample_tea_32(key, mi.UInt32(block))[0],
+                    tracer, bins, *here, samples=n, max_depth=max_depth, key=block_key
                 )
         return values.reshape(shape)
 
