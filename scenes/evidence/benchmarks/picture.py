@@ -31,8 +31,9 @@ from scenes.evidence.validation.rendered_pictures import (
     DIRECTION,
     EYE,
     PicturedSystem,
-    Radiance,
     moments,
+    rendered_room,
+    set_moment,
 )
 
 SIZE, COARSE = 800, 4  # [px] of the picture; of the squares that errors are of
@@ -54,7 +55,7 @@ class PictureScene:
         self.room = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         self.sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
         self.folder = folder
-        Radiance(folder, fenestration).set_sky(moment)
+        set_moment(rendered_room(folder, fenestration), moment)
 
     def ours(self, size: int, samples: int, **options) -> NDArray[np.float32]:
         """Our picture."""

@@ -24,11 +24,10 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.gloss import Gloss, lacquer, mirror
-from mitsuba_cfs.images.hdr import EFFICACY, read_hdr
-from mitsuba_cfs.images.view import View, fisheye, format_view
+from mitsuba_cfs.images.view import View, fisheye
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 from mitsuba_cfs.trace.estimate import Stopping
 from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
@@ -36,15 +35,15 @@ from mitsuba_cfs.trace.picture_paths import point_in_time_picture
 from mitsuba_cfs.trace.point_in_time import point_in_time
 from scenes.cost import room
 from scenes.evidence.benchmarks import radiance
+from scenes.evidence.validation.rendered_scene import RenderedScene
 
 EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
 TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
 FACADE = 10.0  # before the window [m]
-SIZE, FINER = 200, 4  # [px]; rpict's are finer, and averaged
+SIZE = 200  # [px]
 SUN = np.array([0.25, -1.0, 0.8]) / np.linalg.norm([0.25, -1.0, 0.8])
 SUN_ILLUMINANCE = {"mirror": 80_000.0, "metal": 15_000.0, "floor": 0.0}  # normal to it [lx]
 SKY_ILLUMINANCE = 12_000.0  # on the ground [lx]
-QUALITY = "-dc 1 -dt 0 -dj 0 -ds 0.1 -st 0"
 CACHED = "-ps 1 -pa 0 -ss 16 -ab 5 -ad 512 -as 0 -aa 0.2 -ar 32 -lr 8 -lw 1e-3"  # of the pictures
 POINT = "-u+ -ss 1e5 -ab 8 -ad 16384 -aa 0 -lr 20 -lw 1e-9"  # of Ev; several rays to each lobe
 MATERIALS: dict[str, Gloss] = {
@@ -123,63 +122,29 @@ def _with_facade(body: Surfaces, gloss: Gloss) -> Surfaces:
     )
 
 
-class Radiance:
-    """A case in a folder, rendered by Radiance."""
-
-    def __init__(self, given: Case, folder: Path) -> None:
-        body = len(given.interior.triangles)
-        radiance.write_surfaces(given.interior, folder / "room.rad")
-        after = np.arange(len(given.exterior.triangles)) >= body
-        radiance.write_surfaces(given.exterior.some(after), folder / "outdoors.rad")
-        library = radiance.environment()["RAYPATH"].split(":")[-1]
-        cal = (Path(library) / "reinhart.cal").read_text()
-        (folder / "sky.cal").write_text(f"MF : 4;\n{cal}")
-        values = " ".join(f"{v / EFFICACY:.8g}" for v in given.patches)
-        last = len(given.patches) - 1
-        (folder / "sky.dat").write_text(f"1\n0 {last} {last + 1}\n{values}\n")
-        angle, strength = 2 * np.degrees(SUN_RADIUS), f" {given.sun_luminance / EFFICACY:.8g}"
-        sun = (
-            f"void light solar\n0\n0\n3{3 * strength}\nsolar source sun\n0\n0\n"
-            f"4 {SUN[0]:.9g} {SUN[1]:.9g} {SUN[2]:.9g} {angle:.6g}\n"
-        )
-        (folder / "sky.rad").write_text(
-            "void brightdata patches\n4 noop sky.dat sky.cal rbin\n0\n0\n"
-            "patches glow sky_glow\n0\n0\n4 1 1 1 0\nsky_glow source sky\n0\n0\n4 0 0 1 360\n"
-            + (sun if given.sun_luminance else "")
-        )
-        radiance.run("oconv sky.rad room.rad outdoors.rad > scene.oct", folder)
-        self.folder = folder
-
-    def picture(self, view: View) -> np.ndarray:
-        """Luminance [ny, nx], each pixel the mean of finer ones."""
-        n = FINER
-        size = f"-x {n * view.width} -y {n * view.height}"
-        command = f"rpict {QUALITY} {CACHED} {format_view(view)} {size} scene.oct > fine.hdr"
-        radiance.run(command, self.folder)
-        fine = read_hdr(self.folder / "fine.hdr").luminance
-        return fine.reshape(view.height, n, view.width, n).mean(axis=(1, 3))
-
-    def eye_illuminance(self, view: View, points: int) -> tuple[float, float]:
-        """Illuminance at the eye by rtrace, and its standard error."""
-        command = f"rtrace -h -I+ {QUALITY} {POINT} scene.oct"
-        given = radiance.sensors_text([view.position] * points, [view.direction] * points)
-        lines = radiance.run(command, self.folder, given).decode().split()
-        values = np.array(lines, dtype=float).reshape(points, -1)[:, 0] * EFFICACY
-        return float(values.mean()), float(values.std(ddof=1) / np.sqrt(points))
+def rendered(given: Case, folder: Path) -> RenderedScene:
+    """A case in a folder, for Radiance."""
+    body = len(given.interior.triangles)
+    radiance.write_surfaces(given.interior, folder / "room.rad")
+    after = np.arange(len(given.exterior.triangles)) >= body
+    radiance.write_surfaces(given.exterior.some(after), folder / "outdoors.rad")
+    scene = RenderedScene(folder, "room.rad outdoors.rad", CACHED, POINT)
+    scene.set_sky(given.patches, 4, SUN, given.sun_luminance)
+    return scene
 
 
 def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Outcome:
     """A case in both programs."""
     given, view = case(name), fisheye(EYE, DIRECTION, size)
     folder.mkdir(parents=True, exist_ok=True)
-    theirs = Radiance(given, folder)
+    theirs = rendered(given, folder)
     ev, ev_error = theirs.eye_illuminance(view, points)
     found, plain = (_eye(one, view) for one in (given, _without_gloss(given)))
     picture = point_in_time_picture(given.lit, given.sky, view, samples=64)
-    rendered = theirs.picture(view)
+    picture_of_theirs = theirs.picture(view)
     phases, at_point = _five_phase(given, view)
-    np.savez(folder / "pictures.npz", ours=picture, theirs=rendered, five_phase=phases)
-    ours, rated = evaluate(picture, view), evaluate(rendered, view, illuminance=ev)
+    np.savez(folder / "pictures.npz", ours=picture, theirs=picture_of_theirs, five_phase=phases)
+    ours, rated = evaluate(picture, view), evaluate(picture_of_theirs, view, illuminance=ev)
     third = evaluate(phases, view)
     return Outcome(
         name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]), ours.Ev,

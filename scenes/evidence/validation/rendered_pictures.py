@@ -33,11 +33,10 @@ from mitsuba_cfs.bsdf.periodic import plastic
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.evaluation import evaluate
-from mitsuba_cfs.images.hdr import EFFICACY, read_hdr
-from mitsuba_cfs.images.view import View, fisheye, format_view
+from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
-from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE, is_up
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.picture_paths import point_in_time_picture
@@ -45,15 +44,15 @@ from mitsuba_cfs.trace.systems import lit_system
 from scenes.cost import room
 from scenes.evidence.benchmarks import radiance
 from scenes.evidence.benchmarks.annual_product import SYSTEM, WEATHER
+from scenes.evidence.validation.rendered_scene import RenderedScene
 
 EYE, DIRECTION = (1.8, 2.0, 1.2), (0.0, -1.0, 0.0)
-SIZE, FINER = 200, 4  # [px] of the pictures; rpict's are finer, and averaged
+SIZE = 200  # [px] of the pictures
 SAMPLES = 32
 SUBDIVISION = 4
 MONTHS, TIMES = (12, 3, 6), (9, 11, 13, 15)  # of the twelve suns; the month's clearest day
 INDEX, TRANSMISSIVITY = 1.52, 0.90  # of Radiance's `glass`: refractive index; inner transmittance
 TREE_LEVELS, TREE_SAMPLES = 4, 65536
-QUALITY = "-dc 1 -dt 0 -dj 0 -ds 0.1 -st 0"
 CACHED = "-ps 1 -pa 0 -ss 4 -ab 4 -ad 256 -as 0 -aa 0.25 -ar 16 -lr 8 -lw 1e-3"  # of the pictures
 POINT = "-u+ -ss 1 -ab 8 -ad 32768 -aa 0 -lr 20 -lw 1e-9"  # of Ev, so many times:
 POINTS = 8
@@ -142,52 +141,20 @@ def _tree() -> BsdfFile:
     return BsdfFile({"Visible": trees[0]}, name="blind", manufacturer="mitsuba-cfs", thickness=0.08)
 
 
-class Radiance:
-    """The room in a folder, rendered by Radiance."""
+def rendered_room(folder: Path, fenestration: PicturedSystem) -> RenderedScene:
+    """The room in a folder, for Radiance."""
+    radiance.write_surfaces(room.room(), folder / "room.rad")
+    lines = [fenestration.material]
+    window = room.window_groups()[0].windows[0]
+    for i, triangle in enumerate(window.triangles):  # normals into the room
+        lines.append(radiance.polygon("window", f"pane{i}", triangle[::-1]))
+    (folder / "window.rad").write_text("\n".join(lines))
+    return RenderedScene(folder, "room.rad window.rad", CACHED, POINT)
 
-    def __init__(self, folder: Path, fenestration: PicturedSystem) -> None:
-        radiance.write_surfaces(room.room(), folder / "room.rad")
-        lines = [fenestration.material]
-        window = room.window_groups()[0].windows[0]
-        for i, triangle in enumerate(window.triangles):  # normals into the room
-            lines.append(radiance.polygon("window", f"pane{i}", triangle[::-1]))
-        (folder / "window.rad").write_text("\n".join(lines))
-        library = radiance.environment()["RAYPATH"].split(":")[-1]
-        cal = (Path(library) / "reinhart.cal").read_text()
-        (folder / "sky.cal").write_text(f"MF : {SUBDIVISION};\n{cal}")
-        self.folder = folder
 
-    def set_sky(self, moment: Moment) -> None:
-        """Compile the scene under a sky."""
-        values = " ".join(f"{v / EFFICACY:.8g}" for v in moment.patches)
-        last = len(moment.patches) - 1
-        (self.folder / "sky.dat").write_text(f"1\n0 {last} {last + 1}\n{values}\n")
-        sun, radiance_ = moment.sun, f" {moment.sun_luminance / EFFICACY:.8g}"
-        angle = 2 * np.degrees(SUN_RADIUS)
-        (self.folder / "sky.rad").write_text(
-            "void brightdata patches\n4 noop sky.dat sky.cal rbin\n0\n0\n"
-            "patches glow sky_glow\n0\n0\n4 1 1 1 0\nsky_glow source sky\n0\n0\n4 0 0 1 360\n"
-            f"void light solar\n0\n0\n3{3 * radiance_}\nsolar source sun\n0\n0\n"
-            f"4 {sun[0]:.9g} {sun[1]:.9g} {sun[2]:.9g} {angle:.6g}\n"
-        )
-        radiance.run("oconv sky.rad room.rad window.rad > scene.oct", self.folder)
-
-    def picture(self, view: View) -> NDArray[np.float64]:
-        """Luminance [ny, nx], each pixel the mean of finer ones."""
-        n = FINER
-        size = f"-x {n * view.width} -y {n * view.height}"
-        command = f"rpict {QUALITY} {CACHED} {format_view(view)} {size} scene.oct > fine.hdr"
-        radiance.run(command, self.folder)
-        fine = read_hdr(self.folder / "fine.hdr").luminance
-        return fine.reshape(view.height, n, view.width, n).mean(axis=(1, 3))
-
-    def eye_illuminance(self, view: View) -> tuple[float, float]:
-        """Illuminance at the eye by rtrace, and its standard error."""
-        command = f"rtrace -h -I+ {QUALITY} {POINT} scene.oct"
-        given = radiance.sensors_text([view.position] * POINTS, [view.direction] * POINTS)
-        lines = radiance.run(command, self.folder, given).decode().split()
-        values = np.array(lines, dtype=float).reshape(POINTS, -1)[:, 0] * EFFICACY
-        return float(values.mean()), float(values.std(ddof=1) / np.sqrt(POINTS))
+def set_moment(scene: RenderedScene, moment: Moment) -> None:
+    """Compile the scene under the sky of a moment."""
+    scene.set_sky(moment.patches, SUBDIVISION, moment.sun, moment.sun_luminance)
 
 
 def outcomes(
@@ -197,19 +164,19 @@ def outcomes(
     view = fisheye(EYE, DIRECTION, size)
     for name in systems:
         fenestration = PicturedSystem(name, folder)
-        peer = Radiance(folder, fenestration)
+        peer = rendered_room(folder, fenestration)
         lit = LitRoom(room.room(), room.NOTHING, room.window_groups(), [fenestration.system])
         for moment in chosen:
             start = time.perf_counter()
             sky = Sky(moment.patches, moment.sun, moment.sun_luminance)
             picture = point_in_time_picture(lit, sky, view, samples=SAMPLES)
             seconds = time.perf_counter() - start
-            peer.set_sky(moment)
+            set_moment(peer, moment)
             start = time.perf_counter()
             theirs = peer.picture(view)
             peer_seconds = time.perf_counter() - start
             np.savez(folder / f"{name} {moment.name}.npz", ours=picture, theirs=theirs)
-            ev, ev_error = peer.eye_illuminance(view)
+            ev, ev_error = peer.eye_illuminance(view, POINTS)
             ours = evaluate(picture, view)
             rated = evaluate(theirs, view, illuminance=ev)
             altitude = float(np.degrees(np.arcsin(moment.sun[2])))
