@@ -109,6 +109,19 @@ def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
     return read_ifc(path, join=options.join, furniture=options.furniture, progress=progress)
 
 
+def _check_there(path: Path) -> None:
+    if not path.is_file():
+        raise DataError("no such file", file=path)
+
+
+def _read_radiance(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.radiance.building import read_radiance_building
+
+    progress("opening", 0.0)
+    return read_radiance_building(path, options.apertures)
+
+
 FLAGS = {"join": "join", "apertures": "aperture"}
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
-FORMATS: tuple[BuildingFormat, ...] = (IFC,)
+RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures",))
+FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE)

@@ -10,6 +10,7 @@ from scenes import quick
 from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    aperture_option,
     eye_height_option,
     furniture_option,
     glare_sources_option,
@@ -42,6 +43,7 @@ _DEFAULT = YearOptions(Path(), Path())
 @space_option("space", "default: the first with a window", several=False)
 @join_option
 @furniture_option
+@aperture_option
 @view_option("views", "or a file of them", several=True)
 @click.option(
     "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."
