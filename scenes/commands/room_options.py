@@ -28,6 +28,10 @@ join_option = click.option(
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."
 )
+aperture_option = click.option(
+    "--aperture", "apertures", multiple=True, metavar="MATERIAL",
+    help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
+)  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="EPW file, hourly."
 )

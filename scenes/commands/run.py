@@ -8,9 +8,10 @@ import click
 
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE, FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    aperture_option,
     furniture_option,
     glare_sources_option,
     glare_sun_option,
@@ -36,7 +37,7 @@ _DEFAULT = RoomOptions()
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=BUILDING_FILE, metavar="BUILDING")
 @needed_weather_option
 @system_option
 @out_folder_option
@@ -46,6 +47,7 @@ _DEFAULT = RoomOptions()
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @join_option
 @furniture_option
+@aperture_option
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -87,18 +89,20 @@ def command(
     g_value: float | None,
     join: tuple[str, ...],
     furniture: bool,
+    apertures: tuple[str, ...],
     operation: Path | None,
     no_cache: bool,
     quick: bool,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
+    """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
-        building, weather, system, operation, spaces, join, furniture, u_value, g_value,
+        building, weather, system, operation, spaces, join, furniture, apertures,
+        u_value, g_value,
         cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen),
     )  # fmt: skip
     run_to_folder(options, out)
