@@ -19,7 +19,7 @@ from scenes.comply.assess import (
     assess_room,
     values_of,
 )
-from scenes.comply.findings import Findings, GridLight, calendar_of
+from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
 from scenes.comply.sunlight import SunExposure
 from scenes.comply.uses import RoomUse
@@ -122,7 +122,9 @@ def test_levels_of_glare(calendar, share, value, level):
     base = {"minimum": 0.45, "medium": 0.40, "high": 0.35}.get(level, 0.2)
     dgp = np.full(1000, base)
     dgp[: int(1000 * share)] = value
-    assert reached("en17037", Findings(calendar, dgp=dgp))["glare"] == level
+    calm = np.full(len(dgp), 0.1)
+    seats = SeatGlare(np.zeros((2, 3)), np.zeros((2, 3)), np.stack([calm, dgp]), True)
+    assert reached("en17037", Findings(calendar, glare=seats))["glare"] == level  # the worse seat
 
 
 def test_what_was_not_computed_is_no_failure(calendar):

@@ -145,12 +145,30 @@ def test_annual_sunlight_exposure_needs_more_than_250_hours():
 
 
 def test_blinds_close_on_more_than_two_percent():
-    direct = np.zeros((3, 100))
-    direct[1, :2], direct[2, :3] = 1000.0, 1000.0
-    np.testing.assert_array_equal(lm83.blinds_closed(direct), [False, False, True])
+    direct = np.zeros((1, 3, 100))
+    direct[0, 1, :2], direct[0, 2, :3] = 1000.0, 1000.0
+    np.testing.assert_array_equal(lm83.blinds_operated(direct), [[False, False, True]])
     weights = np.ones(100)
     weights[0] = 3.0
-    np.testing.assert_array_equal(lm83.blinds_closed(direct, areas=weights), [False, True, True])
+    found = lm83.blinds_operated(direct, areas=weights)
+    np.testing.assert_array_equal(found, [[False, True, True]])
+
+
+def test_blinds_close_no_further_than_two_percent_ask():
+    """What counts is the sun of all open groups; the combination with most of it left is taken."""
+    direct = np.zeros((3, 6, 100))
+    direct[0, 0, :2], direct[1, 0, 2:4] = 1000.0, 1000.0  # 2 and 2: one of them closes, the last
+    direct[0, 1, :1], direct[1, 1, 2:4] = 1000.0, 1000.0  # 1 and 2: the first closes, 2 are left
+    direct[0, 2, :5], direct[1, 2, 5:7] = 1000.0, 1000.0  # 5 and 2: the second may stay open
+    direct[0, 3, :5], direct[1, 3, 5:9] = 1000.0, 1000.0  # 5 and 4: neither may
+    direct[:, 4, :3] = 400.0  # three groups make 1200 lx together: any two make none
+    direct[2, 5, :1] = 5000.0  # 1 %
+    wanted = [
+        [False, True, True, True, False, False],
+        [True, False, False, True, False, False],
+        [False, False, False, False, True, False],
+    ]
+    np.testing.assert_array_equal(lm83.blinds_operated(direct), wanted)
 
 
 def test_each_group_has_its_own_blinds():
