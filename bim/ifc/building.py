@@ -37,7 +37,6 @@ from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_
 from bim.wall_middles import area_to_wall_middles
 from mitsuba_cfs.errors import RoomError
 
-STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
 SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE, FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     eye_height_option,
@@ -29,7 +29,7 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=BUILDING_FILE, metavar="BUILDING")
 @needed_weather_option
 @click.option(
     "--standard", "standards", multiple=True, required=True, metavar="NAME|FILE.toml",

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from scenes import quick
-from scenes.commands.parameters import IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     eye_height_option,
@@ -35,7 +35,7 @@ _DEFAULT = YearOptions(Path(), Path())
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=BUILDING_FILE, required=False, metavar="[BUILDING]")
 @weather_option
 @system_option
 @out_folder_option

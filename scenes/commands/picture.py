@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import check_file
-from scenes.commands.parameters import IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.room_options import (
     eye_height_option,
     furniture_option,
@@ -30,7 +30,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=BUILDING_FILE, required=False, metavar="[BUILDING]")
 @weather_option
 @system_option
 @click.option(

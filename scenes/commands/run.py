@@ -8,7 +8,7 @@ import click
 
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE, FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     furniture_option,
@@ -36,7 +36,7 @@ _DEFAULT = RoomOptions()
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@click.argument("building", type=BUILDING_FILE, metavar="BUILDING")
 @needed_weather_option
 @system_option
 @out_folder_option
