@@ -109,6 +109,20 @@ def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
     return read_ifc(path, join=options.join, furniture=options.furniture, progress=progress)
 
 
+def _check_honeybee(path: Path) -> None:
+    from bim.honeybee.schema import read_json
+
+    read_json(path)
+
+
+def _read_honeybee(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.honeybee.building import read_honeybee
+
+    progress("rooms", 0.0)
+    return read_honeybee(path, join=options.join, furniture=options.furniture)
+
+
 FLAGS = {"join": "join", "apertures": "aperture"}
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
-FORMATS: tuple[BuildingFormat, ...] = (IFC,)
+HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
+FORMATS: tuple[BuildingFormat, ...] = (IFC, HONEYBEE)

@@ -160,13 +160,9 @@ def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Eleme
                 outer = finishes[face.element].outer
                 value = FACADE_REFLECTANCE if outer is None else outer
                 name, kind = face.name, "IfcDoor" if face.kind == "door" else "IfcWall"
-                found.append(
-                    Element(face.element or "", name, kind, face.triangles, value, value)
-                )
+                found.append(Element(face.element or "", name, kind, face.triangles, value, value))
         found += [
-            Element(
-                w.guid, w.name, "IfcWindow", w.triangles, GLASS_REFLECTANCE, GLASS_REFLECTANCE
-            )
+            Element(w.guid, w.name, "IfcWindow", w.triangles, GLASS_REFLECTANCE, GLASS_REFLECTANCE)
             for w in space.windows
         ]
     return found

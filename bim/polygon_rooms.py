@@ -8,7 +8,7 @@ wall; polygons that are not plane are cut into triangles.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from bim.boundaries import floor_area
 from bim.defaults import EMISSIVITY, GLASS_REFLECTANCE, ROOM_REFLECTANCE, default_construction
+from bim.fenestration import ShadingState
 from bim.mesh_repair import wound_alike
 from bim.model import Construction, Face, MaterialLayer, Problem, Space, Window
 from bim.planes import Facet, Plane, newell_normal, plane_through, polygons_of, triangulated
@@ -66,6 +67,7 @@ class DrawnOpening:
     ring: NDArray[np.float64]  # [N, 3] [m]
     finish: SurfaceFinish = SurfaceFinish()
     glazing: GlazingValues | None = None  # None: an opaque door
+    states: tuple[ShadingState, ...] = ()  # BSDFs that the file holds for it
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,13 +150,13 @@ def _parts(face: DrawnFace, problems: list[Problem]) -> list[_Part]:
         return []
     plane = plane_through(face.rings[0].mean(axis=0), vector)
     flat = [plane.to_plane(ring) for ring in face.rings]
-    whole = _polygon(flat)
+    whole = flat_polygon(flat)
     if max(np.abs(ring[:, 2]).max() for ring in flat) > FLAT and not face.openings:
         return [_Part(facet, face) for facet in _bent(face.rings, whole, plane)]
     rest, cut = whole, []
     for opening in face.openings:
         own = plane.to_plane(opening.ring)
-        outline = _polygon([own])
+        outline = flat_polygon([own])
         inside = shapely.intersection(outline, rest)
         near = np.abs(own[:, 2]).max() < OFF_THE_WALL
         polygons = polygons_of(inside) if near else []
@@ -177,7 +179,7 @@ def _lost(opening: DrawnOpening, face: DrawnFace) -> Problem:
     return Problem(opening.guid, what, "left out", "window" * is_glass, area * is_glass)
 
 
-def _polygon(rings: Sequence[NDArray[np.float64]]) -> shapely.Geometry:
+def flat_polygon(rings: Iterable[NDArray[np.float64]]) -> shapely.Geometry:
     """The polygon of flat rings [N, 2 or 3], the first one its outline; repaired where invalid."""
     outline, *holes = (shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings)
     return shapely.difference(outline, shapely.union_all(holes)) if holes else outline
@@ -278,6 +280,7 @@ def _window(parts: Sequence[tuple[_Part, NDArray[np.float64]]]) -> Window:
         opening.guid, opening.name, triangles, part.face.guid,
         float(sum(one.facet.polygon.area for one, _ in parts)),
         values.u_value, values.g_value, values.visible, values.name, values.solar, values.panes,
+        opening.states,
     )  # fmt: skip
 
 
