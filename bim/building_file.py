@@ -122,7 +122,21 @@ def _read_honeybee(path: Path, options: ReadOptions, progress: Progress) -> Buil
     return read_honeybee(path, join=options.join, furniture=options.furniture)
 
 
+def _check_gbxml(path: Path) -> None:
+    from bim.gbxml.document import read_document
+
+    read_document(path)
+
+
+def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.gbxml.building import read_gbxml
+
+    progress("rooms", 0.0)
+    return read_gbxml(path, join=options.join, furniture=options.furniture)
+
+
 FLAGS = {"join": "join", "apertures": "aperture"}
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
 HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
-FORMATS: tuple[BuildingFormat, ...] = (IFC, HONEYBEE)
+GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
+FORMATS: tuple[BuildingFormat, ...] = (IFC, HONEYBEE, GBXML)

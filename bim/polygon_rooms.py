@@ -45,6 +45,12 @@ class SurfaceFinish:
     gloss: Gloss | None = None
     outer: float | None = None  # visible reflectance of the other side
 
+    def turned(self) -> SurfaceFinish:
+        """The finish as the room on the other side has it."""
+        one = self.construction
+        layers = None if one is None else replace(one, layers=one.layers[::-1])
+        return replace(self, construction=layers, visible=self.outer, outer=self.visible)
+
 
 @dataclass(frozen=True, slots=True)
 class GlazingValues:
@@ -183,6 +189,17 @@ def flat_polygon(rings: Iterable[NDArray[np.float64]]) -> shapely.Geometry:
     """The polygon of flat rings [N, 2 or 3], the first one its outline; repaired where invalid."""
     outline, *holes = (shapely.make_valid(shapely.Polygon(ring[:, :2])) for ring in rings)
     return shapely.difference(outline, shapely.union_all(holes)) if holes else outline
+
+
+def triangles_of_rings(rings: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of a polygon in space, its outline and holes; none without area."""
+    vector = newell_normal(rings[0])
+    if not np.linalg.norm(vector) > 0:
+        return np.empty((0, 3, 3))
+    plane = plane_through(rings[0][0], vector)
+    flat = [triangulated(p) for p in polygons_of(flat_polygon(map(plane.to_plane, rings)))]
+    corners = np.concatenate(flat or [np.empty((0, 3, 2))])
+    return plane.to_world(corners.reshape(-1, 2)).reshape(-1, 3, 3)
 
 
 def _bent(

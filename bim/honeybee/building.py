@@ -30,14 +30,14 @@ from bim.honeybee.schema import (
     read_model,
 )
 from bim.model import Building, Element, Problem
-from bim.planes import newell_normal, plane_through, polygons_of, triangulated
+from bim.planes import newell_normal
 from bim.polygon_rooms import (
     DrawnFace,
     DrawnOpening,
     DrawnRoom,
     GlazingValues,
     SurfaceFinish,
-    flat_polygon,
+    triangles_of_rings,
 )
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import pane_shares
@@ -224,7 +224,7 @@ class _Reader:
         rings = face.geometry.rings(self.scale)
         name = self.light.name(face.properties.radiance, {}, PARTS.get(face.face_type, ""),
                                "exterior_modifier")  # fmt: skip
-        yield from self._element(face.identifier, face.label, kind, _triangles(rings), name)
+        yield from self._element(face.identifier, face.label, kind, triangles_of_rings(rings), name)
 
     def _shades(
         self, shades: Iterable[Shade | ShadeMesh], room: HoneybeeRoom | None
@@ -235,7 +235,7 @@ class _Reader:
                 triangles = (
                     shade.geometry.triangles(self.scale)
                     if isinstance(shade, ShadeMesh)
-                    else _triangles(shade.geometry.rings(self.scale))
+                    else triangles_of_rings(shade.geometry.rings(self.scale))
                 )
             except IndexError:
                 message = "a face has a corner that there is not"
@@ -324,14 +324,3 @@ def _within(thing: HoneybeeRoom | RoomFace) -> Iterator[HoneybeeRoom | RoomFace 
 
 def _area(ring: np.ndarray) -> float:
     return float(np.linalg.norm(newell_normal(ring)))
-
-
-def _triangles(rings: Sequence[np.ndarray]) -> np.ndarray:
-    """Triangles [T, 3, 3] of a polygon with holes; none where it has no area."""
-    vector = newell_normal(rings[0])
-    if not np.linalg.norm(vector) > 0:
-        return np.empty((0, 3, 3))
-    plane = plane_through(rings[0][0], vector)
-    flat = [triangulated(p) for p in polygons_of(flat_polygon(map(plane.to_plane, rings)))]
-    corners = np.concatenate(flat or [np.empty((0, 3, 2))])
-    return plane.to_world(corners.reshape(-1, 2)).reshape(-1, 3, 3)
