@@ -1,4 +1,4 @@
-"""sDA, ASE and provision of rooms with blinds against honeybee-radiance-postprocess, state by state.
+"""sDA, ASE and provision of rooms with blinds against honeybee-radiance-postprocess, by state.
 
     python -m scenes.evidence.validation.peer_states [--peer PYTHON] [--out FOLDER]
 
@@ -75,7 +75,7 @@ class StatedRoom:
 
 
 def rooms(weather: Weather) -> Iterator[StatedRoom]:
-    """The rooms: sun by geometry, the rest as a share of the diffuse light that falls with depth."""
+    """The rooms: sun by geometry, the rest a share of the diffuse light that falls with depth."""
     x, y = (np.arange(SPACING / 2, side, SPACING) for side in ROOM[:2])
     points = np.array([(a, b, PLANE) for a in x for b in y])
     sun, up = sun_directions(weather), sun_directions(weather)[:, 2] > 0.02
@@ -101,7 +101,7 @@ def _lit(points: FloatArray, sun: FloatArray, window: tuple) -> FloatArray:
 
 
 def _sky(points: FloatArray, window: tuple) -> FloatArray:
-    """Share [S] of the diffuse light that reaches each sensor: a small, dirty window's form factor."""
+    """Share [S] of diffuse light that reaches each sensor: a small, dirty window's form factor."""
     normal, offset, along = _wall(window[0])
     _, start, end, sill, head = window
     centre = offset * normal + 0.5 * (start + end) * along + [0, 0, 0.5 * (sill + head)]
