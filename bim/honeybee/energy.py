@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from thermal.panes import PaneOptics, stack
 
 from bim.honeybee.library import NamedObjects
 from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues
+from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
 from mitsuba_cfs.errors import DataError
 from thermal.errors import ThermalInputError
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit

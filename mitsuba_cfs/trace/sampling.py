@@ -86,7 +86,7 @@ def tables(*found: Any) -> list[NDArray[Any]]:
     ]
 
 
-class Choice:
+class DiscreteDistribution:
     """Numbers drawn by weights, as `mi.DiscreteDistribution`, whose kernels hang on their count."""
 
     STEPS = 4  # of the search: kernels differ by so many halvings of the table
