@@ -121,7 +121,35 @@ def _read_radiance(path: Path, options: ReadOptions, progress: Progress) -> Buil
     return read_radiance_building(path, options.apertures)
 
 
+def _check_honeybee(path: Path) -> None:
+    from bim.honeybee.schema import read_json
+
+    read_json(path)
+
+
+def _read_honeybee(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.honeybee.building import read_honeybee
+
+    progress("rooms", 0.0)
+    return read_honeybee(path, join=options.join, furniture=options.furniture)
+
+
+def _check_gbxml(path: Path) -> None:
+    from bim.gbxml.document import read_document
+
+    read_document(path)
+
+
+def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.gbxml.building import read_gbxml
+
+    progress("rooms", 0.0)
+    return read_gbxml(path, join=options.join, furniture=options.furniture)
+
+
 FLAGS = {"join": "join", "apertures": "aperture"}
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
 RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures",))
-FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE)
+HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
+GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
+FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)

@@ -33,6 +33,7 @@ from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
+from mitsuba_cfs.trace.sampling import vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
@@ -184,8 +185,8 @@ def _tiles(tracer: TracedScene, view: View, tile: int) -> tuple[NDArray[np.int64
     """
     directions, counts = pixel_directions(view)
     pixels = np.flatnonzero(counts.reshape(-1))
-    way = mi.Vector3f(directions.reshape(-1, 3)[pixels].T.astype(np.float32))
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+    way = vectors(directions.reshape(-1, 3)[pixels])
+    eye = tracer.place(view.position)
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(eye, way), coherent=True)
     valid = hit.is_valid()
     group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)

@@ -20,7 +20,7 @@ from mitsuba_cfs.trace.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.sampling import lattice_2d, opaque, path_generator, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
@@ -110,7 +110,7 @@ def daylight_matrix(
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         depth = dr.opaque(mi.UInt32, max_depth)
-        clear = tracer.outward(mi.Int32(paths.group), mi.Bool(True)) if something else 0.0
+        clear = tracer.outward(opaque(paths.group, mi.Int32), mi.Bool(True)) if something else 0.0
         place = mi.Point3f(paths.position + clear)
         starts = PathStarts(
             paths.patch, place, paths.outward, paths.generator, depth, mi.Bool(True)
@@ -164,8 +164,8 @@ def sky_irradiance_matrix(
     sky = SkyBins(ReinhartSky(subdivision))
     accepted = AcceptedDirections(acceptance)
     S, P, n = len(points), sky.size, int(samples)
-    place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - tracer.centre, mi.Point3f)
+    normal = vectors(directions)
 
     def batch(number: int) -> NDArray[np.float64]:
         matrix = dr.zeros(mi.Float64, S * P)

@@ -16,7 +16,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 SIDES = ("west", "east", "south", "north", "floor", "ceiling")  # of the box round a room
@@ -63,10 +63,10 @@ def escaped_view(
     corners = np.concatenate(
         [surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]
     ).reshape(-1, 3)
-    box = [mi.Point3f(*map(float, f(axis=0) - tracer.centre)) for f in (corners.min, corners.max)]
+    box = [tracer.place(f(axis=0)) for f in (corners.min, corners.max)]
     S, n = len(points), int(samples)
-    place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - tracer.centre, mi.Point3f)
+    normal = vectors(directions)
     shape = (S, len(SIDES), FIGURES)
 
     def batch(number: int) -> NDArray[np.float64]:

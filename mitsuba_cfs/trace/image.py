@@ -15,7 +15,7 @@ from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.sampling import path_generator, pixel_places
+from mitsuba_cfs.trace.sampling import opaque, path_generator, pixel_places, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
@@ -112,7 +112,7 @@ def _block(
 ) -> NDArray[np.float32]:
     """Rows [PARTS * n, G * K] of some pixels."""
     matrix = dr.zeros(mi.Float64, PARTS * len(pixels) * bins.size * len(tracer.groups))
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+    eye = tracer.place(view.position)
     number = mi.UInt32(pixels.astype(np.uint32))
     for j, (dx, dy) in enumerate(pixel_places(samples)):
         x = (pixels % view.width + dx) / view.width
@@ -123,7 +123,7 @@ def _block(
             bins,
             matrix,
             eye,
-            mi.Vector3f(directions.T.astype(np.float32)),
+            vectors(directions),
             mi.Bool(exists),
             row=dr.arange(mi.UInt32, dr.width(number)),
             apart=dr.opaque(mi.UInt32, len(pixels)),
@@ -155,7 +155,7 @@ def add_picture_paths(
 ) -> None:
     """One path for each lane: L = 1 of the patch seen directly, else rho / pi E of the surface."""
     K = mi.UInt32(bins.size)
-    width = mi.UInt32(bins.size * len(tracer.groups))
+    width = opaque(bins.size * len(tracer.groups), mi.UInt32)
     ray = mi.Ray3f(eye, direction)
     hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active = active & hit.is_valid()

@@ -26,7 +26,7 @@ from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, Rou
 from mitsuba_cfs.trace.outdoor_sun import OutdoorSun, ShownFaces
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, pixel_places
+from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, pixel_places, tables, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places
 
@@ -139,7 +139,7 @@ def _passed(
     inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes, bounce: int
 ) -> tuple[Lanes, Lanes]:
     """Rays that go straight on through windows, and those that go on by glossy surfaces."""
-    origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
+    origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=not bounce)
     active = hit.is_valid()
     group = dr.gather(mi.Int32, inside.group, hit.prim_index, active)
@@ -149,9 +149,10 @@ def _passed(
     for g, system in enumerate(scattering):
         seen = active & (group == g) & (local.z > 0)
         weight = dr.select(seen, system.through(local), weight)
-    tau = np.broadcast_to(weight.numpy(), len(lanes.row)).astype(float)
+    tau, place = tables(weight, mi.Point3f(origin + way * hit.t))
+    tau = np.broadcast_to(tau, len(lanes.row)).astype(float)
     lit = np.flatnonzero(tau > 0)
-    place = mi.Point3f(origin + way * hit.t).numpy()[:, lit].astype(np.float32)
+    place = np.broadcast_to(place, (len(lanes.row), 3)).T[:, lit]
     passed = Lanes(lanes.row[lit], place, lanes.way[:, lit], (lanes.weight * tau)[lit])
     return passed, mirrored(inside, lanes, hit, bounce)
 
@@ -160,16 +161,18 @@ def _looked_at(
     outside: TracedScene, sky: SkyBins, lanes: Lanes, count: int, bounce: int
 ) -> tuple[sparse.csr_array, _Met, Lanes]:
     """Rows [count, P] of what is sky; what the other lanes met; lanes that go on by its gloss."""
-    origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
+    origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
     found = hit.is_valid()
     face = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, found)
-    rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found).numpy()
-    places = face_places(outside, origin, way, hit, found)
-    met, patch = found.numpy(), sky.index(way).numpy().astype(np.int64)
+    rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found)
+    places, met, rho, patch, prim = face_places(
+        outside, origin, way, hit, found, found, rho, sky.index(way), hit.prim_index
+    )
+    patch = patch.astype(np.int64)
     entries = lanes.weight[~met].astype(np.float32), (lanes.row[~met], patch[~met])
     rows = sparse.csr_array(sparse.coo_array(entries, shape=(count, sky.size)))
-    prim = hit.prim_index.numpy().astype(np.int64)[met]
+    prim = prim.astype(np.int64)[met]
     onwards = mirrored(outside, lanes, hit, bounce)
     return rows, (lanes.some(met), prim, rho[met], places.some(met)), onwards
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 SHIFT_ROUNDS = 8
 _DIMENSIONS = 6  # dimensions of the lattice; later decisions of a path are random
@@ -50,9 +52,67 @@ def path_generator(path: mi.UInt32, seed: mi.UInt32) -> mi.PCG32:
     return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
 
 
-def opaque(value: int | float, kind: type) -> object:
-    """A number that may change between calls without a new compilation of the kernel."""
-    return dr.opaque(kind, value)
+def opaque(value: int | float, kind: type | None = None) -> Any:
+    """A number that may change between calls without a new compilation of the kernel.
+
+    Args: kind: `mi.Float` by default.
+    """
+    kind = mi.Float if kind is None else kind
+    return dr.opaque(kind, float(value) if kind is mi.Float else int(value))
+
+
+def opaque_vector(values: ArrayLike) -> mi.Vector3f:
+    """A direction that may change between calls without a new compilation of the kernel."""
+    return mi.Vector3f(*map(opaque, np.asarray(values, dtype=float)))
+
+
+def vectors(table: ArrayLike, kind: type | None = None) -> Any:
+    """A table [n, 3] as a kernel takes it, axis by axis: as a whole its n would be a literal.
+
+    Args: kind: `mi.Vector3f` by default.
+    """
+    columns = np.ascontiguousarray(np.asarray(table, dtype=np.float32).T)
+    return (mi.Vector3f if kind is None else kind)(*map(mi.Float, columns))
+
+
+def tables(*found: Any) -> list[NDArray[Any]]:
+    """What a kernel gives, all from one launch: vectors as tables [n, 3], the others as [n]."""
+    dr.eval(*found)
+    return [
+        np.stack(np.broadcast_arrays(*(axis.numpy() for axis in one)), axis=1)
+        if dr.depth_v(one) > 1
+        else one.numpy()
+        for one in found
+    ]
+
+
+class DiscreteDistribution:
+    """Numbers drawn by weights, as `mi.DiscreteDistribution`, whose kernels hang on their count."""
+
+    STEPS = 4  # of the search: kernels differ by so many halvings of the table
+
+    def __init__(self, weights: NDArray[np.float64]) -> None:
+        """From weights [n], not all zero."""
+        weights = np.asarray(weights, dtype=np.float32)
+        climbed = np.cumsum(weights, dtype=float)
+        some = np.flatnonzero(weights > 0)
+        self._first, self._last = (opaque(end, mi.UInt32) for end in (some[0], some[-1]))
+        self._weight, self._climbed = mi.Float(weights), mi.Float(climbed.astype(np.float32))
+        self._sum = opaque(climbed[-1])
+        self._norm = opaque(np.float32(1) / np.float32(climbed[-1]))
+        self._steps = -(-int(some[-1] - some[0] + 1).bit_length() // self.STEPS) * self.STEPS
+
+    def sample_reuse(self, u: mi.Float, active: mi.Bool = True) -> tuple[mi.UInt32, mi.Float]:
+        """The number that u in [0, 1) stands for, and u within its share, in [0, 1) again."""
+        mark, low, high = u * self._sum, mi.UInt32(self._first), mi.UInt32(self._last)
+        for _ in range(self._steps):
+            middle = (low + high) >> 1
+            above = dr.gather(mi.Float, self._climbed, middle, active) < mark
+            low = dr.select(above, dr.minimum(middle + 1, high), low)
+            high = dr.select(above, high, middle)
+        share = dr.gather(mi.Float, self._weight, low, active) * self._norm
+        before = dr.gather(mi.Float, self._climbed, low - 1, active & (low > 0)) * self._norm
+        return low, (u - before) / share
 
 
 def pixel_places(samples: int) -> NDArray[np.float64]:

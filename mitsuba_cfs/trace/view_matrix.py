@@ -16,7 +16,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.sampling import path_generator
+from mitsuba_cfs.trace.sampling import path_generator, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.shared_hits import MOST_SENSORS, indirect_rows, mirrored_rows, shares
 from mitsuba_cfs.trace.window_integral import add_window_light
@@ -70,8 +70,8 @@ def view_matrix(
     S, n = len(points), int(samples)
     if S * n >= 2**32:
         raise ValueError(f"{S} sensors x {n} samples: a batch must stay below 2**32 paths")
-    place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - tracer.centre, mi.Point3f)
+    normal = vectors(directions)
     shape = (S, len(groups), bins.size)
     blocks = np.array_split(np.arange(S, dtype=np.uint32), -(-S // MOST_SENSORS))
 

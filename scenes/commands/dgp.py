@@ -11,10 +11,12 @@ from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     aperture_option,
+    directions_option,
     eye_height_option,
     furniture_option,
     glare_sources_option,
     glare_sun_option,
+    grid_option,
     join_option,
     method_option,
     out_folder_option,
@@ -45,13 +47,8 @@ _DEFAULT = YearOptions(Path(), Path())
 @furniture_option
 @aperture_option
 @view_option("views", "or a file of them", several=True)
-@click.option(
-    "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."
-)
-@click.option(
-    "--directions", type=click.IntRange(1, 64), default=_DEFAULT.directions, show_default=True,
-    help="Directions of every eye, the first to the biggest window.",
-)  # fmt: skip
+@grid_option
+@directions_option
 @eye_height_option
 @method_option(METHODS, "by paths there are single pictures, cfs picture", default=_DEFAULT.method)
 @click.option(
