@@ -121,7 +121,7 @@ def sums_of(sums: mi.Float64, shape: Sequence[int]) -> NDArray[np.float64]:
     return sums.numpy()[: math.prod(shape)].reshape(shape)
 
 
-class Choice:
+class DiscreteDistribution:
     """Numbers drawn by weights, as `mi.DiscreteDistribution`, whose kernels hang on their count."""
 
     STEPS = 4  # of the search: kernels differ by so many halvings of the table

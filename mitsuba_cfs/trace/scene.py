@@ -13,7 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
 from mitsuba_cfs.trace.random_walk import diffuse_direction
-from mitsuba_cfs.trace.sampling import Choice, lattice_2d, opaque, opaque_vector, vectors
+from mitsuba_cfs.trace.sampling import (
+    DiscreteDistribution,
+    lattice_2d,
+    opaque,
+    opaque_vector,
+    vectors,
+)
 from mitsuba_cfs.trace.traced_gloss import TracedGloss
 
 OPAQUE = -1  # window index of a triangle that is not glazed
@@ -110,12 +116,14 @@ class TracedScene:
         self.window_triangles = len(glazed)
         self._glazed_vertices = [vectors(glazed[:, i] - self.centre, mi.Point3f) for i in range(3)]
         self._glazed_group = mi.Int32(window_group.astype(np.int32))
-        self._glazed = Choice(areas)
+        self._glazed = DiscreteDistribution(areas)
         frames = np.stack([g.frame for g in groups])  # [G, 3, 3]
         self._frame_rows = [vectors(frames[:, i]) for i in range(3)]
         self._axes = [tuple(map(opaque_vector, g.frame)) for g in groups]
         self._group_first = np.searchsorted(window_group, np.arange(len(groups)))
-        self._group_choice = [Choice(areas[window_group == g]) for g in range(len(groups))]
+        self._group_choice = [
+            DiscreteDistribution(areas[window_group == g]) for g in range(len(groups))
+        ]
 
     def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
         """A point uniform over the area of all windows, and the group it lies in."""

@@ -18,7 +18,7 @@ MOST_BARS = 12  # openings with a bar of their own
 
 def plans(result: Compliance, room: CheckedRoom) -> tuple[FloorPlan, ...]:
     """Plans of what the rules look at in a room."""
-    return (*_view_plans(result, room), *_light_plans(room))
+    return (*_view_plans(result, room), *_light_plans(room), *_glare_plans(room))
 
 
 def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
@@ -59,6 +59,20 @@ def _light_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
             scale = ColourScale(0, top, "Direct sun", "h")
             text = f"1000 lx of direct sun, blinds open, on the grid of {name}."
             yield plan(frame, grid.sunlit_hours, scale, title="Sunlit hours", explanation=text)
+
+
+def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
+    glare = None if room.light is None else room.light.glare
+    if glare is None or len(glare.eyes) == 1:
+        return
+    eyes, seat = np.unique(glare.eyes, axis=0, return_inverse=True)
+    worst = np.zeros(len(eyes))  # of the directions of each eye
+    np.maximum.at(worst, seat.ravel(), glare.not_exceeded())
+    frame = plan_frame(room.space, eyes)
+    scale = ColourScale(0.2, 0.6, "Daylight glare probability", "")
+    blinds = "blinds operated" if glare.operated else "blinds open"
+    text = f"Exceeded in 5 % of the hours of use, in each seat's worst direction, {blinds}."
+    yield plan(frame, worst, scale, title="Glare", explanation=text, digits=2)
 
 
 def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:

@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from mitsuba_cfs.glare.classes import exceeded_share
 from mitsuba_cfs.metrics.autonomy import area_share, daylight_autonomy
 from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, reached_on_area
 from mitsuba_cfs.metrics.lm83 import annual_sunlight_exposure
@@ -156,7 +155,7 @@ class SunHours(Need):
 
 
 class DgpExceeded(Need):
-    """EN 17037: share of the hours of use in which the daylight glare probability is above."""
+    """EN 17037: share of the hours of use in which DGP is above, at the worst of the seats."""
 
     what: Literal["dgp_exceeded"]
     limit: Share
@@ -168,11 +167,34 @@ class DgpExceeded(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"share of the hours of use with a daylight glare probability above {self.limit:g}"
+        return (
+            f"share of the hours of use with a daylight glare probability above {self.limit:g}, "
+            "at the worst seat"
+        )
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1."""
-        return None if room.dgp is None else exceeded_share(room.dgp, self.limit)
+        return None if room.glare is None else room.glare.exceeded(self.limit)
+
+
+class ViewFree(Need):
+    """Share of LM-83's hours in which one sees out through some window, blinds operated."""
+
+    what: Literal["view_free"]
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open", "operated"})
+    unit: ClassVar[str] = "%"
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return "share of 8 to 18 o'clock in which blinds leave the view through some window free"
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        if room.light is None or room.light.free is None:
+            return None
+        return float(np.mean(room.light.free[room.ten_hours].any(axis=1)))
 
 
 class SpatialAutonomy(Need):
@@ -306,6 +328,7 @@ AnyNeed = Annotated[
     | ViewShare
     | SunHours
     | DgpExceeded
+    | ViewFree
     | SpatialAutonomy
     | SunlightExposure
     | Equinox

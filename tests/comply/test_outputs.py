@@ -54,7 +54,7 @@ needs = [{what = "sun_hours", at_least = 1.5}]
 def options(tmp_path_factory) -> ComplyOptions:
     path = tmp_path_factory.mktemp("rule") / "rays.toml"
     path.write_text(RULE)
-    return ComplyOptions(None, WEATHER, (str(path),))
+    return ComplyOptions(None, WEATHER, standards=(str(path),))
 
 
 def files_of(options: ComplyOptions, **more) -> ComplyFiles:
@@ -168,7 +168,7 @@ def test_levels_go_into_the_ifc(options, tmp_path):
 def test_least_altitude_of_the_sun(site, altitude, source):
     weather = replace(read_weather(WEATHER), site=site)
     rules = {"en17037": read_rule("en17037")}
-    options = ComplyOptions(None, None, ("en17037",))
+    options = ComplyOptions(None, None, standards=("en17037",))
     found, said = least_altitude(options, rules, weather)
     assert found == altitude and source in said
     own = replace(options, least_altitude_deg=5.0)
@@ -201,7 +201,7 @@ def test_wrong_choices_are_named_first(words, said, tmp_path):
 def test_files_are_read_by_their_options(tmp_path):
     path = tmp_path / "house.toml"
     path.write_text(RULE)
-    options = ComplyOptions(OFFICE, WEATHER, ("en17037", str(path)))
+    options = ComplyOptions(OFFICE, WEATHER, standards=("en17037", str(path)))
     found = read_files(options)
     assert list(found.rules) == ["en17037", "house"]
     assert found.given.light_only and isinstance(Path(str(path)), Path)

@@ -74,10 +74,10 @@ def test_a_coated_pane_may_be_turned(tmp_path):
 
 
 def test_layers_of_a_glazing_system_are_read(tmp_path, real_data):
-    from scenes.fenestration.angular_file import read_layers
+    from mitsuba_cfs.bsdf.pane_file import read_glazing_layers
 
     path = real_data / "bsdf/products_spectral/afc_glazing_system_dgl00_clr.json"
-    panes = read_layers(path)
+    panes = [layer.visible_pane() for layer in read_glazing_layers(path)]
     told = json.loads(path.read_text())
     omega = KLEMS_FULL.projected_solid_angles()
     means = np.diag(np.array(told["visible_front_transmittance"])) * omega
@@ -94,7 +94,7 @@ def test_layers_of_a_glazing_system_are_read(tmp_path, real_data):
         ('[angular]\ntable = "none.csv"', r"none.csv: cannot be read"),
         ('[angular]\ntable = "glass.xml"', "expected the columns theta_deg"),
         ("[angular]", "expected one of table, roos, pane and glazing"),
-        ('[[angular.pane]]\nproduct = "glass.csv"', "is not JSON"),
+        ('[[angular.pane]]\nproduct = "glass.csv"', "is no spectral row"),
         ("[[angular.pane]]\ncoated = true", "either product or transmittance"),
         (
             "[[angular.pane]]\ntransmittance = 0.3\nreflectance_front = 0.1",
