@@ -33,7 +33,7 @@ from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
-from mitsuba_cfs.trace.sampling import vectors
+from mitsuba_cfs.trace.sampling import tables, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
@@ -193,7 +193,7 @@ def _tiles(tracer: TracedScene, view: View, tile: int) -> tuple[NDArray[np.int64
     group = group.numpy().astype(np.int64)
     if tile == 1:
         return pixels, np.arange(len(pixels)), group, np.arange(len(pixels))
-    faces = 1 + face_numbers(tracer.surface.numpy(), tracer.normal.numpy().T)
+    faces = 1 + face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
     windows = faces.max() + 1 + group  # apart from surfaces in their plane
     face = faces[np.where(valid.numpy(), hit.prim_index.numpy().astype(np.int64), 0)]
     face = np.where(valid.numpy(), np.where(group == OPAQUE, face, windows), 0)
