@@ -1,4 +1,4 @@
-"""sDA, ASE and provision of rooms with blinds against honeybee-radiance-postprocess, state by state.
+"""sDA, ASE and provision of rooms with blinds against honeybee-radiance-postprocess, with states.
 
     python -m scenes.evidence.validation.peer_states [--peer PYTHON] [--out FOLDER]
 
@@ -43,7 +43,7 @@ WINDOWS = {
     "small panes": (("S", 1, 2.2, 2.3, 2.6), ("W", 1, 2.2, 2.3, 2.6), ("E", 3, 4.2, 2.3, 2.6)),
     "west": (("W", 0.5, 6.5, 0.8, 2.8),),
 }  # fmt: skip
-PEER = '''
+PEER = """
 import json, sys
 from pathlib import Path
 import numpy as np
@@ -62,7 +62,7 @@ for room in sorted(Path(sys.argv[1]).iterdir()):
                         for kind in made.values() for level in kind["levels"].values()}
     found[room.name] = one
 print(json.dumps(found))
-'''
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class StatedRoom:
 
 
 def rooms(weather: Weather) -> Iterator[StatedRoom]:
-    """The rooms: sun by geometry, the rest as a share of the diffuse light that falls with depth."""
+    """The rooms: sun by geometry, the rest a share of the diffuse light that falls with depth."""
     x, y = (np.arange(SPACING / 2, side, SPACING) for side in ROOM[:2])
     points = np.array([(a, b, PLANE) for a in x for b in y])
     sun, up = sun_directions(weather), sun_directions(weather)[:, 2] > 0.02
@@ -101,7 +101,7 @@ def _lit(points: FloatArray, sun: FloatArray, window: tuple) -> FloatArray:
 
 
 def _sky(points: FloatArray, window: tuple) -> FloatArray:
-    """Share [S] of the diffuse light that reaches each sensor: a small, dirty window's form factor."""
+    """Share [S] of the diffuse light at each sensor: a small, dirty window's form factor."""
     normal, offset, along = _wall(window[0])
     _, start, end, sill, head = window
     centre = offset * normal + 0.5 * (start + end) * along + [0, 0, 0.5 * (sill + head)]
@@ -124,18 +124,14 @@ def figures(room: StatedRoom, weather: Weather) -> dict[str, dict[str, float]]:
     operated = np.where(closed[:, :, None], CLOSED, 1.0) * room.total
     autonomy = daylight_autonomy(operated.sum(axis=0), ten)
     # the peer counts 250 hours and more, IES more than 250: on its terms here
-    ase = lm83.annual_sunlight_exposure(
-        room.direct.sum(axis=0), ten, most_hours=lm83.ASE_HOURS - 1
-    )
+    ase = lm83.annual_sunlight_exposure(room.direct.sum(axis=0), ten, most_hours=lm83.ASE_HOURS - 1)
     blinds = {"sda": 100 * area_share(autonomy >= lm83.SDA_TIME), "ase": 100 * ase}
     return {"states": blinds, "provision": daylight_shares(room.total.sum(axis=0), half)}
 
 
 def daylight_shares(light: FloatArray, half: NDArray[np.bool_]) -> dict[str, float]:
     """Per cent of the sensors that have each of LUX for half of the daylight hours."""
-    return {
-        str(lux): 100 * area_share(daylight_autonomy(light, half, lux) >= 0.5) for lux in LUX
-    }
+    return {str(lux): 100 * area_share(daylight_autonomy(light, half, lux) >= 0.5) for lux in LUX}
 
 
 def ask_peer(python: Path, made: Sequence[StatedRoom], weather: Weather) -> dict:
@@ -166,7 +162,8 @@ def _write(folder: Path, room: StatedRoom, weather: Weather) -> None:
     (results / "grid_states.json").write_text(json.dumps({"room": states}))
     hours = np.arange(8760) + 0.5
     (results / "sun-up-hours.txt").write_text("\n".join(f"{h}" for h in hours[up]))
-    (results / "study_info.json").write_text(json.dumps({"timestep": 1, "study_hours": list(hours)}))
+    study = {"timestep": 1, "study_hours": list(hours)}
+    (results / "study_info.json").write_text(json.dumps(study))
     np.save(folder / "daylight_hours.npy", room.total.sum(axis=0)[daylight_hours(weather)].T)
 
 
