@@ -68,6 +68,10 @@ _DEFAULT = RoomOptions()
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
 @click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
+@click.option(
+    "--explore", is_flag=True,
+    help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
+)  # fmt: skip
 @subdivide_option
 @glare_sources_option
 @glare_sun_option
@@ -89,17 +93,20 @@ def command(
     furniture: bool,
     operation: Path | None,
     no_cache: bool,
+    explore: bool,
     quick: bool,
     **chosen,
 ) -> None:
     """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
+    if explore and chosen["method"] == "point-in-time":
+        raise click.UsageError("--explore needs --method three-phase or five-phase")
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
         building, weather, system, operation, spaces, join, furniture, u_value, g_value,
-        cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen),
+        cache=not no_cache, explore=explore, quick=quick, room=RoomOptions.of(**chosen),
     )  # fmt: skip
     run_to_folder(options, out)
 
@@ -117,8 +124,9 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.explore.folder import write_explorer
     from scenes.report import write_report
-    from scenes.run.outputs import write_results
+    from scenes.run.outputs import EXPLORER, write_results
     from scenes.run.run import run_job
 
     if options.quick:
@@ -128,7 +136,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
             options, progress, files, on_room=_print_summary, on_building=_print_account
         )
         progress("results", 0.0)
-        write_results(result, folder, write_report)
+        write_results(result, folder, write_report, write_explorer if options.explore else None)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:
@@ -136,6 +144,8 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+    if options.explore:
+        click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
 
 
 def _print_account(building) -> None:

@@ -23,6 +23,7 @@ class JobOptions:
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence
     cache: bool = True  # keep traced matrices and find them again
+    explore: bool = False  # every hour's picture in every shading state, for the explorer
     quick: bool = False  # said in the results; what it chooses is in `scenes.quick`
     room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
 
