@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.model import Building
+from mitsuba_cfs.picture_year.year import PictureYear
 from scenes.explore.packing import packed, write_data
 from scenes.explore.view_files import view_arrays, view_facts, write_pictures
 from scenes.figures.plan import PlanFrame, plan_frame
@@ -104,14 +105,15 @@ def _rings(outline: shapely.Geometry) -> list[list[list[float]]]:
     return [np.round(shapely.get_coordinates(ring)[:-1], 3).tolist() for ring in rings]
 
 
-def _check(year) -> dict[str, float] | None:
-    """How far the DGP of the kept pictures is from that of the program's."""
+def _check(year: PictureYear) -> dict[str, Any] | None:
+    """DGP of the program's own pictures in some hours, and how far that of the kept ones is."""
     check = year.check
     if check is None or not len(check.hours):
         return None
     difference = np.abs(check.kept - check.dgp)
     return {
-        "hours": len(difference),
+        "hours": check.hours.tolist(),
+        "dgp": np.round(check.dgp, 6).tolist(),
         "largest": float(difference.max()),
         "mean": float(difference.mean()),
     }

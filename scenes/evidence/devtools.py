@@ -6,16 +6,21 @@ import base64
 import json
 import os
 import select
+import shutil
 import subprocess
 import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from tests.report.browser import chromium
-
 WAIT = 120  # [s] for an answer: the processor may be shared with many
 KEYS = {"ArrowRight": 39, "ArrowLeft": 37, "ArrowDown": 40, "ArrowUp": 38, " ": 32, "Tab": 9}
+
+
+def chromium() -> str | None:
+    """The browser's command, if there is one."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    return next((found for name in names if (found := shutil.which(name))), None)
 
 
 class Page:
@@ -24,23 +29,34 @@ class Page:
     def __init__(self, folder: Path, *flags: str, width: int = 1400, height: int = 1000) -> None:
         to_read, self._write = os.pipe()
         self._read, to_write = os.pipe()
+        browser = chromium()
+        if browser is None:
+            raise FileNotFoundError("no Chromium on this machine")
         command = [
-            chromium(), "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run",
+            browser, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run",
             "--disable-background-networking", "--disable-component-update", "--disable-sync",
             f"--user-data-dir={folder / 'profile'}", f"--window-size={width},{height}",
             "--remote-debugging-pipe", *flags, "about:blank",
         ]  # fmt: skip
-        # Chromium reads from 3 and writes to 4
-        shell = ["sh", "-c", f'exec "$@" 3<&{to_read} 4>&{to_write}', "sh", *map(str, command)]
+        # Chromium reads from 3 and writes to 4; dash knows no descriptor above 9
+        shell = ["bash", "-c", f'exec "$@" 3<&{to_read} 4>&{to_write}', "bash", *map(str, command)]
         self._process = subprocess.Popen(
             shell, pass_fds=(to_read, to_write), stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )  # fmt: skip
         os.close(to_read)
         os.close(to_write)
-        self._number, self._rest = 0, b""
+        self._number, self._rest, self._session = 0, b"", ""
         self.faults: list[str] = []  # errors and warnings of the page
         self.requests: list[str] = []  # addresses that it asked for
+        try:
+            self._attach(width, height)
+        except BaseException:
+            self.close()
+            raise
+
+    def _attach(self, width: int, height: int) -> None:
+        """Take the first page of the browser."""
         targets = self.send("Target.getTargets")["targetInfos"]
         target = next(t["targetId"] for t in targets if t["type"] == "page")
         attached = self.send("Target.attachToTarget", targetId=target, flatten=True)
@@ -50,14 +66,16 @@ class Page:
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.send("Emulation.setDeviceMetricsOverride", **size)
 
-    _session: str | None = None
-
     def __enter__(self) -> Page:
         return self
 
     def __exit__(
         self, kind: type | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the browser."""
         self._process.kill()
         self._process.wait()
         os.close(self._write)
@@ -67,7 +85,7 @@ class Page:
         """What the browser answers to a command."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": parameters}
-        if self._session is not None:
+        if self._session:
             message["sessionId"] = self._session
         os.write(self._write, json.dumps(message).encode() + b"\0")
         while True:
@@ -101,10 +119,10 @@ class Page:
             case "Network.requestWillBeSent":
                 self.requests.append(data["request"]["url"])
 
-    def open(self, address: str) -> None:
+    def open(self, address: str, *, ready: str = "document.body?.dataset.ready === 'yes'") -> None:
         """Go to an address and wait until the page says that it is ready."""
         self.send("Page.navigate", url=address)
-        self.until("document.body?.dataset.ready === 'yes'")
+        self.until(ready)
 
     def value(self, expression: str) -> Any:
         """What JavaScript gives, awaited."""
