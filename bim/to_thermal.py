@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from bim.model import Construction, Face, Space, centroid
 from thermal.blackbox import Fenestration
-from thermal.zone import Gains, IdealLoads, Layer, OpaqueSurface, WindowElement, Zone
+from thermal.emitters import IdealLoads
+from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone
 
 # what lies beyond a face, in the words of `thermal`: a neighbour is taken to be as warm as the room
 OUTSIDE = {

@@ -44,9 +44,15 @@ from .glazing_unit import (
 )
 from .gvalue import ThermalData as ThermalData, thermal_data as thermal_data
 from .iso15099 import Iso15099Data as Iso15099Data, iso15099_data as iso15099_data
+from .emitters import HeatedSlab as HeatedSlab, IdealLoads as IdealLoads
+from .ventilation import (
+    AirTransfer as AirTransfer,
+    Leakage as Leakage,
+    SupplyAir as SupplyAir,
+    WindowAiring as WindowAiring,
+)
 from .zone import (
     Gains as Gains,
-    IdealLoads as IdealLoads,
     Layer as Layer,
     OpaqueSurface as OpaqueSurface,
     WindowElement as WindowElement,

@@ -66,16 +66,6 @@ class BoxTable(TomlTable):
     construction: dict[Part, tuple[LayerTable, ...]] = Field(default_factory=dict)
 
 
-class ComfortTable(TomlTable):
-    """The person, for PMV and SET."""
-
-    metabolic_rate: Annotated[float, Field(ge=0.7, le=4)] = 1.2  # [met]
-    clothing: Annotated[float, Field(ge=0, le=2)] = 0.7  # [clo]
-    air_speed: Annotated[float, Field(ge=0, le=2)] = 0.1  # [m/s]
-    humidity: Annotated[float, Field(ge=0, le=100)] = 50.0  # relative, indoors [%]
-    mean_radiant: Literal["view factors", "room centre", "area"] = "view factors"
-
-
 class TraceTable(TomlTable):
     """How the light is computed: as the choices of those names of a run, with fewer rays."""
 
@@ -104,7 +94,6 @@ class StudyFile(OperationTables):
     couple: bool = False  # heat flows through the walls between the rooms
     box: BoxTable | None = None
     system: tuple[StateTable, ...] = ()  # states; none: what the building's file holds
-    comfort: ComfortTable = ComfortTable()
     trace: TraceTable = TraceTable()
     step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10
 

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
-from scenes.heat.study_file import ComfortTable
+from scenes.room.operation_tables import ComfortTable
 from thermal.balance import ZoneResult
 from thermal.comfort import (
     ADAPTIVE_BANDS,

@@ -15,8 +15,8 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.room.operation_tables import PARTS, OperationTables
 from scenes.room.schedules import WEEK, scheduled_fields
 from thermal.control import by_schedule
+from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
-from thermal.zone import IdealLoads
 
 FloatArray = NDArray[np.float64]
 
