@@ -50,8 +50,8 @@ def command(study: Path, out: Path, quick: bool) -> None:
         summary = room.summary
         click.echo(
             f"{room.name}: operative {summary['operative_min_c']:.1f} to "
-            f"{summary['operative_max_c']:.1f} C, heating {summary['heating_kwh']:.0f} kWh, "
-            f"cooling {summary['cooling_kwh']:.0f} kWh, comfortable "
+            f"{summary['operative_max_c']:.1f} C, heating {summary['heat_kwh']:.0f} kWh, "
+            f"cooling {summary['cold_kwh']:.0f} kWh, comfortable "
             f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of the occupied hours"
         )
     for note in notes[quick:]:
@@ -69,10 +69,13 @@ def _write(rooms, record: dict, results: ResultFolder) -> None:
         for number, room in enumerate(rooms, 1):
             name = "hours.csv" if len(rooms) == 1 else f"hours_{number}.csv"
             write_table(room.hours.round(4), folder / name)
+            write_table(room.powers.round(3), folder / name.replace("hours", "energy"))
         table = pd.DataFrame(
             [{"room": r.name, "floor_m2": r.floor_area} | r.summary for r in rooms]
         )
         write_table(table.round(4), folder / "summary.csv", index=False)
         months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
         write_table(months, folder / "discomfort_by_month.csv")
+        energy = pd.concat({r.name: r.energy for r in rooms}, names=["room"])
+        write_table(energy.round(4), folder / "energy_by_month.csv")
         write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")

@@ -1,4 +1,4 @@
-"""The tables of a TOML file that say what lies beyond a room: ground, neighbours, bridges, frames."""
+"""The tables of a TOML file for what lies beyond a room: ground, neighbours, bridges, frames."""
 
 from __future__ import annotations
 
@@ -92,5 +92,3 @@ class EnvelopeTable(TomlTable):
     bridge: tuple[BridgeTable, ...] = ()
     frame_u: Annotated[Positive, plausible.FRAME_U] | None = None  # with films 0.13 and 0.04
     frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]
-
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated
 
 from pydantic import Field, model_validator
@@ -66,6 +67,6 @@ class PlantTable(TomlTable):
             pairs = getattr(self, key)
             if isinstance(pairs, tuple):
                 at = [temperature for temperature, _ in pairs]
-                if not at or any(b <= a for a, b in zip(at, at[1:], strict=False)):
+                if not at or any(b <= a for a, b in pairwise(at)):
                     raise ValueError(f"{key}: expected pairs by rising outdoor temperature")
         return self
