@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -20,6 +20,7 @@ from scenes.fenestration.resolver import fill_windows, source_notes, window_sour
 from scenes.fenestration.systems import States
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
+from scenes.heat.design_days import design_loads
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
@@ -48,6 +49,18 @@ class ThermalYear:
     months: pd.DataFrame  # discomfort in the occupied hours, by band and month
     powers: pd.DataFrame  # heat, cold, electricity by hour [W]
     energy: pd.DataFrame  # by month [kWh] and [kWh/m2]
+    design: pd.DataFrame | None = None  # loads of design days
+
+
+@dataclass(frozen=True, slots=True)
+class _Balanced:
+    """Rooms as they were balanced."""
+
+    rooms: Sequence[RoomZone]
+    results: list[ZoneResult]
+    humidity: list[Humidity]
+    notes: tuple[str, ...]  # what had to be assumed
+    design: pd.DataFrame | None
 
 
 def run_study(
@@ -91,14 +104,20 @@ def run_study(
         rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
         radiants.append(radiant)
         steps("heat", 1.0)
-    rooms, results, moist, unpaired = year_of_rooms(study, building, rooms, weather, progress)
-    notes |= dict.fromkeys(unpaired)
+    found = _balanced(study, building, rooms, weather, progress)
+    notes |= dict.fromkeys(found.notes)
     years = []
-    for room, result, humidity, radiant in zip(rooms, results, moist, radiants, strict=True):
+    for room, result, humidity, radiant in zip(
+        found.rooms, found.results, found.humidity, radiants, strict=True
+    ):
         if radiant is None and trace.view_factors:
             notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
         felt_result = _felt(study, room.zone, result, radiant)
-        years.append(_year(study, room, felt_result, humidity, weather))
+        year = _year(study, room, felt_result, humidity, weather)
+        if found.design is not None:
+            own = found.design[found.design["room"] == room.zone.name]
+            year = replace(year, design=own.reset_index(drop=True))
+        years.append(year)
     return years, tuple(notes)
 
 
@@ -112,32 +131,32 @@ def _check_states(study: StudyFile, in_windows: Mapping[str, States]) -> None:
         raise DataError(message, file=study.building, field=f"control.{field}")
 
 
-def year_of_rooms(
+def _balanced(
     study: StudyFile,
     building: Building,
     rooms: Sequence[RoomZone],
     weather: Weather,
     progress: Progress,
-) -> tuple[Sequence[RoomZone], list[ZoneResult], list[Humidity], tuple[str, ...]]:
-    """The rooms' years: together where the study couples them, else one by one.
-
-    Returns: the rooms as they were taken, their years, their humidity, what had to be assumed.
-    """
-    step_s, unpaired = study.options.heat_step_s, ()
+) -> _Balanced:
+    """The rooms' years: together where the study couples them, else one by one."""
+    step_s, notes = study.options.heat_step_s, ()
+    progress("heat balance", 0.0)
+    groups: list[tuple[Sequence[RoomZone], dict]] = [([room], {}) for room in rooms]
     if study.couple:
-        progress("heat balance", 0.0)
-        rooms, links, unpaired = coupled(rooms, study.air.door_m3_s)
-        air = {"air_links": links, "transfers": _transfers(study, building, rooms, weather)}
-        found = balances(rooms, weather, step_s, progress=progress, **air)
-        moist = list(room_humidity(rooms, found, weather, **air))
-    else:
-        found, moist = [], []
-        for number, room in enumerate(rooms):
-            progress("heat balance", number / len(rooms))
-            found += balances([room], weather, step_s, progress=progress)
-            moist += room_humidity([room], found[-1:], weather)
-    progress("heat balance", 1.0)
-    return rooms, found, moist, unpaired
+        rooms, links, notes = coupled(rooms, study.air.door_m3_s)
+        transfers = _transfers(study, building, rooms, weather)
+        groups = [(rooms, {"air_links": links, "transfers": transfers})]
+    results, moist, design = [], [], []
+    for number, (together, air) in enumerate(groups):
+        found = balances(together, weather, step_s, progress=progress, **air)
+        results += found
+        moist += room_humidity(together, found, weather, **air)
+        if study.design is not None:
+            cold = study.design.outdoor_c
+            design.append(design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air))
+        progress("heat balance", (number + 1) / len(groups))
+    table = pd.concat(design, ignore_index=True) if design else None
+    return _Balanced(rooms, results, moist, notes, table)
 
 
 def _transfers(

@@ -93,6 +93,12 @@ class TransferTable(TomlTable):
     m3_h: Annotated[float | str, OrSchedule(plausible.FLOW)]
 
 
+class DesignTable(TomlTable):
+    """The loads of design days."""
+
+    outdoor_c: Annotated[float, plausible.OUTDOOR] | None = None  # cold day; None: the weather's
+
+
 class StudyFile(OperationTables):
     """A whole study; paths are relative to the file."""
 
@@ -102,6 +108,7 @@ class StudyFile(OperationTables):
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     couple: bool = False  # heat flows through the walls between the rooms
     transfer: tuple[TransferTable, ...] = ()
+    design: DesignTable | None = None  # loads of design days too
     box: BoxTable | None = None
     system: tuple[StateTable, ...] = ()  # states; none: what the building's file holds
     trace: TraceTable = TraceTable()

@@ -355,7 +355,9 @@ class RoomSimulation:
         else:
             services = plain_services(self.space, self.occupied, self.options.occupancy)
         solar, gains = sun.switched(self.windows, self.thermals, state)
-        return RoomZone(self.space, room, solar, gains, state, lamps, self.occupied, plane, services)
+        return RoomZone(
+            self.space, room, solar, gains, state, lamps, self.occupied, plane, services
+        )
 
     def thermal(self) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort, and the balance they come from."""
