@@ -23,10 +23,10 @@ from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.straight_view import straight_rays
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import (
     Places,
     face_places,
@@ -35,7 +35,7 @@ from mitsuba_cfs.trace.sun_paths import (
 )
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
-PLACES = 2048  # that stand for all that paths meet, at most
+PLACES = 1024  # that stand for all that paths meet, at most
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
 LANES = 2**22  # shadow rays at once
