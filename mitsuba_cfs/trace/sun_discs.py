@@ -25,6 +25,7 @@ RIM = 0.998  # of the disc's area within them
 DISC_RAYS = 16  # inside, for edges that leave the rim alone
 EDGE_RAYS = 256  # in each batch, to a disc that an edge crosses
 LANES = 2**22  # rays at once
+TURN = 0.5 * (3 - 5**0.5)  # of a spiral between neighbours, the golden section of it
 
 
 class Scattering(Protocol):
@@ -69,7 +70,7 @@ class SunDiscs:
             number = dr.opaque(mi.UInt32, k)
             inner = number >= RIM_RAYS
             rim = mi.Point2f(RIM, (mi.Float(number) + turn) / RIM_RAYS)
-            u = dr.select(inner, lattice_2d(number, stream, 2), rim)
+            u = dr.select(inner, _spiral(number - RIM_RAYS, DISC_RAYS, stream), rim)
             values, passed = self._rays(sensor, disc_direction(centre, u))
             first = passed if k == 0 else first
             alike &= passed == first
@@ -93,7 +94,7 @@ class SunDiscs:
             centre = dr.gather(mi.Vector3f, self._around.towards, sun)
             # the sensor's alone: an hour's light does not hang on those computed with it
             stream = mi.sample_tea_32(sensor, key)[0]
-            way = on_disc(centre, lane - row * EDGE_RAYS, stream)
+            way = disc_direction(centre, _spiral(lane - row * EDGE_RAYS, EDGE_RAYS, stream))
             for part, values in zip(found, self._rays(sensor, way)[0], strict=True):
                 part[crossed] = values.numpy().reshape(-1, EDGE_RAYS).mean(axis=1)
         return found
@@ -114,7 +115,7 @@ class SunDiscs:
         active &= (local.z > 0) & (share > 0)
         passed = dr.select(active, group, OPAQUE)
         values = [
-            mi.Float(0)
+            dr.zeros(mi.Float, dr.width(cosine))
             if system is None
             else dr.select(passed == g, cosine * share * system.through(local), 0.0)
             for g, system in enumerate(self._scattering)
@@ -135,10 +136,17 @@ def on_disc(centre: mi.Vector3f, sample: mi.UInt32, stream: mi.UInt32) -> mi.Vec
     return disc_direction(centre, lattice_2d(sample, stream, 2))
 
 
+def _spiral(number: mi.UInt32, count: int, stream: mi.UInt32) -> mi.Point2f:
+    """Places even over a disc, as shares of its area and of the turn (Vogel 1979's spiral)."""
+    place = (mi.Float(number) + lattice(stream * 0, stream, 2)) / count
+    turn = mi.Float(number) * TURN + lattice(stream * 0, stream, 3)
+    return mi.Point2f(place, turn - dr.floor(turn))
+
+
 def disc_direction(centre: mi.Vector3f, u: mi.Point2f) -> mi.Vector3f:
     """The direction that has a share `u.x` of the sun's disc within it, at a share of the turn."""
-    cosine = 1 - u.x * float(1 - np.cos(SUN_RADIUS))
-    sine = dr.safe_sqrt(1 - cosine * cosine)
+    height = u.x * float(1 - np.cos(SUN_RADIUS))  # 1 - cos, which single precision has no more
+    cosine, sine = 1 - height, dr.sqrt(height * (2 - height))
     phi = dr.two_pi * u.y
     frame = mi.Frame3f(centre)
     return frame.to_world(mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), cosine))
