@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.straight_views import StraightViews
+from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.reflected_sun import (
@@ -185,9 +186,9 @@ class ReflectedSunLight:
         traced, straight, sun = self._found.traced, self._found.straight, self._sky.sun
         daylight = self._reflected_daylight()
         parts = traced.parts.of(g)
-        light = sum(straight.rest(g, j, q) @ (daylight[q] @ sun) for q in parts)
+        light = sum(straight.rest(g, j, q) @ times_sky(daylight[q], sun) for q in parts)
         whole, direct = straight.matrix(g, j), straight.matrix(g, j, direct=True)
-        return light if whole is None else light + (whole.values - direct.values) @ sun
+        return light if whole is None else light + times_sky(whole.values - direct.values, sun)
 
     def _reflected_daylight(self) -> Array:
         """D - D_d [Q, K, P]."""

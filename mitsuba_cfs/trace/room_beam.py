@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.sampling import lattice_2d, pixel_places
+from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, pixel_places, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import Places, face_places, on_disc_of
@@ -161,16 +161,16 @@ class _Beam:
         point = lane - hour * dr.opaque(mi.UInt32, points)
         # the same points in all hours: an hour's light does not hang on those computed with it
         key = dr.opaque(mi.UInt32, self.seed & 0xFFFFFFFF)
-        stream = mi.sample_tea_32(mi.UInt32(self.group), key)[0]
+        stream = mi.sample_tea_32(opaque(self.group, mi.UInt32), key)[0]
         position = inside.sample_group(self.group, lattice_2d(point, stream, 0))
-        towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), hour)
+        towards = dr.gather(mi.Vector3f, vectors(suns), hour)
         to_sun = on_disc_of(towards, point)
         local = inside.to_group(self.group, to_sun)
         active = local.z > 0
-        start = mi.Point3f(position + inside.outward(mi.Int32(self.group), mi.Bool(True)))
+        start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
         active &= ~outside.met_outdoors(start, to_sun, active)[0].is_valid()
         value = dr.select(active, local.z * self.way.through(local), 0.0)
-        value *= float(inside.groups[self.group].area) / points
+        value *= opaque(inside.groups[self.group].area / points)
         return value.numpy().reshape(len(suns), points), position, to_sun
 
     def _landed(
@@ -184,13 +184,14 @@ class _Beam:
     ) -> sparse.csr_array:
         """Flux on the cells [c, count] by rays [n, points] of some of the hours [n]."""
         inside, flat = self.scenes[0], value.ravel()
-        off = inside.outward(mi.Int32(self.group), mi.Bool(True))
+        off = inside.outward(opaque(self.group, mi.Int32), mi.Bool(True))
         origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
-        ray, lit = mi.Ray3f(origin, onwards), mi.Bool(flat > 0)
+        ray, lit = mi.Ray3f(origin, onwards), column(flat > 0, mi.Bool)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=lit)
         lit &= hit.is_valid()
-        kept = np.flatnonzero(lit.numpy())
-        cell = cells.of(face_places(inside, origin, onwards, hit, lit).some(kept))
+        places, lit = face_places(inside, origin, onwards, hit, lit, lit)
+        kept = np.flatnonzero(lit)
+        cell = cells.of(places.some(kept))
         kept, cell = kept[cell >= 0], cell[cell >= 0]
         entries = flat[kept].astype(float), (cell, hours[kept // value.shape[1]])
         return sparse.csr_array(sparse.coo_array(entries, shape=(cells.size, count)))
@@ -224,9 +225,10 @@ def _reflected(
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
         met = hit.is_valid()
-        rho = inside.whole(hit.prim_index, way, met).numpy()
-        kept = np.flatnonzero(met.numpy() & (rho > 0))
-        cell = cells.of(face_places(inside, point, way, hit, met).some(kept))
+        rho = inside.whole(hit.prim_index, way, met)
+        places, met, rho = face_places(inside, point, way, hit, met, met, rho)
+        kept = np.flatnonzero(met & (rho > 0))
+        cell = cells.of(places.some(kept))
         kept, cell = kept[cell >= 0], cell[cell >= 0]
         entries = rho[kept].astype(float) / samples, (begin + kept // samples, cell)
         found = found + sparse.csr_array(sparse.coo_array(entries, shape=found.shape))
@@ -251,6 +253,6 @@ def _points_on(interior: Surfaces, inside: TracedScene) -> Places:
     point = a * (1 - root) + b * root * (1 - v) + c * root * v - inside.centre
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    off = inside.epsilon * normal
+    off = inside.epsilon[0] * normal
     both = np.concatenate([point + off, point - off]), np.concatenate([normal, -normal])
     return Places(both[0].astype(np.float32), both[1].astype(np.float32))

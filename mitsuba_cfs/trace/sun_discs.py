@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.sun import SUN_RADIUS
-from mitsuba_cfs.trace.sampling import lattice, lattice_2d
+from mitsuba_cfs.trace.sampling import column, lattice, lattice_2d
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.sun_ways import SunWay
 
@@ -88,7 +88,7 @@ class SunDiscs:
             crossed = self._crossed[start : start + step]
             lane = dr.arange(mi.UInt32, len(crossed) * EDGE_RAYS)
             row = lane // EDGE_RAYS
-            pair = dr.gather(mi.UInt32, mi.UInt32(crossed.astype(np.uint32)), row)
+            pair = dr.gather(mi.UInt32, column(crossed, mi.UInt32), row)
             sensor = pair // dr.opaque(mi.UInt32, suns)
             sun = pair - sensor * dr.opaque(mi.UInt32, suns)
             centre = dr.gather(mi.Vector3f, self._around.towards, sun)
