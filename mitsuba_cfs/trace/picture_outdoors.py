@@ -21,7 +21,6 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, RoughSun, mirrored
 from mitsuba_cfs.trace.outdoor_sun import OutdoorSun, ShownFaces
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
@@ -37,6 +36,7 @@ from mitsuba_cfs.trace.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import Places, face_places
 
 BLOCK_BYTES = 128 * 2**20

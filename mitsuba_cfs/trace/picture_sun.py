@@ -16,7 +16,6 @@ from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
     disc_parts,
@@ -27,6 +26,7 @@ from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_
 from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import on_disc_of, place_and_hour
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 

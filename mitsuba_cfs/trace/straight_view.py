@@ -19,7 +19,6 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import (
@@ -31,6 +30,7 @@ from mitsuba_cfs.trace.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sun_discs import Scattering
 
 
 def straight_view_matrix(
