@@ -31,7 +31,7 @@ from mitsuba_cfs.trace.reflected_sun import (
     window_shares,
 )
 from mitsuba_cfs.trace.room_beam import RoomCells, room_cells, room_light
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
 SENSOR_SHARE = 4  # paths of a sensor for V, for each that looks for them
@@ -61,12 +61,12 @@ class ReflectedSun:
     @cached_property
     def inside(self) -> TracedScene:
         """The room."""
-        return TracedScene(self.traced.scene.interior, self.traced.scene.groups)
+        return traced_scene(self.traced.scene.interior, self.traced.scene.groups)
 
     @cached_property
     def outside(self) -> TracedScene:
         """What stands before the parts of the window groups."""
-        return TracedScene(self.traced.scene.exterior, self.traced.parts.groups)
+        return traced_scene(self.traced.scene.exterior, self.traced.parts.groups)
 
     @cached_property
     def windows(self) -> SunShares:
