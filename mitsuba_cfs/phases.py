@@ -11,7 +11,7 @@ from scipy import sparse
 DARK = 0.05  # share of a sky matrix's entries that are lit, below which only these are multiplied
 
 
-def times_sky(matrix: ArrayLike, sky: ArrayLike) -> NDArray[np.floating]:
+def times_sky(matrix: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
     """A matrix [..., P] times a sky [P, H]; of the sun alone few patches are lit in an hour."""
     matrix, sky = np.asarray(matrix), np.asarray(sky)
     if not sky.size or np.count_nonzero(sky) > DARK * sky.size:
