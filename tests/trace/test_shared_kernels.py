@@ -19,11 +19,11 @@ FEW = {"samples": 8, "max_depth": 4}
 
 
 def turned_room() -> tuple[Surfaces, list[WindowGroup], Surfaces]:
-    """The test room, larger, turned and elsewhere, with two windows and one surface less."""
+    """The test room eight times as large, turned, elsewhere; two windows, one surface less."""
     turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
 
     def moved(triangles):
-        return (1.3 * triangles) @ turn.T + [40.0, -7.0, 3.0]
+        return (8.0 * triangles) @ turn.T + [40.0, -7.0, 3.0]
 
     interior, (group,) = rooms.test_room()
     glass = group.windows[0].triangles
@@ -94,3 +94,21 @@ def test_second_room_compiles_nothing(traced):
     known = {kernel["hash"] for kernel in first}
     new = [kernel for kernel in second if kernel["hash"] not in known]
     assert len(first) > 5 and not new, f"{len(new)} kernels of {len(second)} are the room's own"
+
+
+def test_scene_of_the_same_objects_is_found_again_and_no_other():
+    from mitsuba_cfs.trace.scene import KEPT, traced_scene
+
+    interior, groups = rooms.test_room()
+    first = traced_scene(interior, groups)
+    assert traced_scene(interior, list(groups)) is first
+    others = [
+        traced_scene(interior, groups, windows_block=False),
+        traced_scene(interior, groups, window_reflectance=[0.2]),
+        traced_scene(interior, groups, window_reflectance=[0.4]),
+        traced_scene(rooms.test_room()[0], groups),
+    ]
+    assert len({id(scene) for scene in (first, *others)}) == 5
+    for _ in range(KEPT):
+        traced_scene(rooms.test_room()[0], groups)
+    assert traced_scene(interior, groups) is not first
