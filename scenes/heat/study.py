@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from bim.ifc.building import read_ifc
+from bim.building_file import ReadOptions, read_building_file
 from bim.model import Building, Space
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
@@ -218,7 +218,7 @@ def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
     if study.box is not None:
         building = box_building(study.box)
         return building, list(building.spaces)
-    building = read_ifc(study.building, join=study.join)
+    building = read_building_file(study.building, ReadOptions(tuple(study.join)))
     if study.couple:
         spaces = named_spaces(building, study.spaces, study.building)
         return building, shared_constructions(spaces)

@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.head import check_head
+from bim.building_file import check_building_file
 from bim.model import BOX_PARTS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import ROUGHEST
@@ -165,8 +164,7 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
         found["trace"] = study.trace.model_copy(update=picks(HEAT, given))
     if study.building is not None:
         found["building"] = _there(here, study.building, path)
-        check_head(found["building"])
-        corrections_beside(found["building"])
+        check_building_file(found["building"])
     return study.model_copy(update=found)
 
 

@@ -38,11 +38,19 @@ from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
-from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYear, ThermalResult
+from scenes.results import (
+    DaylightResult,
+    ExploredRoom,
+    GlareResults,
+    OperationResult,
+    RoomYear,
+    ThermalResult,
+)
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.room.control import shading_states
 from scenes.room.daylight import room_daylight, room_scene
 from scenes.room.envelope import enveloped
+from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.holes import hole_problems
 from scenes.room.humidity import felt_by, room_humidity
@@ -91,6 +99,7 @@ def compute_room(
     skies: AnnualSky | None = None,
     cache: MatrixCache | None = None,
     pictures: bool = True,
+    explore: bool = False,
     rate: tuple[str, NDArray[np.int64]] | None = None,
     progress: Progress = silent,
 ) -> RoomYear:
@@ -107,6 +116,7 @@ def compute_room(
         cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
             and weather do not enter V and D: variants of them cost only algebra.
         pictures: False leaves the luminance pictures and their glare out.
+        explore: True gives every hour's picture in every state, for the explorer.
         rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
 
     Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
@@ -129,9 +139,13 @@ def compute_room(
     if pictures:
         rated = room.timed("glare", lambda: room.glare(hours, year))
     dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
+    explored = room.timed("explorer", room.explored) if explore else None
     heat, balance = room.timed("thermal", room.thermal)
     ran = None if operation is None else room.operation_result(balance)
-    return RoomYear(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes)
+    return RoomYear(
+        space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes,
+        explored=explored,
+    )  # fmt: skip
 
 
 class RoomSimulation:
@@ -267,6 +281,13 @@ class RoomSimulation:
             self.pictured, metric, self.lit_state, hours=columns,
             options=rating_of(self.outputs), progress=steps,
         )  # fmt: skip
+
+    def explored(self) -> ExploredRoom:
+        """Every hour in every state."""
+        states = max(self.windows.systems, key=len)
+        names = [state.name for state in states]
+        steps = part(self.progress, 0.0, 1.0, "explorer")
+        return explored_room(self.light, self.state, names, steps)
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
