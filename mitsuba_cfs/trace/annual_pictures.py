@@ -33,6 +33,7 @@ from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
+from mitsuba_cfs.trace.sampling import tables, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
@@ -184,15 +185,15 @@ def _tiles(tracer: TracedScene, view: View, tile: int) -> tuple[NDArray[np.int64
     """
     directions, counts = pixel_directions(view)
     pixels = np.flatnonzero(counts.reshape(-1))
-    way = mi.Vector3f(directions.reshape(-1, 3)[pixels].T.astype(np.float32))
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+    way = vectors(directions.reshape(-1, 3)[pixels])
+    eye = tracer.place(view.position)
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(eye, way), coherent=True)
     valid = hit.is_valid()
     group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
     group = group.numpy().astype(np.int64)
     if tile == 1:
         return pixels, np.arange(len(pixels)), group, np.arange(len(pixels))
-    faces = 1 + face_numbers(tracer.surface.numpy(), tracer.normal.numpy().T)
+    faces = 1 + face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
     windows = faces.max() + 1 + group  # apart from surfaces in their plane
     face = faces[np.where(valid.numpy(), hit.prim_index.numpy().astype(np.int64), 0)]
     face = np.where(valid.numpy(), np.where(group == OPAQUE, face, windows), 0)

@@ -49,18 +49,28 @@ from scenes.results import (
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.room.control import shading_states
 from scenes.room.daylight import room_daylight, room_scene
+from scenes.room.envelope import enveloped
 from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.holes import hole_problems
+from scenes.room.humidity import felt_by, room_humidity
 from scenes.room.operation import Operation
 from scenes.room.operation_hours import OperationHours
-from scenes.room.operation_tables import OperationTables
+from scenes.room.operation_tables import ComfortTable, OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.solar import RoomSun
 from scenes.room.thermal import fenestration_table, thermal_result
 from scenes.room.windows import room_windows
-from scenes.room.zone import RoomZone, balances, internal_gains, operated, with_states
+from scenes.room.zone import (
+    RoomZone,
+    balances,
+    internal_gains,
+    operated,
+    plain_services,
+    services_of,
+    with_states,
+)
 from thermal.balance import ZoneResult
 from thermal.errors import ThermalInputError
 
@@ -359,9 +369,16 @@ class RoomSimulation:
         if self.operation is not None:
             area = self.space.floor_area
             zone, lamps = operated(room.zone, self.operation, area, self.weather, plane)
-            room = replace(room, zone=zone)
+            room = enveloped(
+                replace(room, zone=zone), self.building, self.space, self.operation, self.weather
+            )
+            services = services_of(self.operation, area, self.weather)
+        else:
+            services = plain_services(self.space, self.occupied, self.options.occupancy)
         solar, gains = sun.switched(self.windows, self.thermals, state)
-        return RoomZone(self.space, room, solar, gains, state, lamps, self.occupied, plane)
+        return RoomZone(
+            self.space, room, solar, gains, state, lamps, self.occupied, plane, services
+        )
 
     def thermal(self) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort, and the balance they come from."""
@@ -369,7 +386,11 @@ class RoomSimulation:
         (balance,) = balances([self.zone], self.weather, step_s, progress=self.progress)
         self.progress("heat", 1.0)
         table = fenestration_table(self.windows, self.thermals)
-        return thermal_result(self.zone, balance, self.weather, self.occupied, table), balance
+        (humidity,) = room_humidity([self.zone], [balance], self.weather)
+        person = ComfortTable() if self.operation is None else self.operation.comfort
+        return thermal_result(
+            self.zone, balance, self.weather, felt_by(person, balance, humidity), table
+        ), balance
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""

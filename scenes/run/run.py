@@ -140,7 +140,11 @@ def read_inputs(
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
     building = read_building(
-        options.building, join=options.join, furniture=options.furniture, progress=steps
+        options.building,
+        join=options.join,
+        furniture=options.furniture,
+        apertures=options.apertures,
+        progress=steps,
     )
     inputs = job_inputs(building, options.spaces, files)
     progress("inputs", 1.0)
