@@ -158,7 +158,7 @@ def picture(drawn: Drawn) -> tuple[NDArray[np.float32], cfs.GlareResult]:
     sampling = cfs.Sampling(view_samples=SAMPLES, window_parts=drawn.window_parts)
     traced, view = cfs.PhaseScene(drawn.scene, sampling), drawn.scene.view
     light = cfs.PhaseSystems(traced, drawn.systems).light(drawn.sky)
-    shown = light.pictures(np.array([0]), [0])
+    shown = light.pictures(np.array([0]), [0] * len(drawn.systems))
     found = np.zeros(view.width * view.height, dtype=np.float32)
     found[shown.pixels] = shown.values(np.array([0]))[0]
     found = found.reshape(view.height, view.width)
