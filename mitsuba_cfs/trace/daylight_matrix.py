@@ -20,7 +20,14 @@ from mitsuba_cfs.trace.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.sampling import lattice_2d, opaque, path_generator, vectors
+from mitsuba_cfs.trace.sampling import (
+    empty_sums,
+    lattice_2d,
+    opaque,
+    path_generator,
+    sums_of,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
@@ -168,7 +175,7 @@ def sky_irradiance_matrix(
     normal = vectors(directions)
 
     def batch(number: int) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, S * P)
+        matrix = empty_sums(S * P)
         count = dr.opaque(mi.UInt32, n)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
@@ -184,7 +191,7 @@ def sky_irradiance_matrix(
             mi.Bool(True),
         )
         add_daylight_paths(tracer, sky, matrix, starts)
-        return matrix.numpy().reshape(S, P) * (accepted.total / n)
+        return sums_of(matrix, (S, P)) * (accepted.total / n)
 
     return accumulate(
         batch,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -15,7 +16,15 @@ from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.sampling import opaque, path_generator, pixel_places, vectors
+from mitsuba_cfs.trace.sampling import (
+    column,
+    empty_sums,
+    opaque,
+    path_generator,
+    pixel_places,
+    sums_of,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
@@ -111,9 +120,10 @@ def _block(
     seed: int,
 ) -> NDArray[np.float32]:
     """Rows [PARTS * n, G * K] of some pixels."""
-    matrix = dr.zeros(mi.Float64, PARTS * len(pixels) * bins.size * len(tracer.groups))
+    shape = PARTS * len(pixels), bins.size * len(tracer.groups)
+    matrix = empty_sums(math.prod(shape))
     eye = tracer.place(view.position)
-    number = mi.UInt32(pixels.astype(np.uint32))
+    number = column(pixels, mi.UInt32)
     for j, (dx, dy) in enumerate(pixel_places(samples)):
         x = (pixels % view.width + dx) / view.width
         y = 1.0 - (pixels // view.width + dy) / view.height
@@ -124,7 +134,7 @@ def _block(
             matrix,
             eye,
             vectors(directions),
-            mi.Bool(exists),
+            column(exists, mi.Bool),
             row=dr.arange(mi.UInt32, dr.width(number)),
             apart=dr.opaque(mi.UInt32, len(pixels)),
             stream=number,
@@ -135,7 +145,7 @@ def _block(
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
         dr.eval(matrix)
-    return (matrix.numpy() / samples).astype(np.float32)
+    return (sums_of(matrix, shape) / samples).astype(np.float32)
 
 
 def add_picture_paths(

@@ -26,7 +26,16 @@ from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, Rou
 from mitsuba_cfs.trace.outdoor_sun import OutdoorSun, ShownFaces
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, pixel_places, tables, vectors
+from mitsuba_cfs.trace.sampling import (
+    column,
+    empty_sums,
+    lattice_2d,
+    path_generator,
+    pixel_places,
+    sums_of,
+    tables,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places
 
@@ -76,7 +85,7 @@ def outdoors(
     outside = TracedScene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
-    faces = face_numbers(outside.surface.numpy(), outside.normal.numpy().T)
+    faces = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])
     rays_at_once = max(256, RAYS // samples)
     free, shown, rough = [], [], []
     for start in range(0, len(pixels), rays_at_once):
@@ -218,14 +227,12 @@ def _reflected(
         end = min(start + size, count)
         mine = order[ends[start] : ends[end]]
         tile, places = shown.tile[mine] - start, shown.places.some(mine)
-        matrix = dr.zeros(mi.Float64, (end - start) * sky.size)
-        generator = path_generator(
-            mi.UInt32(mine.astype(np.uint32)), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-        )
+        matrix = empty_sums((end - start) * sky.size)
+        generator = path_generator(column(mine, mi.UInt32), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
         away = mi.warp.square_to_cosine_hemisphere(u)
         starts = PathStarts(
-            mi.UInt32(tile.astype(np.uint32)),
+            column(tile, mi.UInt32),
             places.points(),
             mi.Frame3f(places.normals()).to_world(away),
             generator,
@@ -233,7 +240,7 @@ def _reflected(
             mi.Bool(True),
         )
         add_daylight_paths(outside, sky, matrix, starts)
-        values = matrix.numpy().reshape(end - start, sky.size)
+        values = sums_of(matrix, (end - start, sky.size))
         values *= np.pi / np.bincount(tile, minlength=end - start)[:, None]
         blocks.append(sparse.csr_array(values.astype(np.float32)))
     return sparse.csr_array(sparse.vstack(blocks))

@@ -36,7 +36,14 @@ from mitsuba_cfs.trace.picture_sharing import (
 )
 from mitsuba_cfs.trace.point_in_time import add_paths, leave, window_parts, window_sun
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixel_places, vectors
+from mitsuba_cfs.trace.sampling import (
+    lattice,
+    lattice_2d,
+    path_generator,
+    pixel_places,
+    tables,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 BLOCK = 2**19  # paths traced at a time
@@ -134,7 +141,7 @@ class _Faces:
 
     @staticmethod
     def _table(scene: TracedScene) -> tuple[mi.UInt32, int]:
-        face = face_numbers(scene.surface.numpy(), scene.normal.numpy().T)
+        face = face_numbers(scene.surface.numpy(), tables(scene.normal)[0])
         return mi.UInt32(face.astype(np.uint32)), int(face.max()) + 1
 
     def inside(self, prim: mi.UInt32, behind: mi.Bool, active: mi.Bool) -> mi.UInt32:

@@ -25,7 +25,7 @@ from mitsuba_cfs.trace.picture_disc import (
 )
 from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.room_sun import SunElements
-from mitsuba_cfs.trace.sampling import lattice_2d, opaque, opaque_vector, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.sun_paths import on_disc_of, place_and_hour
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
@@ -91,7 +91,7 @@ class PictureSun:
         reflectance = tracer.diffuse(hit.prim_index, -dr.dot(face, direction), valid)
         dull = valid & (group == OPAQUE) & (reflectance > 0)
         self._surface = np.flatnonzero(dull.numpy())
-        chosen = mi.UInt32(self._surface.astype(np.uint32))
+        chosen = column(self._surface, mi.UInt32)
         self._place = dr.gather(mi.Point3f, mi.Point3f(place), chosen)
         self._normal = dr.gather(mi.Vector3f, face, chosen)
         self._reflectance = dr.gather(mi.Float, reflectance, chosen)
@@ -101,7 +101,7 @@ class PictureSun:
             if not len(pane):  # the view shows nothing of this group
                 self._panes.append((pane, None, None))
                 continue
-            chosen = mi.UInt32(pane.astype(np.uint32))
+            chosen = column(pane, mi.UInt32)
             towards = tracer.to_group(g, dr.gather(mi.Vector3f, direction, chosen))
             point = dr.gather(mi.Point3f, mi.Point3f(self._eye + direction * hit.t), chosen)
             step = tracer.exterior_normal(g) * tracer.epsilon
@@ -236,7 +236,7 @@ class PictureSun:
         shown = hit.is_valid()
         place, normal, rho = tracer.surface_at(hit, self._eye, direction, shown)
         shown &= dr.gather(mi.Int32, tracer.group, hit.prim_index, shown) == OPAQUE
-        places = mi.UInt32(number.astype(np.uint32))
+        places = column(number, mi.UInt32)
         to_sun = on_disc_of(vectors(suns), places)
         cosine = dr.dot(normal, to_sun)
         tau = self._straight(place, to_sun, shown & (cosine > 0))

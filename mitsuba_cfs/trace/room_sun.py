@@ -26,7 +26,7 @@ from scipy import sparse
 
 from mitsuba_cfs.images.view import View, pixel_solid_angles, rays
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS
-from mitsuba_cfs.trace.sampling import lattice_2d, pixel_places, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d, pixel_places, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 
@@ -135,8 +135,8 @@ class _Look:
         """What rays of pixels find near, stratified over the pixels of a row by their number."""
         shown = self._shown(pixels, samples)
         of_row, sample = row[shown.ray], number[shown.ray] * samples + shown.sample
-        stream = mi.UInt32((of_row + self._seed * 1_000_003 & 0xFFFFFFFF).astype(np.uint32))
-        u = lattice_2d(mi.UInt32(sample.astype(np.uint32)), stream, 0)
+        stream = column(of_row + self._seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
+        u = lattice_2d(column(sample, mi.UInt32), stream, 0)
         point, normal = shown.places.points(), shown.places.normals()
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         hit = self._tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
@@ -160,8 +160,9 @@ class _Look:
         directions, exists = rays(view, x, 1.0 - y / view.height)
         way = vectors(directions)
         ray = mi.Ray3f(eye, way)
-        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=mi.Bool(exists))
-        found = mi.Bool(exists) & hit.is_valid()
+        exist = column(exists, mi.Bool)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=exist)
+        found = exist & hit.is_valid()
         rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
         places, found, rho, far = face_places(tracer, eye, way, hit, found, found, rho, hit.t)
         kept = np.flatnonzero(found & (rho > 0))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import drjit as dr
@@ -10,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 SHIFT_ROUNDS = 8
+PADDED = 1 << 21  # sums from which on their number is what is asked for
+ALIGNMENT = 64  # of memory that kernels load whole vectors from [bytes]
 _DIMENSIONS = 6  # dimensions of the lattice; later decisions of a path are random
 
 
@@ -66,13 +70,30 @@ def opaque_vector(values: ArrayLike) -> mi.Vector3f:
     return mi.Vector3f(*map(opaque, np.asarray(values, dtype=float)))
 
 
+def column(values: ArrayLike, kind: type | None = None) -> Any:
+    """Values [n] as a kernel takes them, one for each lane.
+
+    Dr.Jit compiles one kernel for memory that begins at the width of its vectors and another for
+    any other; NumPy's begins now here, now there.
+
+    Args: kind: `mi.Float` by default.
+    """
+    kind = mi.Float if kind is None else kind
+    names = {mi.Float: np.float32, mi.UInt32: np.uint32, mi.Bool: np.bool_}
+    given = np.asarray(values, dtype=names[kind])
+    memory = np.empty(given.nbytes + ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    aligned = memory[start : start + given.nbytes].view(given.dtype)
+    aligned[:] = given
+    return kind(aligned)
+
+
 def vectors(table: ArrayLike, kind: type | None = None) -> Any:
     """A table [n, 3] as a kernel takes it, axis by axis: as a whole its n would be a literal.
 
     Args: kind: `mi.Vector3f` by default.
     """
-    columns = np.ascontiguousarray(np.asarray(table, dtype=np.float32).T)
-    return (mi.Vector3f if kind is None else kind)(*map(mi.Float, columns))
+    return (mi.Vector3f if kind is None else kind)(*map(column, np.asarray(table).T))
 
 
 def tables(*found: Any) -> list[NDArray[Any]]:
@@ -84,6 +105,20 @@ def tables(*found: Any) -> list[NDArray[Any]]:
         else one.numpy()
         for one in found
     ]
+
+
+def empty_sums(count: int) -> mi.Float64:
+    """Zeros to add up to in a kernel, at least so many, for `sums_of`.
+
+    Dr.Jit gives each thread a copy of what is not large and writes its size into the kernel: it is
+    a power of two, so that few kernels differ in it.
+    """
+    return dr.zeros(mi.Float64, count if count > PADDED else 1 << (count - 1).bit_length())
+
+
+def sums_of(sums: mi.Float64, shape: Sequence[int]) -> NDArray[np.float64]:
+    """What a kernel has added up, as an array of a shape."""
+    return sums.numpy()[: math.prod(shape)].reshape(shape)
 
 
 class DiscreteDistribution:

@@ -22,7 +22,14 @@ from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice_2d, opaque, path_generator, vectors
+from mitsuba_cfs.trace.sampling import (
+    empty_sums,
+    lattice_2d,
+    opaque,
+    path_generator,
+    sums_of,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import TracedScene
 
 
@@ -59,7 +66,7 @@ def straight_view_matrix(
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, S * sky.size)
+        matrix = empty_sums(S * sky.size)
         stream = key ^ opaque(0x510E527F + g, mi.UInt32)
         sensor, start, omega, weight = straight_rays(
             inside, g, way, (points, directions), n, stream
@@ -73,7 +80,7 @@ def straight_view_matrix(
             weight > 0,
         )
         add_daylight_paths(outside, sky, matrix, starts, weight)
-        return matrix.numpy().reshape(S, sky.size) / n
+        return sums_of(matrix, (S, sky.size)) / n
 
     def batch(number: int) -> NDArray[np.float64]:
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)

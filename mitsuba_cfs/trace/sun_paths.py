@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.sun import SUN_RADIUS
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, tables, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d, path_generator, tables, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_ways import sun_ways
 
@@ -82,7 +82,7 @@ def reflecting_places(
     for bounce in range(bounces):
         if not len(path):
             break
-        number = mi.UInt32((path * bounces + bounce).astype(np.uint32))
+        number = column(path * bounces + bounce, mi.UInt32)
         kept, places, rho, luck = _next(tracer, places, path_generator(number, key))
         path, weight = path[kept], weight[kept] * rho
         paths.append(path)

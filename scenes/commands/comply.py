@@ -30,7 +30,7 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
 @building_options("all")
 @click.option(
     "--standard", "standards", multiple=True, required=True, metavar="NAME|FILE.toml",
-    help="Rules to check: en17037, lm83, leed-v4.1, breeam-hea01, well-v2, or a file of your own.",
+    help="Rules to check: en17037, leed-v4.1, any other of docs/comply.md, or a file of your own.",
 )  # fmt: skip
 @click.option(
     "--closed", type=FILE,

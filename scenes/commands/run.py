@@ -44,6 +44,10 @@ _DEFAULT = RoomOptions()
     "--operation", type=FILE,
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
+@click.option(
+    "--explore", is_flag=True,
+    help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
+)  # fmt: skip
 def command(
     building: Path,
     *,
@@ -58,17 +62,21 @@ def command(
     apertures: tuple[str, ...],
     operation: Path | None,
     no_cache: bool,
+    explore: bool,
     quick: bool,
     **chosen,
 ) -> None:
     """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
+    if explore and chosen["method"] == "point-in-time":
+        raise click.UsageError("--explore needs --method three-phase or five-phase")
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
-        RoomOptions.of(**chosen), operation=operation, u_value=u_value, g_value=g_value,
+        RoomOptions.of(**chosen), operation=operation, explore=explore,
+        u_value=u_value, g_value=g_value,
     )  # fmt: skip
     run_to_folder(options, out)
 
@@ -86,8 +94,9 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.explore.folder import write_explorer
     from scenes.report import write_report
-    from scenes.run.outputs import write_results
+    from scenes.run.outputs import EXPLORER, write_results
     from scenes.run.run import run_job
 
     if options.quick:
@@ -97,7 +106,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
             options, progress, files, on_room=_print_summary, on_building=_print_account
         )
         progress("results", 0.0)
-        write_results(result, folder, write_report)
+        write_results(result, folder, write_report, write_explorer if options.explore else None)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:
@@ -105,6 +114,8 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+    if options.explore:
+        click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
 
 
 def _print_account(building) -> None:

@@ -22,6 +22,7 @@ from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
 from scenes.comply.glare import seat_glare
 from scenes.comply.glass import windows_without_view
+from scenes.comply.heat import room_heat
 from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
@@ -38,7 +39,7 @@ from scenes.run.building import read_building
 from scenes.run.inputs import named_spaces
 from scenes.run.rooms import RoomSeries
 
-LIGHT, RAYS = frozenset({"open", "operated", "glare"}), frozenset({"view", "sun"})
+LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat"}), frozenset({"view", "sun"})
 
 
 def check_building(
@@ -111,7 +112,7 @@ class Check:
         self.systems: dict[str, States] = {guid: states[:1] for guid, states in systems.items()}
         # LM-83's default shade is for its own sum alone, no rating of glare
         self.shaded = files.closed is not None or min(map(len, systems.values()), default=0) > 1
-        if "operated" in self.parts or (self.glaring and self.shaded):
+        if "operated" in self.parts or (self.shaded and self.moving):
             self.systems = open_and_closed(systems, files.closed)
         self.building = traced_building(building, self.systems)
         self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
@@ -125,7 +126,12 @@ class Check:
     @property
     def lit(self) -> bool:
         """Whether the rules look at light at all."""
-        return bool(self.parts & {"open", "operated"}) or self.glaring
+        return bool(self.parts & {"open", "operated", "heat"}) or self.glaring
+
+    @property
+    def moving(self) -> bool:
+        """Whether something that real blinds change is looked at, LM-83's own sum apart."""
+        return self.glaring or "heat" in self.parts
 
     @property
     def glaring(self) -> bool:
@@ -206,13 +212,17 @@ class Check:
         operated = {
             distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts
         }
-        if self.glaring and self.shaded:
+        if self.moving and self.shaded:
             operated = operated or {0}
         found = lights_of(room, operated)
-        glare = self._glare(room, found) if self.glaring else None
+        closed = next((one.closed for one in found if one.closed is not None), None)
+        closed = closed if self.shaded else None
+        glare = self._glare(room, closed) if self.glaring else None
+        heat = room_heat(room, closed) if "heat" in self.parts else None
+        of_room = Findings(self.calendar, glare=glare, heat=heat)
         lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
         values = {
-            name: values_of(rules[name], Findings(self.calendar, light, glare=glare), LIGHT)
+            name: values_of(rules[name], replace(of_room, light=light), LIGHT)
             for name, light in lights.items()
         }
         summaries = {id(light): self._summary(light) for light in found}
@@ -220,12 +230,9 @@ class Check:
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
 
-    def _glare(self, room: RoomSimulation, lights: list[GridLight]) -> SeatGlare:
-        """Glare of a room's seats, real blinds operated as LM-83 moves them."""
-        state = None
-        if self.shaded:
-            closed = next(one.closed for one in lights if one.closed is not None)
-            state = closed[room.skies.lit].T.astype(np.int64)
+    def _glare(self, room: RoomSimulation, closed: NDArray[np.bool_] | None) -> SeatGlare:
+        """Glare of a room's seats with its blinds closed [H, G]; None: open all year."""
+        state = None if closed is None else closed[room.skies.lit].T.astype(np.int64)
         options = self.options
         return seat_glare(
             room, state, grid=options.grid, directions=options.directions,
@@ -241,7 +248,7 @@ class Check:
             daylight_autonomy(light_of_use, ten),
             sunlit_hours(light.direct, ten, step_h=self.calendar.step_h),
             None if light.closed is None else light.closed[ten].mean(axis=0),
-            None if light.free is None else _free_shares(light.free[ten]),
+            None if light.free is None else free_shares(light.free[ten]),
         )
 
     def room(
@@ -288,6 +295,12 @@ class Check:
         elif self.glaring:
             blinds = "blinds closed by LM-83's rule" if self.shaded else "every window open"
             found.append(f"Glare is rated with {blinds}.")
+        if "heat" in self.parts:
+            blinds = "blinds closed when LM-83 closes some" if self.shaded else "no blinds"
+            found.append(
+                f"Temperatures are those without heating and cooling, {blinds}, "
+                f"{options.room.infiltration_ach:g} air changes an hour, gains of the hours of use."
+            )
         if "open" in self.parts and self.calendar.median_diffuse is None:
             found.append("The weather file has no diffuse illuminance: no daylight factor method.")
         found += [
@@ -298,7 +311,7 @@ class Check:
         return found
 
 
-def _free_shares(free: NDArray[np.bool_]) -> tuple[float, float]:
+def free_shares(free: NDArray[np.bool_]) -> tuple[float, float]:
     """Shares of the hours in which some and in which all window groups [H, G] are seen through."""
     return float(np.mean(free.any(axis=1))), float(np.mean(free.all(axis=1)))
 

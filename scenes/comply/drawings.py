@@ -105,5 +105,5 @@ def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
         tuple(Tick(100 * (h - FIRST_HOUR) / span, str(h), "") for h in hours),
         tuple(Tick(100 * (count - i - 0.5) / count, name, "", False)
               for i, (name, _) in enumerate(rows)),
-        tuple(marks), height=40 + 26 * count,
+        tuple(marks), height=30 + 18 * count,
     )  # fmt: skip

@@ -73,6 +73,15 @@ class SeatGlare:
 
 
 @dataclass(frozen=True, slots=True)
+class RoomHeat:
+    """The temperatures of a room without heating and cooling."""
+
+    operative_c: FloatArray  # [H]
+    outdoor_c: FloatArray  # [H]
+    occupied: NDArray[np.bool_]  # [H] the hours of use
+
+
+@dataclass(frozen=True, slots=True)
 class Findings:
     """What was computed of a room; None is not computed."""
 
@@ -81,6 +90,7 @@ class Findings:
     view: ViewOut | None = None
     sun: SunExposure | None = None
     glare: SeatGlare | None = None
+    heat: RoomHeat | None = None
 
     @property
     def daylight_hours(self) -> NDArray[np.bool_]:

@@ -196,7 +196,8 @@ def _rooms(
     def compute(space: Space, steps: Progress) -> RoomYear:
         return compute_room(
             inputs.building, space, inputs.systems, inputs.weather, options.room,
-            operation=inputs.operation, skies=skies, cache=cache, progress=steps,
+            operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
+            progress=steps,
         )  # fmt: skip
 
     return RoomSeries(

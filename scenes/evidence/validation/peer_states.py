@@ -1,4 +1,4 @@
-"""sDA, ASE and provision of rooms with blinds against honeybee-radiance-postprocess, by state.
+"""sDA, ASE and provision of rooms with blinds against honeybee-radiance-postprocess, with states.
 
     python -m scenes.evidence.validation.peer_states [--peer PYTHON] [--out FOLDER]
 
@@ -101,7 +101,7 @@ def _lit(points: FloatArray, sun: FloatArray, window: tuple) -> FloatArray:
 
 
 def _sky(points: FloatArray, window: tuple) -> FloatArray:
-    """Share [S] of diffuse light that reaches each sensor: a small, dirty window's form factor."""
+    """Share [S] of the diffuse light at each sensor: a small, dirty window's form factor."""
     normal, offset, along = _wall(window[0])
     _, start, end, sill, head = window
     centre = offset * normal + 0.5 * (start + end) * along + [0, 0, 0.5 * (sill + head)]
@@ -162,9 +162,8 @@ def _write(folder: Path, room: StatedRoom, weather: Weather) -> None:
     (results / "grid_states.json").write_text(json.dumps({"room": states}))
     hours = np.arange(8760) + 0.5
     (results / "sun-up-hours.txt").write_text("\n".join(f"{h}" for h in hours[up]))
-    (results / "study_info.json").write_text(
-        json.dumps({"timestep": 1, "study_hours": list(hours)})
-    )
+    study = {"timestep": 1, "study_hours": list(hours)}
+    (results / "study_info.json").write_text(json.dumps(study))
     np.save(folder / "daylight_hours.npy", room.total.sum(axis=0)[daylight_hours(weather)].T)
 
 
