@@ -1,8 +1,10 @@
 """The names of `import bim`, and the modules that they come from."""
 
 from .account import Account as Account
+from .context.surroundings import with_surroundings as with_surroundings
 from .fenestration import ShadingState as ShadingState
 from .gbxml.building import read_gbxml as read_gbxml
+from .georeference import Georeference as Georeference
 from .honeybee.building import read_honeybee as read_honeybee
 from .ifc.building import read_ifc as read_ifc
 from .ifc.corrections import Corrections as Corrections, read_corrections as read_corrections

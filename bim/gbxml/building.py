@@ -92,7 +92,9 @@ class _Reader:
             Problem(document.file.name, f"{n} surface(s) of type {k!r:.40}", "left out")
             for k, n in unplaced.items()
         ]
-        storeys = {s.get("id", ""): _name(s) for s in document.all("Campus/Building/BuildingStorey")}
+        storeys = {
+            s.get("id", ""): _name(s) for s in document.all("Campus/Building/BuildingStorey")
+        }
         rooms = tuple(self._room(one, faces[guid], storeys) for guid, one in spaces.items())
         campus = root.find("Campus")
         name = "" if campus is None else _name(campus)

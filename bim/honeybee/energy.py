@@ -17,11 +17,11 @@ import numpy as np
 from bim.honeybee.library import NamedObjects
 from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues
+from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
 from mitsuba_cfs.errors import DataError
 from thermal.errors import ThermalInputError
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
 from thermal.iso15099 import NFRC, iso15099_g_values, iso15099_u_value
-from thermal.panes import PaneOptics, stack
 
 NO_MASS_CONDUCTIVITY = (
     0.04  # of a layer that states its resistance alone: an insulation's [W/(m K)]

@@ -28,6 +28,14 @@ join_option = click.option(
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."
 )
+surroundings_option = click.option(
+    "--surroundings", multiple=True, type=FILE,
+    help="What stands around: OBJ, STL, PLY, glTF, CityJSON, GeoJSON; PVGIS's horizon.",
+)  # fmt: skip
+surroundings_offset_option = click.option(
+    "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
+    help="Added to their coordinates [m] in place of any georeference.",
+)  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="EPW file, hourly."
 )

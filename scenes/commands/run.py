@@ -25,6 +25,8 @@ from scenes.commands.room_options import (
     space_option,
     subdivide_option,
     sun_option,
+    surroundings_offset_option,
+    surroundings_option,
     system_option,
     u_option,
 )
@@ -46,6 +48,8 @@ _DEFAULT = RoomOptions()
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @join_option
 @furniture_option
+@surroundings_option
+@surroundings_offset_option
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -87,6 +91,8 @@ def command(
     g_value: float | None,
     join: tuple[str, ...],
     furniture: bool,
+    surroundings: tuple[Path, ...],
+    surroundings_offset: tuple[float, float, float] | None,
     operation: Path | None,
     no_cache: bool,
     quick: bool,
@@ -98,8 +104,9 @@ def command(
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
-        building, weather, system, operation, spaces, join, furniture, u_value, g_value,
-        cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen),
+        building, weather, system, operation, spaces, join, furniture, surroundings,
+        surroundings_offset, u_value, g_value, cache=not no_cache, quick=quick,
+        room=RoomOptions.of(**chosen),
     )  # fmt: skip
     run_to_folder(options, out)
 
@@ -111,6 +118,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     from scenes.run.files import read_files
 
     inputs = (options.building, options.weather, options.system, options.operation)
+    inputs += options.surroundings
     folder = ResultFolder(out, command, inputs=inputs)
     if options.cache:
         default_folder()  # or one line that it cannot be one

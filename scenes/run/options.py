@@ -20,6 +20,8 @@ class JobOptions:
     spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     furniture: bool = False  # whether what stands in the rooms is in their light and views
+    surroundings: tuple[Path, ...] = ()  # files of what stands around
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence
     cache: bool = True  # keep traced matrices and find them again

@@ -140,8 +140,10 @@ def read_inputs(
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
     building = read_building(
-        options.building, join=options.join, furniture=options.furniture, progress=steps
-    )
+        options.building, join=options.join, furniture=options.furniture,
+        surroundings=options.surroundings, surroundings_offset=options.surroundings_offset,
+        progress=steps,
+    )  # fmt: skip
     inputs = job_inputs(building, options.spaces, files)
     progress("inputs", 1.0)
     return inputs
@@ -233,6 +235,7 @@ def _manifest(
     if inputs.operation is not None:
         files["operation"] = inputs.operation.file
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
+    files |= {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
         "quick": options.quick,

@@ -40,11 +40,14 @@ def loop(points) -> str:
 def surface(name, kind, points, spaces, inner="", construction="") -> str:
     refers = f' constructionIdRef="{construction}"' if construction else ""
     beside = "".join(f'<AdjacentSpaceId spaceIdRef="{s}"/>' for s in spaces)
-    return f'<Surface id="{name}" surfaceType="{kind}"{refers}>{beside}{loop(points)}{inner}</Surface>'
+    return (
+        f'<Surface id="{name}" surfaceType="{kind}"{refers}>{beside}{loop(points)}{inner}</Surface>'
+    )
 
 
 def two_rooms(azimuth=0.0) -> str:
     """Office 5 x 8 x 3 m and, east of it, hall 4 x 8 x 3 m; a window south, a door between."""
+
     def box(x0, x1):
         return {
             "south": [(x0, 0, 0), (x1, 0, 0), (x1, 0, 3), (x0, 0, 3)],
