@@ -116,6 +116,18 @@ def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
     return read_ifc(path, join=options.join, furniture=options.furniture, progress=progress)
 
 
+def _check_there(path: Path) -> None:
+    if not path.is_file():
+        raise DataError("no such file", file=path)
+
+
+def _read_radiance(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.radiance.building import read_radiance_building
+
+    progress("opening", 0.0)
+    return read_radiance_building(path, options.apertures)
+
+
 def _check_honeybee(path: Path) -> None:
     from bim.honeybee.schema import read_json
 
@@ -144,6 +156,7 @@ def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Buildin
 
 FLAGS = {"join": "join", "apertures": "aperture"}
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
+RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures",))
 HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
 GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
-FORMATS: tuple[BuildingFormat, ...] = (IFC, HONEYBEE, GBXML)
+FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)

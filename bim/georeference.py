@@ -39,7 +39,7 @@ def local_metres(
     """East and north [N, 2] [m] of places [N, 2] [deg] from one among them.
 
     By the ellipsoid's two radii of curvature there, to the second order of the distance (a parallel
-    is curved): 0.05 m off at 3 km and 50 degrees.
+    is curved): 0.01 m off at 3 km and 50 degrees.
     """
     phi = np.radians(latitude_deg)
     e2 = FLATTENING * (2 - FLATTENING)

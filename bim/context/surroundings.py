@@ -163,10 +163,10 @@ def _beside(
     ]
     if own:
         what = f"{', '.join(own[:3])}: {len(own)} object(s) where rooms of the building are"
-        problems.append(Problem(file, what, "left out as the building itself"))
+        problems.append(Problem(context.path.name, what, "left out as the building itself"))
     if far:
         what = f"{far} object(s) further than {FARTHEST / 1000:.0f} km"
-        problems.append(Problem(file, what, "left out: is the file placed rightly?"))
+        problems.append(Problem(context.path.name, what, "left out: is the file placed rightly?"))
     return kept, problems
 
 

@@ -13,6 +13,7 @@ import shapely
 
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
 from bim.coarser import coarser
+from bim.defaults import CLEAR_GLAZING
 from bim.guarded import RoomBoundary, room_boundaries
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
@@ -30,7 +31,7 @@ from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_problems
 from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
 from bim.model import Building, Element, Problem, Space
-from bim.outdoors import lifted_sites, unblinded
+from bim.outdoors import lifted_sites, mirrors_in_view, unblinded
 from bim.rays import RayMesh, ray_mesh
 from bim.solids import triangles_of
 from bim.soundness import agree, soundness_problems
@@ -151,11 +152,13 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
         source.elements,
         reflectance=source.corrections.surroundings,
         kept=source.corrections.kept(source.model),
+        panes=CLEAR_GLAZING,
     )
+    elements, problems_of_panes = mirrors_in_view(elements, windows)
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
     traced, fine = coarser(list(outdoors.elements))
-    return tuple(traced), [*problems, *more, *outdoors.problems, *fine]
+    return tuple(traced), [*problems, *problems_of_panes, *more, *outdoors.problems, *fine]
 
 
 def _surroundings(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
-from mitsuba_cfs.bsdf.klems import KlemsBasis
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
 
 FloatArray = NDArray[np.float64]
@@ -76,6 +76,16 @@ class AngularTable:
         if angles[-1] < np.pi / 2 - 1e-9:
             angles, values = np.append(angles, np.pi / 2), np.append(values, end)
         return np.clip(PchipInterpolator(angles, values)(np.minimum(theta, angles[-1])), 0, 1)
+
+
+def specular_matrices(table: AngularTable, basis: KlemsBasis = KLEMS_FULL) -> KlemsBsdf:
+    """The Klems matrices of a table with reflectances on either side: means over its patches."""
+    known = (table.transmittance, table.reflectance_front, table.reflectance_back)
+    tau, front, back = (
+        np.diag(table.patch_means(basis, values, end) / basis.projected_solid_angles())
+        for values, end in zip(known, (0.0, 1.0, 1.0), strict=True)
+    )
+    return KlemsBsdf(basis, basis, tau, tau, front, back)
 
 
 def roos_table(glazing: Glazing) -> AngularTable:

@@ -24,7 +24,7 @@ from scipy import sparse
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.sampling import lattice_2d, opaque
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.straight_view import straight_rays
 from mitsuba_cfs.trace.sun_paths import (
@@ -86,8 +86,17 @@ def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunSh
         stream = mi.sample_tea_32(patch, key)[0]
         way = outside.to_world(q, bins.sample(patch, lattice_2d(sample, stream, 0)))
         position = outside.sample_group(q, lattice_2d(sample, stream, 2))
-        weight = dr.full(mi.Float, 1.0 / samples, K * samples)
-        met.append(_met(outside, q * K + patch, weight, position, way, seed * 1_000_003 + q))
+        weight = opaque(1.0 / samples) + dr.zeros(mi.Float, K * samples)
+        met.append(
+            _met(
+                outside,
+                opaque(q * K, mi.UInt32) + patch,
+                weight,
+                position,
+                way,
+                seed * 1_000_003 + q,
+            )
+        )
     return SunShares.of(met, len(outside.groups) * K, seed)
 
 
@@ -143,10 +152,10 @@ def _met(
     hit, origin = outside.met_outdoors(origin, way, active)
     found = active & hit.is_valid()
     rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, found)
-    places = face_places(outside, origin, way, hit, found)
-    value = (weight * rho * dr.inv_pi).numpy().astype(float)
-    kept = np.flatnonzero(found.numpy() & (value > 0))
-    first, value, row = places.some(kept), value[kept], row.numpy()[kept].astype(np.int64)
+    value = weight * rho * dr.inv_pi
+    places, found, value, row = face_places(outside, origin, way, hit, found, found, value, row)
+    kept = np.flatnonzero(found & (value > 0))
+    first, value, row = places.some(kept), value[kept].astype(float), row[kept].astype(np.int64)
     later = reflecting_places(outside, first, seed, BOUNCES)
     return _Met(
         np.concatenate([row, row[later.path]]),

@@ -20,7 +20,7 @@ from scipy import sparse
 
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.sampling import lattice_2d, opaque, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, on_disc_of, reflecting_places
 
@@ -114,23 +114,24 @@ def _flux(
     hour = lane // WINDOW_POINTS
     point = lane - hour * WINDOW_POINTS
     # the same points in all hours: an hour's light does not hang on those computed with it
-    position = inside.sample_group(group, lattice_2d(point, mi.UInt32(group), 0))
-    towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), hour)
+    position = inside.sample_group(group, lattice_2d(point, opaque(group, mi.UInt32), 0))
+    towards = dr.gather(mi.Vector3f, vectors(suns), hour)
     to_sun = on_disc_of(towards, point)
     local = inside.to_group(group, to_sun)
     active = local.z > 0
-    off = inside.outward(mi.Int32(group), mi.Bool(True))
+    off = inside.outward(opaque(group, mi.Int32), mi.Bool(True))
     active &= ~outside.met_outdoors(mi.Point3f(position + off), to_sun, active)[0].is_valid()
     value = dr.select(active, local.z * way.through(local), 0.0)
-    value *= float(inside.groups[group].area) / WINDOW_POINTS
+    value *= opaque(inside.groups[group].area / WINDOW_POINTS)
     origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
     ray = mi.Ray3f(origin, onwards)
     hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
     lit = active & hit.is_valid()
-    kept = np.flatnonzero(lit.numpy())
-    cell = cells.of(face_places(inside, origin, onwards, hit, lit).some(kept))
+    places, lit, value, hour = face_places(inside, origin, onwards, hit, lit, lit, value, hour)
+    kept = np.flatnonzero(lit)
+    cell = cells.of(places.some(kept))
     kept, cell = kept[cell >= 0], cell[cell >= 0]
-    entries = value.numpy()[kept], (cell, hour.numpy()[kept])
+    entries = value[kept], (cell, hour[kept])
     return sparse.csr_array(sparse.coo_array(entries, shape=(len(cells.keys), len(suns))))
 
 
@@ -152,6 +153,6 @@ def _points_on(interior: Surfaces, inside: TracedScene, seed: int) -> Places:
     point = a * (1 - root) + b * root * (1 - v) + c * root * v - inside.centre
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    off = inside.epsilon * normal
+    off = inside.epsilon[0] * normal
     both = np.concatenate([point + off, point - off]), np.concatenate([normal, -normal])
     return Places(both[0].astype(np.float32), both[1].astype(np.float32))

@@ -10,10 +10,13 @@ from scenes import quick
 from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    aperture_option,
+    directions_option,
     eye_height_option,
     furniture_option,
     glare_sources_option,
     glare_sun_option,
+    grid_option,
     join_option,
     method_option,
     out_folder_option,
@@ -42,14 +45,10 @@ _DEFAULT = YearOptions(Path(), Path())
 @space_option("space", "default: the first with a window", several=False)
 @join_option
 @furniture_option
+@aperture_option
 @view_option("views", "or a file of them", several=True)
-@click.option(
-    "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."
-)
-@click.option(
-    "--directions", type=click.IntRange(1, 64), default=_DEFAULT.directions, show_default=True,
-    help="Directions of every eye, the first to the biggest window.",
-)  # fmt: skip
+@grid_option
+@directions_option
 @eye_height_option
 @method_option(METHODS, "by paths there are single pictures, cfs picture", default=_DEFAULT.method)
 @click.option(

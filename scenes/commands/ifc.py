@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bim.model import Building, Space
 
 PATTERNS = {  # of the files that an export writes
-    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml"),
+    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml", "run.sh"),
     "--mitsuba": ("scene.xml", "glass_*.xml", "*.ply"),
 }
 

@@ -10,6 +10,7 @@ import click
 from mitsuba_cfs.files import check_file
 from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.room_options import (
+    aperture_option,
     eye_height_option,
     furniture_option,
     glare_sources_option,
@@ -39,6 +40,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @space_option("space", "default: the first with a window", several=False)
 @join_option
 @furniture_option
+@aperture_option
 @view_option("view", "not parallel", several=False)
 @eye_height_option
 @size_option("size", 800, "as evalglare wants them")

@@ -8,6 +8,7 @@ import click
 
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
+<<<<<<< HEAD
 from scenes.commands.parameters import BUILDING_FILE, FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
@@ -30,6 +31,11 @@ from scenes.commands.room_options import (
     system_option,
     u_option,
 )
+=======
+from scenes.commands.parameters import FILE
+from scenes.commands.quick_option import given
+from scenes.commands.room_options import building_options, method_option, size_option, u_option
+>>>>>>> main
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
@@ -38,18 +44,17 @@ _DEFAULT = RoomOptions()
 
 
 @click.command()
-@click.argument("building", type=BUILDING_FILE, metavar="BUILDING")
-@needed_weather_option
-@system_option
-@out_folder_option
+@building_options("all with a window")
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
-@space_option("spaces", "default: all with a window")
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
+<<<<<<< HEAD
 @join_option
 @furniture_option
 @surroundings_option
 @surroundings_offset_option
+=======
+>>>>>>> main
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -71,15 +76,10 @@ _DEFAULT = RoomOptions()
     "--operation", type=FILE,
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
-@click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
-@subdivide_option
-@glare_sources_option
-@glare_sun_option
-@sun_option
-@sky_ground_option
-@seed_option
-@no_cache_option
-@quick_option
+@click.option(
+    "--explore", is_flag=True,
+    help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
+)  # fmt: skip
 def command(
     building: Path,
     *,
@@ -91,22 +91,35 @@ def command(
     g_value: float | None,
     join: tuple[str, ...],
     furniture: bool,
+<<<<<<< HEAD
     surroundings: tuple[Path, ...],
     surroundings_offset: tuple[float, float, float] | None,
+=======
+    apertures: tuple[str, ...],
+>>>>>>> main
     operation: Path | None,
     no_cache: bool,
+    explore: bool,
     quick: bool,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
+    """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
+    if explore and chosen["method"] == "point-in-time":
+        raise click.UsageError("--explore needs --method three-phase or five-phase")
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
+<<<<<<< HEAD
         building, weather, system, operation, spaces, join, furniture, surroundings,
         surroundings_offset, u_value, g_value, cache=not no_cache, quick=quick,
         room=RoomOptions.of(**chosen),
+=======
+        building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
+        RoomOptions.of(**chosen), operation=operation, explore=explore,
+        u_value=u_value, g_value=g_value,
+>>>>>>> main
     )  # fmt: skip
     run_to_folder(options, out)
 
@@ -125,8 +138,9 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.explore.folder import write_explorer
     from scenes.report import write_report
-    from scenes.run.outputs import write_results
+    from scenes.run.outputs import EXPLORER, write_results
     from scenes.run.run import run_job
 
     if options.quick:
@@ -136,7 +150,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
             options, progress, files, on_room=_print_summary, on_building=_print_account
         )
         progress("results", 0.0)
-        write_results(result, folder, write_report)
+        write_results(result, folder, write_report, write_explorer if options.explore else None)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:
@@ -144,6 +158,8 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+    if options.explore:
+        click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
 
 
 def _print_account(building) -> None:

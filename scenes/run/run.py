@@ -140,10 +140,19 @@ def read_inputs(
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
     building = read_building(
+<<<<<<< HEAD
         options.building, join=options.join, furniture=options.furniture,
         surroundings=options.surroundings, surroundings_offset=options.surroundings_offset,
         progress=steps,
     )  # fmt: skip
+=======
+        options.building,
+        join=options.join,
+        furniture=options.furniture,
+        apertures=options.apertures,
+        progress=steps,
+    )
+>>>>>>> main
     inputs = job_inputs(building, options.spaces, files)
     progress("inputs", 1.0)
     return inputs
@@ -194,7 +203,8 @@ def _rooms(
     def compute(space: Space, steps: Progress) -> RoomYear:
         return compute_room(
             inputs.building, space, inputs.systems, inputs.weather, options.room,
-            operation=inputs.operation, skies=skies, cache=cache, progress=steps,
+            operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
+            progress=steps,
         )  # fmt: skip
 
     return RoomSeries(

@@ -88,7 +88,7 @@ def read_year(
     steps = part(progress, 0.1, 0.6)
     viewed = read_viewed_room(
         options.building, options.space, options.join, files.given, view_of, steps,
-        furniture=options.furniture,
+        furniture=options.furniture, apertures=options.apertures,
     )  # fmt: skip
     variants.activate()
     sampling = sampling_of(options)
@@ -99,7 +99,7 @@ def read_year(
     progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     chosen += [options.window_parts, options.glare_sources, options.glare_sun]
-    chosen += [options.sun_model, options.sky_ground, options.furniture]
+    chosen += [options.sun_model, options.sky_ground, options.furniture, options.apertures]
     # corrections change rooms and surroundings, as --join does, under the same GUID
     files_read = (options.building, options.weather, *files_beside(options.building))
     hashes = [sha256(path) for path in files_read]

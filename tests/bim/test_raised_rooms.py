@@ -89,6 +89,14 @@ def test_stated_ceiling_is_believed(tmp_path, relation):
     assert "kept: " in said(building) and "eiling" in said(building)
 
 
+@pytest.mark.parametrize("height", [LOW, HEIGHT])
+def test_room_does_not_rise_into_a_storey_whose_rooms_are_not_drawn(tmp_path, height):
+    building = read(tmp_path, box_model(space_height=height, roof=False, upper=True)[0])
+    assert building.spaces[0].raised == 0.0
+    why = "far above this glass" if height == LOW else "belongs to the storey above"
+    assert why in said(building)
+
+
 def test_slab_that_is_no_closed_solid_is_still_between(tmp_path):
     small, _ = box_model(space_height=LOW)
     create = small.model.create_entity

@@ -129,7 +129,7 @@ def test_arcs_agree_with_proj():
     plane = pyproj.Proj("+proj=aeqd +lat_0=50 +lon_0=8 +ellps=WGS84")
     east, north = plane(places[:, 0], places[:, 1])
     found = local_metres(places, 8.0, 50.0)
-    np.testing.assert_allclose(found, np.column_stack([east, north]), atol=0.05)  # at 3 km
+    np.testing.assert_allclose(found, np.column_stack([east, north]), atol=0.01)  # at 3 km
 
 
 @pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "glb"])

@@ -75,7 +75,7 @@ def test_three_commands_give_the_same_numbers(variant, tmp_path, method) -> None
         f"[options]\n{TRACE}\n"
     )
     options = JobOptions(
-        OFFICE, WEATHER, VENETIAN_BLIND, operation, ("A",),
+        OFFICE, WEATHER, VENETIAN_BLIND, ("A",), operation=operation,
         room=RoomOptions.of(method=method, picture_hours=("06-21 12",), **SAMPLING),
     )  # fmt: skip
     (room,) = run_job(options).spaces
