@@ -118,9 +118,7 @@ def write_radiance(
     files = {identifier(name): bsdfs.get(name) for name in windows}
     script = _write(folder / "run.sh", [run_script(files, sky_division)])
     script.chmod(0o755)
-    return RadianceFiles(
-        written, room, scene, windows, bsdfs, sky, sensors, view, surfaces, script
-    )
+    return RadianceFiles(written, room, scene, windows, bsdfs, sky, sensors, view, surfaces, script)
 
 
 def _surface_lines(space: Space, spacing: float) -> Iterable[str]:

@@ -29,7 +29,10 @@ join_option = click.option(
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."
 )
-<<<<<<< HEAD
+aperture_option = click.option(
+    "--aperture", "apertures", multiple=True, metavar="MATERIAL",
+    help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
+)  # fmt: skip
 surroundings_option = click.option(
     "--surroundings", multiple=True, type=FILE,
     help="What stands around: OBJ, STL, PLY, glTF, CityJSON, GeoJSON; PVGIS's horizon.",
@@ -37,11 +40,6 @@ surroundings_option = click.option(
 surroundings_offset_option = click.option(
     "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
     help="Added to their coordinates [m] in place of any georeference.",
-=======
-aperture_option = click.option(
-    "--aperture", "apertures", multiple=True, metavar="MATERIAL",
-    help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
->>>>>>> main
 )  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="EPW file, hourly."

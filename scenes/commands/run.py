@@ -8,34 +8,16 @@ import click
 
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
-<<<<<<< HEAD
-from scenes.commands.parameters import BUILDING_FILE, FILE
-from scenes.commands.quick_option import given, quick_option
-from scenes.commands.room_options import (
-    furniture_option,
-    glare_sources_option,
-    glare_sun_option,
-    join_option,
-    method_option,
-    needed_weather_option,
-    no_cache_option,
-    out_folder_option,
-    seed_option,
-    size_option,
-    sky_ground_option,
-    space_option,
-    subdivide_option,
-    sun_option,
-    surroundings_offset_option,
-    surroundings_option,
-    system_option,
-    u_option,
-)
-=======
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
-from scenes.commands.room_options import building_options, method_option, size_option, u_option
->>>>>>> main
+from scenes.commands.room_options import (
+    building_options,
+    method_option,
+    size_option,
+    surroundings_offset_option,
+    surroundings_option,
+    u_option,
+)
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
@@ -45,16 +27,11 @@ _DEFAULT = RoomOptions()
 
 @click.command()
 @building_options("all with a window")
+@surroundings_option
+@surroundings_offset_option
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
-<<<<<<< HEAD
-@join_option
-@furniture_option
-@surroundings_option
-@surroundings_offset_option
-=======
->>>>>>> main
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -91,12 +68,9 @@ def command(
     g_value: float | None,
     join: tuple[str, ...],
     furniture: bool,
-<<<<<<< HEAD
+    apertures: tuple[str, ...],
     surroundings: tuple[Path, ...],
     surroundings_offset: tuple[float, float, float] | None,
-=======
-    apertures: tuple[str, ...],
->>>>>>> main
     operation: Path | None,
     no_cache: bool,
     explore: bool,
@@ -111,15 +85,10 @@ def command(
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
-<<<<<<< HEAD
-        building, weather, system, operation, spaces, join, furniture, surroundings,
-        surroundings_offset, u_value, g_value, cache=not no_cache, quick=quick,
-        room=RoomOptions.of(**chosen),
-=======
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore,
-        u_value=u_value, g_value=g_value,
->>>>>>> main
+        u_value=u_value, g_value=g_value, surroundings=surroundings,
+        surroundings_offset=surroundings_offset,
     )  # fmt: skip
     run_to_folder(options, out)
 

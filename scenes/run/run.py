@@ -140,19 +140,14 @@ def read_inputs(
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
     building = read_building(
-<<<<<<< HEAD
-        options.building, join=options.join, furniture=options.furniture,
-        surroundings=options.surroundings, surroundings_offset=options.surroundings_offset,
-        progress=steps,
-    )  # fmt: skip
-=======
         options.building,
         join=options.join,
         furniture=options.furniture,
         apertures=options.apertures,
+        surroundings=options.surroundings,
+        surroundings_offset=options.surroundings_offset,
         progress=steps,
     )
->>>>>>> main
     inputs = job_inputs(building, options.spaces, files)
     progress("inputs", 1.0)
     return inputs

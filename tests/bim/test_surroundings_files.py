@@ -124,7 +124,7 @@ def test_footprints_stand_by_latitude_and_longitude(house, tmp_path):
 
 
 def test_arcs_agree_with_proj():
-    pyproj = pytest.importorskip("pyproj", reason="no pyproj")
+    pyproj = pytest.importorskip("pyproj")
     places = np.array([[8.02, 50.01], [7.97, 49.98]])
     plane = pyproj.Proj("+proj=aeqd +lat_0=50 +lon_0=8 +ellps=WGS84")
     east, north = plane(places[:, 0], places[:, 1])
