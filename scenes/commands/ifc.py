@@ -151,6 +151,7 @@ def attach(
 )  # fmt: skip
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
+@click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
 def export(
     building: Path,
     *,
@@ -161,15 +162,18 @@ def export(
     mitsuba: Path | None,
     epjson: Path | None,
     gltf: Path | None,
+    honeybee: Path | None,
 ) -> None:
     """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
 
     Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
     and what is not known, is said.
     """
-    if radiance is None and mitsuba is None and epjson is None and gltf is None:
-        raise click.UsageError("nothing to write: give --radiance, --mitsuba, --epjson or --gltf")
-    for field, path in (("--epjson", epjson), ("--gltf", gltf)):
+    files = {"--epjson": epjson, "--gltf": gltf, "--honeybee": honeybee}
+    asked = {"--radiance": radiance, "--mitsuba": mitsuba, **files}
+    if not any(asked.values()):
+        raise click.UsageError(f"nothing to write: give one of {', '.join(asked)}")
+    for field, path in files.items():
         if path is not None:
             check_file(path, field=field, inputs=[building])
     formats: dict[Path, list[str]] = {}
@@ -180,6 +184,7 @@ def export(
         parent: ResultFolder(parent, "ifc export", adding=True, field=options[0])
         for parent, options in formats.items()
     }
+    from bim.honeybee.write import write_honeybee
     from bim.ifc.building import read_ifc
     from bim.to_energyplus import write_epjson
     from bim.to_gltf import write_gltf
@@ -216,14 +221,18 @@ def export(
         for name in written:
             click.echo(parent / name)
     assumed: tuple[str, ...] = ()
-    if epjson is not None:
+    if epjson is not None or honeybee is not None:
         u_and_g, assumed = known.u_and_g()
+    if honeybee is not None:
+        write_honeybee(replace(read, spaces=tuple(chosen)), honeybee, known=u_and_g)
+        click.echo(honeybee)
+    if epjson is not None:
         write_epjson(read, epjson, spaces=chosen, known=u_and_g)
         click.echo(epjson)
     if gltf is not None:
         write_gltf(replace(read, spaces=tuple(chosen)), gltf)
         click.echo(gltf)
-    notes = known.notes() if folders or epjson is not None else ()
+    notes = known.notes() if folders or epjson is not None or honeybee is not None else ()
     for note in (*notes, *assumed):
         click.echo(f"note: {note}")
 
