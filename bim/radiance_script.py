@@ -31,7 +31,7 @@ oconv materials.rad outdoors.rad > outdoors.oct
 group() {
     rfluxmtx -faf -I+ -ab "$bounces" -ad "$indoors" -lw "$(least "$indoors")" -y "$count" \\
         - "windows_$1.rad" -i room.oct < "$sensors" > "view_$1.mtx"
-    rfluxmtx -ffa -ab "$bounces" -ad 1024 -lw 1e-5 -c "$outdoors" \\
+    rfluxmtx -ffa -ab "$bounces" -ad 16 -lw 1e-4 -c "$outdoors" \\
         "windows_$1.rad" sky.rad -i outdoors.oct > "daylight_$1.mtx"
     rmtxop -ff "view_$1.mtx" . "windows_$1.xml" . "daylight_$1.mtx" > "part_$1.mtx"
 }

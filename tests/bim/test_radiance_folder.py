@@ -87,5 +87,4 @@ def test_the_folder_gives_our_light(room, tmp_path):
         error = float(np.sqrt(np.mean((spread / mean) ** 2) / RUNS))
         rms = float(np.sqrt(np.mean((ours @ sky / mean - 1) ** 2)))
         # ours is within 1 % at 60,000 paths; three standard errors of Radiance's mean besides
-        print(rms, error)
         assert rms < 0.01 + 3 * error, (rms, error)

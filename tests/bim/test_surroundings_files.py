@@ -13,9 +13,11 @@ from bim_fuzz import mutations
 from bim.context.horizon import horizon_wall, read_horizon
 from bim.context.surroundings import read_context, with_surroundings
 from bim.georeference import Georeference, crs_name, local_metres
+from bim.ifc.building import read_ifc
 from bim.shell import enclosed_volume
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
+from tests.bim.small_ifc import box_room
 
 
 @pytest.fixture
@@ -234,3 +236,43 @@ def test_random_bytes_give_one_line(tmp_path, suffix):
             refused += 1
             assert "\n" not in str(error)
     assert refused
+
+
+def test_an_ifc_says_where_it_lies(tmp_path):
+    """Its x axis points north on the map and its true north is that of the map: x = 0, y = 10 m."""
+    path, model = tmp_path / "box.ifc", box_room("IFC4")
+    context = model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)[0]
+    metre = model.createIfcSIUnit(None, "LENGTHUNIT", None, "METRE")
+    crs = model.createIfcProjectedCRS("EPSG:25832", None, None, None, None, None, metre)
+    model.createIfcMapConversion(context, crs, 456000.0, 5430000.0, 110.0, 0.0, 1.0, None)
+    context.TrueNorth = model.createIfcDirection((1.0, 0.0))
+    model.write(str(path))
+    house = read_ifc(path)
+    assert house.georeference.crs == "EPSG:25832"
+    place = house.georeference.to_world @ [456000.0, 5430010.0, 115.0, 1.0]
+    np.testing.assert_allclose(place[:3], [0, 10, 5], atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["geojson", "city.json"])
+def test_a_quarter_around_a_real_house(real_data, tmp_path, kind):
+    """A block 30 m north of the FZK house, by longitude and latitude or on the map of UTM 32."""
+    house = read_ifc(real_data / "ifc" / "buildings" / "AC20-FZK-Haus.ifc")
+    lon, lat = house.longitude_deg, house.latitude_deg
+    north, east = 30 / 111_209, 20 / 73_030  # degrees: tables of geodesy for 49 degrees
+    low, high = (lon, lat + north), (lon + east, lat + north + north / 3)
+    if kind == "geojson":
+        ring = [low, (high[0], low[1]), high, (low[0], high[1]), low]
+        feature = {"type": "Feature", "properties": {"height": 9.0, "name": "block"},
+                   "geometry": {"type": "Polygon", "coordinates": [ring]}}  # fmt: skip
+        content = {"type": "FeatureCollection", "features": [feature]}
+    else:
+        pyproj = pytest.importorskip("pyproj")
+        change = pyproj.Transformer.from_crs("OGC:CRS84", "EPSG:25832", always_xy=True)
+        (x0, y0), (x1, y1) = change.transform(*low), change.transform(*high)
+        floor = house.elevation
+        content = city({"block": ((x0, y0, floor), (x1, y1, floor + 9.0))})
+    found = with_surroundings(house, [written(tmp_path, content, f"quarter.{kind}")])
+    corners = bounds(found, "block")
+    # on the map, north is 0.4 degrees from the house's: 0.3 m at 40 m
+    np.testing.assert_allclose(corners, [[0, 30, 0], [20, 40, 9]], atol=0.3)
