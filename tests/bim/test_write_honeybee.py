@@ -20,7 +20,9 @@ def test_a_room_comes_back(tmp_path, recess, frame):
     windows = [WindowRectangle(0.5, 0.9, 3.0, 1.5, frame=frame),
                WindowRectangle(1.0, 1.0, 1.0, 2.0, "ceiling", frame=frame)]  # fmt: skip
     wall = Element("wall", "wall", "IfcWall", WALL, 0.4, 0.4)
-    box = shoebox(4, 5, 3, windows=windows, recess=recess, elements=(wall,), reflectance_solar={})
+    box = shoebox(
+        4, 5, 3, windows=windows, recess=recess, elements=(wall,), reflectance_solar={"floor": 0.35}
+    )
     write_honeybee(box, tmp_path / "box.hbjson", known={"room-window-0": (1.1, 0.5)})
     (space,), (own,) = read_honeybee(tmp_path / "box.hbjson").spaces, box.spaces
     assert space.volume == pytest.approx(own.volume, rel=1e-5)
@@ -31,6 +33,7 @@ def test_a_room_comes_back(tmp_path, recess, frame):
     assert areas == pytest.approx(sorted(window.area for window in own.windows), rel=2.1e-3)
     floor, before = (next(f for f in s.faces if f.kind == "floor") for s in (space, own))
     assert floor.reflectance_visible == pytest.approx(before.reflectance_visible, abs=1e-4)
+    assert floor.reflectance_solar == pytest.approx(0.35)
     assert floor.construction.resistance == pytest.approx(before.construction.resistance)
     np.testing.assert_allclose(floor.normal, before.normal, atol=1e-6)
 
