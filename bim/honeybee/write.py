@@ -7,23 +7,20 @@ else a face of its own that is a thousandth wider.  Reveals are walls with an ad
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
-from bim.planes import Plane, merged_polygons, plane_through, polygons_of, rings_of
+from bim.planes import Plane, rings_of
 from bim.to_radiance import identifier
 from mitsuba_cfs.files import write_text
 
-SAME_PLANE = 2e-3  # glass this near the plane of a face lies in it [m]
-WIDER = 1.001  # of a face that is made for a window, in size
-INSIDE = 0.01  # share of the glass' border that a face it lies in has to share
 TYPES = {"floor": "Floor", "ceiling": "RoofCeiling", "roof": "RoofCeiling"}
 Known = Mapping[str, tuple[float | None, float | None]]  # U and g by a window's GUID
 
@@ -149,94 +146,32 @@ class _Library:
 
 def _room(space: Space, guids: Mapping[str, str], names: _Names, library: _Library) -> dict:
     own = guids[space.guid]
-    parts = [(face, plane, p) for face in space.faces for plane, p in _polygons(face.triangles)]
-    hosts: list[list[tuple[Window, shapely.Polygon]]] = [[] for _ in parts]
-    extra = []
-    for window in space.windows:
-        for plane, glass in _polygons(window.triangles):
-            at = _host(plane, glass, parts)
-            if at is None:
-                extra.append(_own_face(window, plane, glass, own, names, library))
-                continue
-            face, host_plane, polygon = parts[at]
-            pane = _moved(glass, plane, host_plane)
-            parts[at] = face, host_plane, _largest(shapely.union(polygon, pane, grid_size=1e-6))
-            hosts[at].append((window, pane))
     faces = [
-        _face(face, plane, polygon, windows, guids, own=own, names=names, library=library)
-        for (face, plane, polygon), windows in zip(parts, hosts, strict=True)
+        _own_face(part, own, names, library)
+        if part.face is None
+        else _face(part, part.face, own=own, names=names, library=library)
+        for part in hosted_polygons(space)
     ]
     return {
-        "type": "Room", "identifier": own, "display_name": space.label, "faces": [*faces, *extra],
+        "type": "Room", "identifier": own, "display_name": space.label, "faces": faces,
         "story": space.storey or None, "properties": _properties("Room"),
     }  # fmt: skip
 
 
-def _polygons(triangles: NDArray[np.float64]) -> list[tuple[Plane, shapely.Polygon]]:
-    """The plane polygons that a surface's triangles are, with its normal."""
-    vector = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]).sum(0)
-    plane = plane_through(triangles[0, 0], vector)
-    return [(plane, p) for p in merged_polygons(plane.to_plane(triangles)[..., :2])]
-
-
-def _moved(polygon: shapely.Polygon, source: Plane, target: Plane) -> shapely.Polygon:
-    return shapely.transform(polygon, lambda p: target.to_plane(source.to_world(p))[:, :2])
-
-
-def _largest(shape: shapely.Geometry) -> shapely.Polygon:
-    return max(polygons_of(shape), key=lambda polygon: polygon.area)
-
-
-def _host(
-    plane: Plane,
-    glass: shapely.Polygon,
-    parts: Sequence[tuple[Face, Plane, shapely.Polygon]],
-) -> int | None:
-    """The polygon of a face that the glass lies in: that which has most of its border."""
-    best, most = None, INSIDE * glass.length
-    for index, (_, other, polygon) in enumerate(parts):
-        corners = plane.to_world(shapely.get_coordinates(glass))
-        off = np.abs(other.to_plane(corners)[:, 2]).max()
-        if plane.normal @ other.normal < 0.9999 or off > SAME_PLANE:
-            continue
-        pane = _moved(glass, plane, other)
-        shared = pane.boundary.intersection(polygon.buffer(SAME_PLANE)).length
-        if shared > most:
-            best, most = index, shared
-    return best
-
-
-def _own_face(
-    window: Window,
-    plane: Plane,
-    glass: shapely.Polygon,
-    room: str,
-    names: _Names,
-    library: _Library,
-) -> dict:
+def _own_face(part: HostedPolygon, own: str, names: _Names, library: _Library) -> dict:
     """A face for glass that lies in none."""
-    x, y = glass.centroid.x, glass.centroid.y
-    inner = shapely.transform(glass, lambda p: [x, y] + (p - [x, y]) / WIDER)
+    ((window, pane),) = part.panes
     return {
-        "type": "Face", "identifier": names.of(f"{room}_{window.name or 'window'}_wall"),
-        "face_type": "Wall", "geometry": _geometry(plane, glass),
+        "type": "Face", "identifier": names.of(f"{own}_{window.name or 'window'}_wall"),
+        "face_type": "Wall", "geometry": _geometry(part.plane, part.polygon),
         "boundary_condition": {"type": "Outdoors"},
-        "apertures": [_aperture(window, plane, inner, names, library)],
+        "apertures": [_aperture(window, part.plane, pane, names, library)],
         "properties": _properties("Face"),
     }  # fmt: skip
 
 
-def _face(
-    face: Face,
-    plane: Plane,
-    polygon: shapely.Polygon,
-    windows: Sequence[tuple[Window, shapely.Polygon]],
-    guids: Mapping[str, str],
-    *,
-    own: str,
-    names: _Names,
-    library: _Library,
-) -> dict:
+def _face(part: HostedPolygon, face: Face, *, own: str, names: _Names, library: _Library) -> dict:
+    plane, windows = part.plane, part.panes
     conditions = {"outside": "Outdoors", "ground": "Ground"}
     # two faces of a wall do not lie in one place here: honeybee's "Surface" cannot say that
     condition = "Outdoors" if windows else conditions.get(face.adjacency, "Adiabatic")
@@ -246,7 +181,7 @@ def _face(
     slope = "RoofCeiling" if plane.normal[2] > 0.7 else "Wall"
     return {
         "type": "Face", "identifier": names.of(f"{own}_{face.name}"), "display_name": face.name,
-        "face_type": TYPES.get(face.kind, slope), "geometry": _geometry(plane, polygon),
+        "face_type": TYPES.get(face.kind, slope), "geometry": _geometry(plane, part.polygon),
         "boundary_condition": {"type": condition},
         "apertures": [_aperture(w, plane, pane, names, library) for w, pane in windows],
         "properties": _properties(

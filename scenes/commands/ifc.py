@@ -152,6 +152,7 @@ def attach(
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 @click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
+@click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
 def export(
     building: Path,
     *,
@@ -163,13 +164,14 @@ def export(
     epjson: Path | None,
     gltf: Path | None,
     honeybee: Path | None,
+    gbxml: Path | None,
 ) -> None:
     """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
 
     Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
     and what is not known, is said.
     """
-    files = {"--epjson": epjson, "--gltf": gltf, "--honeybee": honeybee}
+    files = {"--epjson": epjson, "--gltf": gltf, "--honeybee": honeybee, "--gbxml": gbxml}
     asked = {"--radiance": radiance, "--mitsuba": mitsuba, **files}
     if not any(asked.values()):
         raise click.UsageError(f"nothing to write: give one of {', '.join(asked)}")
@@ -184,6 +186,7 @@ def export(
         parent: ResultFolder(parent, "ifc export", adding=True, field=options[0])
         for parent, options in formats.items()
     }
+    from bim.gbxml.write import write_gbxml
     from bim.honeybee.write import write_honeybee
     from bim.ifc.building import read_ifc
     from bim.to_energyplus import write_epjson
@@ -221,18 +224,20 @@ def export(
         for name in written:
             click.echo(parent / name)
     assumed: tuple[str, ...] = ()
-    if epjson is not None or honeybee is not None:
+    states = any(path is not None for path in (epjson, honeybee, gbxml))  # U and g of windows
+    if states:
         u_and_g, assumed = known.u_and_g()
-    if honeybee is not None:
-        write_honeybee(replace(read, spaces=tuple(chosen)), honeybee, known=u_and_g)
-        click.echo(honeybee)
+    for path, write in ((honeybee, write_honeybee), (gbxml, write_gbxml)):
+        if path is not None:
+            write(replace(read, spaces=tuple(chosen)), path, known=u_and_g)
+            click.echo(path)
     if epjson is not None:
         write_epjson(read, epjson, spaces=chosen, known=u_and_g)
         click.echo(epjson)
     if gltf is not None:
         write_gltf(replace(read, spaces=tuple(chosen)), gltf)
         click.echo(gltf)
-    notes = known.notes() if folders or epjson is not None or honeybee is not None else ()
+    notes = known.notes() if folders or states else ()
     for note in (*notes, *assumed):
         click.echo(f"note: {note}")
 
