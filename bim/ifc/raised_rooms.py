@@ -7,10 +7,10 @@ height; and where one is likely though nobody drew it: less than `PLENUM` would 
 than `MOSTLY` of the room's glass.  Both limits are our own judgement: voids above ceilings are 0.3
 to 1 m high.
 
-Nor does it rise into a storey whose rooms are not drawn.  Glass of another storey that begins
-above its top is that storey's; and where what covers the room lies more than twice as far above
-its top as the glass that is left, with such a void besides, the air up there is no longer what this
-glass lights: a hall under a ridge is up to twice as high as its eaves.
+Nor does it rise into a storey whose rooms are not drawn.  What covers it lies no further above its
+top than the space is high: the storey that is missing would be higher.  Glass of the room's
+own storey, or that begins below its top, shows a higher room: up to twice as far as it reaches, as
+a hall under a ridge is up to twice as high as its eaves, and such a void.
 """
 
 from __future__ import annotations
@@ -53,15 +53,14 @@ def raised_rooms(
     for index, record in enumerate(records):
         if record.guid not in low:
             continue
-        above, reach, others = _glass_above(record, glass)
-        if above + others < LEAST_GLASS:
+        area, reach = _glass_above(record, glass)
+        if area < LEAST_GLASS:
             continue
-        raised, why = record, "it belongs to the storey above, which has no rooms there"
-        if above >= LEAST_GLASS:
-            share = _share_above(record, above, glass)
-            raised, why = _raised(source, index, result, lids, share, 2 * reach + PLENUM)
+        most = max(float(np.ptp([record.solid.low[2], record.solid.high[2]])), 2 * reach + PLENUM)
+        share = _share_above(record, area, glass)
+        raised, why = _raised(source, index, result, lids, share, most)
         gain = f"{raised.solid.high[2] - record.solid.high[2]:.2f} m"
-        top, area = record.solid.high[2], above + others
+        top = record.solid.high[2]
         what = f"room {record.label}: ends at {top:.2f} m, below {area:.2f} m2 of"
         done = f"raised by {gain}, {raised.raised:.1f} m3 more" if not why else f"kept: {why}"
         problems.append(
@@ -71,22 +70,18 @@ def raised_rooms(
     return result, problems
 
 
-def _glass_above(record: SpaceRecord, glass: GlassOfRooms) -> tuple[float, float, float]:
-    """Glass above a room's top [m2], how far it reaches above that [m], and that of other storeys.
-
-    The last, which begins above the room's top, is not among the first.
-    """
+def _glass_above(record: SpaceRecord, glass: GlassOfRooms) -> tuple[float, float]:
+    """Glass above a room's top [m2], and how far what is surely its own reaches above that [m]."""
     top = float(record.solid.high[2])
-    above, reach, others = 0.0, 0.0, 0.0
+    area, reach = 0.0, 0.0
     for one in glass.glass:
         if one.low is None or one.low.guid != record.guid:
             continue
+        area += one.out - one.used
         low, high = one.heights
-        if one.storey != record.storey and low > top - SAME_HEIGHT:
-            others += one.out - one.used
-        else:
-            above, reach = above + one.out - one.used, max(reach, high - top)
-    return above, reach, others
+        if one.storey == record.storey or low < top - SAME_HEIGHT:
+            reach = max(reach, high - top)
+    return area, reach
 
 
 def _share_above(record: SpaceRecord, above: float, glass: GlassOfRooms) -> float:
@@ -121,7 +116,7 @@ def _raised(
     if solid is None or gain < LOWEST_GAIN:
         return record, "its ceiling is drawn"
     if gain > most:
-        return record, f"what covers it lies {gain:.2f} m above its top, far above this glass"
+        return record, f"what covers it lies {gain:.2f} m above its top, a storey or more"
     if gain < PLENUM and share_above < MOSTLY:
         return record, f"the {gain:.2f} m above it may be the void of a ceiling that is not drawn"
     whole = room_solid(record.guid, record.solid.name, solid.manifold)

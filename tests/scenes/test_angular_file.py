@@ -117,3 +117,35 @@ def test_what_scatters_has_no_function_of_an_angle(tmp_path):
     path.with_suffix(".toml").write_text(ROOS)
     with pytest.raises(DataError, match="scatters 100 %"):
         read_system(path)
+
+
+def test_reflectances_of_a_table_are_read(tmp_path):
+    names = ("theta_deg", "transmittance", "reflectance_front", "reflectance_back")
+    rows = ["0,0.7,0.12,0.2", "60,0.6,0.2,0.3", "90,0,1,1"]
+    (tmp_path / "sides.csv").write_text("\n".join([",".join(names), *rows]))
+    found = system(tmp_path, '[angular]\ntable = "sides.csv"').angular
+    assert found.reflected("front", 0.0) == pytest.approx(0.12)
+    assert found.reflected("back", np.radians(60)) == pytest.approx(0.3)
+
+
+def test_a_stated_pane_may_be_turned(tmp_path):
+    toml = (
+        "[[angular.pane]]\ntransmittance = 0.7\nreflectance_front = 0.10\n"
+        "reflectance_back = 0.15\nflipped = true"
+    )
+    glass = Pane("coated", 0.7, 0.15, 0.10, coated=True)
+    found = system(tmp_path, toml, glass).angular
+    assert found.reflected("front", 0.0) == pytest.approx(0.15, abs=2e-3)
+    assert found.reflected("back", 0.0) == pytest.approx(0.10, abs=2e-3)
+
+
+def test_a_unit_has_as_many_panes_as_it_says(tmp_path):
+    one = Glazing("unit", 0.70, 0.12, 0.13, 1)
+    found = system(tmp_path, ROOS + "\npanes = 1", one).angular
+    assert found.transmitted(THETA) == pytest.approx(roos_table(one).transmitted(THETA))
+    assert abs(found.transmitted(THETA[2]) - roos_table(UNIT).transmitted(THETA[2])) > 0.01
+
+
+def test_the_files_that_it_names_are_beside_it(tmp_path):
+    system(tmp_path, '[angular]\ntable = "glass.csv"')
+    assert [p.name for p in files_beside(tmp_path / "glass.xml")] == ["glass.toml", "glass.csv"]

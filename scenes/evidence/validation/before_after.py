@@ -24,8 +24,8 @@ from bim.shoebox import WindowRectangle, shoebox
 from bim.to_tracer import interior_surfaces, window_groups
 from mitsuba_cfs.methods.optics import GivenOptics, States
 
-SIZE = 160  # [px]
-SAMPLES = 16  # paths of a pixel
+SIZE = 110  # [px]
+SAMPLES = 8  # paths of a pixel
 RANGE = (30.0, 3e4)  # of the colours [cd/m2]
 CLEAR = cfs.Glazing("clear", 0.78, 0.14, 0.14)
 DARK = cfs.Glazing("dark", 0.10, 0.1, 0.1)
