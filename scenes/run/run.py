@@ -252,7 +252,11 @@ def _manifest(
         "system": ", ".join(dict.fromkeys(system.name for system in used)),
         "fenestration": used_sources(inputs),
         "options": {
-            key: str(value) if isinstance(value, Path) else value
+            key: str(value)
+            if isinstance(value, Path)
+            else [str(file) for file in value]
+            if key == "surroundings"
+            else value
             for key, value in options.named().items()
         },
         "seed": options.room.sampling.seed,
