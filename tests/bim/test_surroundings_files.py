@@ -103,6 +103,13 @@ def test_the_building_itself_is_left_out(house, tmp_path):
     assert "itself: 1 object(s) where rooms" in said.what
 
 
+def test_what_lies_beyond_all_sight_is_left_out(house, tmp_path):
+    path = written(tmp_path, city({"far": ((5e5, 0, 0), (5e5 + 9, 9, 9))}), "far.city.json")
+    found = with_surroundings(house, [path], offset=(0, 0, 0))
+    assert not found.elements
+    assert "further than 20 km" in found.problems[0].what
+
+
 def test_solids_of_a_quarter_keep_their_volume(tmp_path):
     path = written(tmp_path, city({"a": ((5, 5, 0), (15, 25, 12))}), "a.city.json")
     (one,) = read_context(path).objects
