@@ -20,6 +20,9 @@ FILES = {  # the names that the pages use
     "blind.xml": VENETIAN_BLIND, "blind.toml": VENETIAN_BLIND.with_suffix(".toml"),
     "shade.xml": VENETIAN_BLIND, "CITY.epw": WEATHER, "city.epw": WEATHER, "Lyon.epw": WEATHER,
     "house.ifc": OFFICE, "office.ifc": OFFICE,
+    "model.hbjson": REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson",
+    "quarter.city.json": REPOSITORY / "docs" / "tutorials" / "quarter.city.json",
+    "horizon.csv": REPOSITORY / "docs" / "tutorials" / "horizon.csv",
     "office.rad": REPOSITORY / "docs" / "tutorials" / "office.rad",
 }  # fmt: skip
 
