@@ -23,6 +23,7 @@ from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.sampling import lattice_2d
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, on_disc_of, reflecting_places
+from mitsuba_cfs.trace.sun_ways import sun_ways
 
 CELLS = 1024  # into which the surfaces' area is divided, about
 AREA_POINTS = 2**19  # by which the cells' areas are counted
@@ -115,23 +116,25 @@ def _flux(
     point = lane - hour * WINDOW_POINTS
     # the same points in all hours: an hour's light does not hang on those computed with it
     position = inside.sample_group(group, lattice_2d(point, mi.UInt32(group), 0))
-    towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), hour)
-    to_sun = on_disc_of(towards, point)
-    local = inside.to_group(group, to_sun)
-    active = local.z > 0
     off = inside.outward(mi.Int32(group), mi.Bool(True))
-    active &= ~outside.met_outdoors(mi.Point3f(position + off), to_sun, active)[0].is_valid()
-    value = dr.select(active, local.z * way.through(local), 0.0)
-    value *= float(inside.groups[group].area) / WINDOW_POINTS
-    origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
-    ray = mi.Ray3f(origin, onwards)
-    hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-    lit = active & hit.is_valid()
-    kept = np.flatnonzero(lit.numpy())
-    cell = cells.of(face_places(inside, origin, onwards, hit, lit).some(kept))
-    kept, cell = kept[cell >= 0], cell[cell >= 0]
-    entries = value.numpy()[kept], (cell, hour.numpy()[kept])
-    return sparse.csr_array(sparse.coo_array(entries, shape=(len(cells.keys), len(suns))))
+    flux = sparse.csr_array((len(cells.keys), len(suns)))
+    for by in sun_ways(outside):
+        turned = mi.Vector3f(by.turned(suns).T.astype(np.float32))
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, turned, hour), point)
+        local = inside.to_group(group, to_sun)
+        reaching = by.reaching(mi.Ray3f(mi.Point3f(position + off), to_sun), local.z > 0)
+        value = dr.select(local.z > 0, local.z * way.through(local) * reaching, 0.0)
+        value *= float(inside.groups[group].area) / WINDOW_POINTS
+        origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
+        ray = mi.Ray3f(origin, onwards)
+        hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=value > 0)
+        lit = (value > 0) & hit.is_valid()
+        kept = np.flatnonzero(lit.numpy())
+        cell = cells.of(face_places(inside, origin, onwards, hit, lit).some(kept))
+        kept, cell = kept[cell >= 0], cell[cell >= 0]
+        entries = value.numpy()[kept], (cell, hour.numpy()[kept])
+        flux = flux + sparse.csr_array(sparse.coo_array(entries, shape=flux.shape))
+    return flux
 
 
 def _keys(places: Places, low: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
