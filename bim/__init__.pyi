@@ -2,6 +2,8 @@
 
 from .account import Account as Account
 from .fenestration import ShadingState as ShadingState
+from .gbxml.building import read_gbxml as read_gbxml
+from .honeybee.building import read_honeybee as read_honeybee
 from .ifc.building import read_ifc as read_ifc
 from .ifc.corrections import Corrections as Corrections, read_corrections as read_corrections
 from .ifc.fenestration_read import read_fenestration as read_fenestration

@@ -6,6 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+DARK = 0.05  # share of a sky matrix's entries that are lit, below which only these are multiplied
+
+
+def times_sky(matrix: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
+    """A matrix [..., P] times a sky [P, H]; of the sun alone few patches are lit in an hour."""
+    matrix, sky = np.asarray(matrix), np.asarray(sky)
+    if not sky.size or np.count_nonzero(sky) > DARK * sky.size:
+        return np.matmul(matrix, sky)
+    rows = np.ascontiguousarray(matrix.reshape(-1, len(sky)).T)
+    found = sparse.csr_array(sky.T) @ rows
+    return np.ascontiguousarray(found.T).reshape(*matrix.shape[:-1], sky.shape[1])
 
 
 def window_radiance(daylight: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
@@ -15,7 +28,7 @@ def window_radiance(daylight: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
         daylight: daylight matrices D [G, K, P].
         sky: sky matrix s [P, H], luminance [cd/m2] or radiance [W/m2/sr].
     """
-    return np.matmul(np.asarray(daylight), np.asarray(sky))
+    return times_sky(daylight, sky)
 
 
 def room_side_radiance(
@@ -31,7 +44,7 @@ def room_side_radiance(
     if len(transmission) != len(daylight):
         raise ValueError(f"{len(transmission)} transmission matrices for {len(daylight)} groups")
     through = np.stack([np.asarray(t) @ d for t, d in zip(transmission, daylight, strict=True)])
-    return np.matmul(through, np.asarray(sky))
+    return times_sky(through, sky)
 
 
 def three_phase(
@@ -77,7 +90,7 @@ def sun_beams(
         direct_daylight: D_d [G, K, P].
         sun: s_d [P, H], the sun alone on the sky's patches.
     """
-    window = np.matmul(np.asarray(direct_daylight), np.asarray(sun))
+    window = times_sky(direct_daylight, sun)
     diagonal = np.stack([np.diag(np.asarray(T)) for T in transmission])
     patches = np.minimum(np.asarray(through), diagonal)
     return window * patches[:, :, None], window * np.asarray(through_sun)[:, None]

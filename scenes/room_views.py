@@ -1,4 +1,4 @@
-"""The views of a room that a user gives: read from a text or a file, and checked to be in it."""
+"""The views of a room: given as a text or a file, or a grid of eyes; and whether they are in it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from bim.model import Space
-from bim.sensors import horizontal_section
+from bim.sensors import horizontal_section, sensor_grid, view_point
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.images.view import View, parse_view
+from mitsuba_cfs.images.view import View, fisheye, parse_view
 
+MARGIN = 0.5  # of the grid of eyes from the walls [m]
 FROM_WALLS = 0.01  # least distance of an eye from what bounds the room [m]
 
 
@@ -48,6 +51,37 @@ def given_views(text: str, size: int = 800) -> list[NamedView]:
     if not found:
         raise DataError("holds no view (a line with -vta -vp ... -vd ...)", file=file)
     return found
+
+
+def eyes_of(
+    space: Space, grid: float | None, directions: int, eye_height: float, size: int
+) -> list[NamedView]:
+    """Fisheye views of eyes all over a room, or of one in its middle, in the directions of each.
+
+    Args:
+        grid: spacing of the eyes [m]; None: one.
+        directions: the first is that to the biggest window, the others at equal angles from it.
+        eye_height: above the floor [m]; size: of a side of their pictures [px].
+    """
+    middle, towards = view_point(space, eye_height)
+    eyes = middle[None]
+    if grid is not None:
+        eyes, _ = sensor_grid(space, grid, eye_height, MARGIN)
+    return [
+        NamedView(
+            f"eye{e + 1:03d}_{d + 1}",
+            fisheye(eye, turned(towards, 2 * np.pi * d / directions), size),
+        )
+        for e, eye in enumerate(eyes)
+        for d in range(directions)
+    ]
+
+
+def turned(direction: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """A direction [3] turned about the vertical, counter-clockwise seen from above."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = direction
+    return np.array([c * x - s * y, s * x + c * y, z])
 
 
 def check_eye(each: NamedView, space: Space) -> None:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.methods.optics import States, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.straight_views import StraightViews
+from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.reflected_sun import (
     SunShares,
@@ -118,7 +119,7 @@ class ReflectedSunLight:
         if not self._found.outdoors_reflects:
             return None
         traced, shares = self._found.traced, self._found.windows
-        by_patches = (traced.daylight.values - traced.direct_daylight) @ self._sky.sun
+        by_patches = times_sky(traced.daylight.values - traced.direct_daylight, self._sky.sun)
         return self._outdoors(shares).reshape(by_patches.shape) - by_patches
 
     def sensors(self, g: int, j: int, *, beam: bool) -> Array | float:
@@ -137,7 +138,7 @@ class ReflectedSunLight:
             return 0.0
         traced, straight = self._found.traced, self._found.straight
         whole, direct = straight.matrix(g, j), straight.matrix(g, j, direct=True)
-        found = self._outdoors(shares) - (whole.values - direct.values) @ self._sky.sun
+        found = self._outdoors(shares) - times_sky(whole.values - direct.values, self._sky.sun)
         beam = straight.beam(g, j)
         for q in traced.parts.of(g):
             found -= (traced.direct_sensors[:, q] * beam) @ self.windows[q]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_scene import OUTDOOR_DEPTH, PhaseScene
+from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.direct_sun import patch_beams
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
@@ -90,7 +91,7 @@ class StraightViews:
         found = whole.values @ sky.whole - self._in_patches(g, j, traced.daylight.values, sky.whole)
         if traced.five_phase:
             direct = self.matrix(g, j, direct=True)
-            found -= direct.values @ sky.sun
+            found -= times_sky(direct.values, sky.sun)
             found += self._in_patches(g, j, traced.direct_daylight, sky.sun)
         return found
 

@@ -1,14 +1,13 @@
-"""EN 17037: recommended levels of daylight provision, by illuminance or by daylight factor."""
+"""EN 17037: what decides the level of daylight provision; the levels are data of a rule file."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.metrics.autonomy import area_share, scheduled, sensor_weights
+from mitsuba_cfs.metrics.autonomy import scheduled, sensor_weights
 
 FloatArray = NDArray[np.float64]
 
@@ -18,24 +17,10 @@ HORIZONTAL_AREA = 0.95  # rooflights, where there is a target only (table A.2)
 RULES = ("hourly", "sensor")
 
 
-class Level(IntEnum):
-    """Recommended levels of table A.1; NONE where not even the first is met."""
-
-    NONE = 0
-    MINIMUM = 1
-    MEDIUM = 2
-    HIGH = 3
-
-
-TARGET = {Level.MINIMUM: 300.0, Level.MEDIUM: 500.0, Level.HIGH: 750.0}  # [lx] E_T
-MINIMUM_TARGET = {Level.MINIMUM: 100.0, Level.MEDIUM: 300.0, Level.HIGH: 500.0}  # [lx] E_TM
-
-
 @dataclass(frozen=True, slots=True)
 class DaylightProvision:
-    """The level of a room, and what decided it."""
+    """What decides the level of a room."""
 
-    level: Level
     target_illuminance: (
         float  # [lx] reached on half the area (95 % under rooflights), half the time
     )
@@ -50,13 +35,13 @@ def daylight_provision(
     horizontal_openings: bool = False,
     rule: str = "hourly",
 ) -> DaylightProvision:
-    """Level of daylight provision of a room by annual illuminance (method 2 of the standard).
+    """Illuminances that a room reaches by annual illuminance (method 2 of the standard).
 
     Args:
         illuminance: [H, S] [lx] on the reference plane (0.85 m, 0.5 m off the walls).
         hours: [H] mask of the daylight hours (`daylight_hours`: half of the year).
         areas: [S] area of each sensor; equal unless given.
-        horizontal_openings: rooflights: 300, 500, 750 lx on 95 % and no minimum target.
+        horizontal_openings: rooflights, whose target is for 95 % of the area.
         rule: `hourly`: the area is lit at the same time, in at least half of the hours (the words
             of the standard); `sensor`: each sensor has its own half of the hours (as sDA), which
             some programs take and which is never stricter by much.
@@ -75,12 +60,7 @@ def daylight_provision(
 
     target = reached(HORIZONTAL_AREA if horizontal_openings else TARGET_AREA)
     minimum = reached(MINIMUM_AREA)
-    level = Level.NONE
-    for candidate, wanted in TARGET.items():
-        least = 0.0 if horizontal_openings else MINIMUM_TARGET[candidate]
-        if target >= wanted and minimum >= least:
-            level = candidate
-    return DaylightProvision(level, target, minimum)
+    return DaylightProvision(target, minimum)
 
 
 def reached_on_area(values: ArrayLike, weights: FloatArray, area: float) -> FloatArray:
@@ -99,49 +79,10 @@ def exceeded(values: ArrayLike, time: float) -> FloatArray:
     return np.partition(values, len(values) - count, axis=0)[len(values) - count]
 
 
-def daylight_factor_targets(median_diffuse_illuminance: float) -> dict[Level, tuple[float, float]]:
-    """Target and minimum target daylight factor (0 to 1) of each level (method 1).
-
-    Args: median outdoor diffuse horizontal illuminance over the daylight hours [lx], such as the
-    14,100 lx of London in table A.3; `median_diffuse` gives it for a weather file.
-
-    Source: EN 17037:2018, annex A, table A.3: D_T = E_T/E_v,d,med.
-    """
-    if not median_diffuse_illuminance > 0:
-        raise ValueError(f"expected a positive illuminance, got {median_diffuse_illuminance}")
-    return {
-        level: (
-            TARGET[level] / median_diffuse_illuminance,
-            MINIMUM_TARGET[level] / median_diffuse_illuminance,
-        )
-        for level in TARGET
-    }
-
-
 def median_diffuse(diffuse_illuminance: ArrayLike, hours: ArrayLike) -> float:
     """Median of the outdoor diffuse horizontal illuminance [H] over the daylight hours [lx]."""
     values = np.asarray(diffuse_illuminance, dtype=float)
     return float(np.median(scheduled(values[:, None], hours)))
-
-
-def daylight_factor_level(
-    daylight_factor: ArrayLike,
-    median_diffuse_illuminance: float,
-    *,
-    areas: ArrayLike | None = None,
-    horizontal_openings: bool = False,
-) -> Level:
-    """Level of daylight provision by daylight factors [S] (0 to 1) (method 1 of the standard)."""
-    factor = np.asarray(daylight_factor, dtype=float)
-    level = Level.NONE
-    targets = daylight_factor_targets(median_diffuse_illuminance)
-    for candidate, (target, minimum) in targets.items():
-        wanted = HORIZONTAL_AREA if horizontal_openings else TARGET_AREA
-        enough = area_share(factor >= target, areas) >= wanted - 1e-9
-        least = horizontal_openings or (area_share(factor >= minimum, areas) >= MINIMUM_AREA - 1e-9)
-        if enough and least:
-            level = candidate
-    return level
 
 
 def greatest_cell(length: float, width: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,32 +77,35 @@ def annual_sunlight_exposure(
     return area_share(lit > most_hours, areas)
 
 
-def blinds_closed(
-    direct_illuminance: ArrayLike,
+def blinds_operated(
+    direct_illuminance: Sequence[ArrayLike],
     *,
     areas: ArrayLike | None = None,
     threshold: float = ASE_THRESHOLD,
     most_area: float = BLIND_AREA,
 ) -> NDArray[np.bool_]:
-    """Time steps [H] in which a window group's blinds close: direct sun on over 2 % of the area.
-
-    Args: `direct_illuminance` [H, S] [lx] of the sun through this group alone, blinds open.
-    """
-    direct = np.asarray(direct_illuminance, dtype=float)
-    if direct.ndim != 2:
-        raise ValueError(f"direct_illuminance: expected [H, S], got {direct.shape}")
-    weights = sensor_weights(areas, direct.shape[1])
-    # the sum of equal weights has rounding errors, the area limit has none
-    return (direct >= threshold) @ weights > most_area * (1 + 1e-9)
-
-
-def blinds_operated(
-    direct_illuminance: Sequence[ArrayLike], *, areas: ArrayLike | None = None
-) -> NDArray[np.bool_]:
     """Time steps [G, H] in which the blinds of each window group are closed, as LM-83 moves them.
+
+    Blinds close whenever more than 2 % of the points have direct sun, in that combination of groups
+    that leaves most of it but no more than 2 %; of equals, the one that closes the last groups.
+    Closed blinds pass no direct sun: the standard's direct sun is that of open ones.
 
     Args: direct_illuminance: [G][H, S] [lx] straight from the sun through each group alone, open.
 
-    Source: IES LM-83-12, 2.2.6: the groups are moved each for itself.
+    Source: IES LM-83-12, 2.2.6, as quoted by blog.lightstanza.com/daylight-terms: the groups "can
+    close in any combination, until the criterion value for each hour is achieved".
     """
-    return np.stack([blinds_closed(direct, areas=areas) for direct in direct_illuminance])
+    direct = np.asarray(direct_illuminance, dtype=float)
+    if direct.ndim != 3:
+        raise ValueError(f"direct_illuminance: expected [G][H, S], got {direct.shape}")
+    weights = sensor_weights(areas, direct.shape[2])
+    most = most_area * (
+        1 + 1e-9
+    )  # the sum of equal weights has rounding errors, the limit has none
+    closed = np.zeros(direct.shape[:2], dtype=bool)
+    for hour in np.flatnonzero((direct.sum(axis=0) >= threshold) @ weights > most):
+        through = np.flatnonzero(direct[:, hour].any(axis=1))
+        states = np.array(list(product((False, True), repeat=len(through))))
+        left = (~states @ direct[through, hour] >= threshold) @ weights
+        closed[through, hour] = states[np.argmax(np.where(left > most, -1.0, left))]
+    return closed

@@ -61,7 +61,6 @@ class RoomMetrics:
             "mean_illuminance_lx": float(self.mean_illuminance @ self.areas),
             "spatial_daylight_autonomy": self.spatial_daylight_autonomy,
             "annual_sunlight_exposure": self.annual_sunlight_exposure,
-            "en17037_level": self.daylight_provision.level.name.lower(),
             "en17037_target_lx": self.daylight_provision.target_illuminance,
             "en17037_minimum_lx": self.daylight_provision.minimum_illuminance,
         }

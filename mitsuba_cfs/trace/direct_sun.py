@@ -20,7 +20,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.lit_room import PatchBeam
-from mitsuba_cfs.trace.sampling import lattice, lattice_2d
+from mitsuba_cfs.trace.sampling import lattice, lattice_2d, opaque, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
@@ -167,10 +167,10 @@ def direct_sun_matrix(
         raise ValueError("a BSDF plugin needs a `key` before its matrix can be kept in a cache")
     inside = TracedScene(interior, groups)
     outside = TracedScene(exterior, groups, windows_block=False)
-    place = mi.Point3f((points - inside.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - inside.centre, mi.Point3f)
+    normal = vectors(directions)
     ways = [
-        _SunScene(inside, way, place, normal, mi.Vector3f(way.turned(suns).T.astype(np.float32)))
+        _SunScene(inside, way, place, normal, vectors(way.turned(suns)))
         for way in sun_ways(outside)
     ]
 
@@ -212,7 +212,7 @@ def through_beams(
     for g, (group, way) in enumerate(zip(groups, scattering, strict=True)):
         local = suns @ group.frame.T
         if way is not None:
-            tau = way.through(mi.Vector3f(local.T.astype(np.float32)))
+            tau = way.through(vectors(local))
             result[g] = np.where(local[:, 2] > 0, np.broadcast_to(tau.numpy(), len(suns)), 0.0)
     return result
 
@@ -244,9 +244,9 @@ def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) ->
     """Points on a group, what each sensor sees of them, and which suns reach them."""
     inside, place, towards = around.inside, around.place, around.towards
     j = dr.arange(mi.UInt32, count)
-    stream = mi.sample_tea_32(mi.UInt32(group), key)[0]
+    stream = mi.sample_tea_32(opaque(group, mi.UInt32), key)[0]
     position = inside.sample_group(group, lattice_2d(j, stream, 0))
-    area = inside.groups[group].area
+    share = opaque(inside.groups[group].area / count)  # of the area, of each point
 
     S, Q = dr.width(place), dr.width(towards)
     sensor, point = _pairs(S, count)
@@ -255,19 +255,19 @@ def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) ->
     distance2 = dr.squared_norm(to_point)
     distance = dr.sqrt(distance2)
     omega = to_point / distance
-    outward = inside.to_local(mi.Int32(group), omega, mi.Bool(True))
+    outward = inside.to_local(opaque(group, mi.Int32), omega, mi.Bool(True))
     cosine = dr.dot(dr.gather(mi.Vector3f, around.normal, sensor), omega)
     seen = (cosine > 0) & (outward.z > 1e-4)
     shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
     seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
-    weight = dr.select(seen, cosine * outward.z / distance2 * (area / count), 0.0)
+    weight = dr.select(seen, cosine * outward.z / distance2 * share, 0.0)
 
     point, sun = _pairs(count, Q)
     ray = mi.Ray3f(
         dr.gather(mi.Point3f, position, point),
         on_disc(dr.gather(mi.Vector3f, towards, sun), point, stream),
     )
-    before = dr.dot(ray.d, mi.Vector3f(*map(float, inside.groups[group].frame[2]))) > 0
+    before = dr.dot(ray.d, inside.exterior_normal(group)) > 0
     result = _Points(position, weight, outward, around.way.reaching(ray, before))
     dr.eval(result.position, result.weight, result.outward, result.sunlit)
     return result
@@ -287,7 +287,7 @@ def _scattered(
     suns = dr.opaque(mi.UInt32, dr.width(towards))
     sensor, sun = _pairs(sensors, dr.width(towards))
     to_sun = dr.gather(mi.Vector3f, towards, sun)
-    local = inside.to_local(mi.Int32(group), to_sun, mi.Bool(True))
+    local = inside.to_local(opaque(group, mi.Int32), to_sun, mi.Bool(True))
     weights, outwards, sunlit = points.weight, points.outward, points.sunlit
     j = mi.UInt32(0)
     total = mi.Float(0)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.trace.picture_sun import LANES
-from mitsuba_cfs.trace.sampling import path_generator
+from mitsuba_cfs.trace.sampling import column, path_generator, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, place_and_hour
 
@@ -56,8 +56,8 @@ def mirrored(
     none = np.empty(0, dtype=np.int64)
     if tracer.gloss is None or bounce >= MOST_MIRRORS or not len(lanes.row):
         return lanes.some(none)
-    way, found = mi.Vector3f(lanes.way), hit.is_valid()
-    position, face, _ = tracer.surface_at(hit, mi.Point3f(lanes.origin), way, found)
+    way, found = vectors(lanes.way.T), hit.is_valid()
+    position, face, _ = tracer.surface_at(hit, vectors(lanes.origin.T, mi.Point3f), way, found)
     lane = dr.arange(mi.UInt32, len(lanes.row))
     glossy, towards, weight = tracer.gloss.leave(
         hit.prim_index, face, way, mi.Float(0), path_generator(lane, mi.UInt32(bounce)), found
@@ -107,8 +107,8 @@ class RoughFaces:
         cosine = dr.dot(normal, to_sun)
         lit = cosine > 0
         lit &= ~outside.scene.ray_test(mi.Ray3f(point, to_sun), coherent=False, active=lit)
-        triangle = dr.gather(mi.UInt32, mi.UInt32(self.triangle.astype(np.uint32)), face)
-        way = dr.gather(mi.Vector3f, mi.Vector3f(self.way), face)
+        triangle = dr.gather(mi.UInt32, column(self.triangle, mi.UInt32), face)
+        way = dr.gather(mi.Vector3f, vectors(self.way.T), face)
         value = outside.gloss.lobe(triangle, normal, way, to_sun, lit) * cosine
         return dr.select(lit, value, 0.0).numpy().reshape(self.places.size, len(suns))
 

@@ -26,7 +26,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, mirrored
-from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, tables, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.straight_view import straight_rays
 from mitsuba_cfs.trace.sun_paths import (
@@ -94,8 +94,17 @@ def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunSh
         stream = mi.sample_tea_32(patch, key)[0]
         way = outside.to_world(q, bins.sample(patch, lattice_2d(sample, stream, 0)))
         position = outside.sample_group(q, lattice_2d(sample, stream, 2))
-        weight = dr.full(mi.Float, 1.0 / samples, K * samples)
-        met.append(_met(outside, q * K + patch, weight, position, way, seed * 1_000_003 + q))
+        weight = opaque(1.0 / samples) + dr.zeros(mi.Float, K * samples)
+        met.append(
+            _met(
+                outside,
+                opaque(q * K, mi.UInt32) + patch,
+                weight,
+                position,
+                way,
+                seed * 1_000_003 + q,
+            )
+        )
     return SunShares.of(met, len(outside.groups) * K, seed)
 
 
@@ -157,30 +166,29 @@ def _met(
 
     By gloss a path goes on to what it mirrors; the sun itself in a mirror is the direct sun's.
     """
-    shining = np.flatnonzero(weight.numpy() > 0)
-    start, along = (np.ascontiguousarray(v.numpy()[:, shining]) for v in (origin, way))
-    share = weight.numpy()[shining].astype(float)
-    lanes = Lanes(row.numpy()[shining].astype(np.int64), start, along, share)
+    start, along, share, of = tables(origin, way, weight, row)
+    some = np.flatnonzero(share > 0)
+    lanes = Lanes(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
     rows, values, places, rough = [], [], [], []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):
             break
-        direction = mi.Vector3f(lanes.way)
-        hit, last = outside.met_outdoors(mi.Point3f(lanes.origin), direction, mi.Bool(True))
-        lanes = replace(lanes, origin=last.numpy())
+        direction = vectors(lanes.way.T)
+        last = vectors(lanes.origin.T, mi.Point3f)
+        hit, last = outside.met_outdoors(last, direction, mi.Bool(True))
         met = hit.is_valid()
-        there = face_places(outside, last, direction, hit, met)
         normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, met)
         rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(normal, direction)), met)
-        value = lanes.weight * rho.numpy() / np.pi
-        kept = np.flatnonzero(met.numpy() & (value > 0))
+        others = met, rho, hit.prim_index, last
+        there, met, rho, prim, begun = face_places(outside, last, direction, hit, met, *others)
+        lanes = replace(lanes, origin=begun.T)
+        value = lanes.weight * rho / np.pi
+        kept = np.flatnonzero(met & (value > 0))
         rows.append(lanes.row[kept])
         values.append(value[kept])
         places.append(there.some(kept))
         if outside.gloss is not None:
-            found = np.flatnonzero((outside.gloss.roughness(hit.prim_index, met) > 0).numpy())
-            prim, some = hit.prim_index.numpy().astype(np.int64)[found], lanes.some(found)
-            rough.append(RoughFaces(some.row, some.weight, prim, some.way, there.some(found)))
+            rough.append(_rough(outside, lanes, there, np.where(met, prim, 0), met))
         lanes = mirrored(outside, lanes, hit, bounce)
     if not rows:
         return _Met(np.empty(0, dtype=np.int64), np.empty(0), Places.joined([]), [])
@@ -192,6 +200,20 @@ def _met(
         Places.joined([first, later.places]),
         rough,
     )
+
+
+def _rough(
+    outside: TracedScene,
+    lanes: Lanes,
+    places: Places,
+    triangle: NDArray[np.uint32],
+    met: NDArray[np.bool_],
+) -> RoughFaces:
+    """Those of the faces that rays met whose gloss is rough."""
+    alpha = outside.gloss.roughness(column(triangle, mi.UInt32), column(met, mi.Bool)).numpy()
+    found = np.flatnonzero(alpha > 0)
+    some, faces = lanes.some(found), triangle[found].astype(np.int64)
+    return RoughFaces(some.row, some.weight, faces, some.way, places.some(found))
 
 
 def _few(rough: RoughFaces) -> RoughFaces:

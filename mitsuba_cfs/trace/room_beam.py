@@ -20,7 +20,7 @@ from scipy import sparse
 
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.sampling import lattice_2d, opaque, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, on_disc_of, reflecting_places
 from mitsuba_cfs.trace.sun_ways import sun_ways
@@ -115,24 +115,25 @@ def _flux(
     hour = lane // WINDOW_POINTS
     point = lane - hour * WINDOW_POINTS
     # the same points in all hours: an hour's light does not hang on those computed with it
-    position = inside.sample_group(group, lattice_2d(point, mi.UInt32(group), 0))
-    off = inside.outward(mi.Int32(group), mi.Bool(True))
+    position = inside.sample_group(group, lattice_2d(point, opaque(group, mi.UInt32), 0))
+    off = inside.outward(opaque(group, mi.Int32), mi.Bool(True))
     flux = sparse.csr_array((len(cells.keys), len(suns)))
     for by in sun_ways(outside):
-        turned = mi.Vector3f(by.turned(suns).T.astype(np.float32))
-        to_sun = on_disc_of(dr.gather(mi.Vector3f, turned, hour), point)
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.turned(suns)), hour), point)
         local = inside.to_group(group, to_sun)
         reaching = by.reaching(mi.Ray3f(mi.Point3f(position + off), to_sun), local.z > 0)
         value = dr.select(local.z > 0, local.z * way.through(local) * reaching, 0.0)
-        value *= float(inside.groups[group].area) / WINDOW_POINTS
+        value *= opaque(inside.groups[group].area / WINDOW_POINTS)
         origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
         ray = mi.Ray3f(origin, onwards)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=value > 0)
         lit = (value > 0) & hit.is_valid()
-        kept = np.flatnonzero(lit.numpy())
-        cell = cells.of(face_places(inside, origin, onwards, hit, lit).some(kept))
+        others = lit, value, hour
+        places, met, share, column = face_places(inside, origin, onwards, hit, lit, *others)
+        kept = np.flatnonzero(met)
+        cell = cells.of(places.some(kept))
         kept, cell = kept[cell >= 0], cell[cell >= 0]
-        entries = value.numpy()[kept], (cell, hour.numpy()[kept])
+        entries = share[kept], (cell, column[kept])
         flux = flux + sparse.csr_array(sparse.coo_array(entries, shape=flux.shape))
     return flux
 
@@ -155,6 +156,6 @@ def _points_on(interior: Surfaces, inside: TracedScene, seed: int) -> Places:
     point = a * (1 - root) + b * root * (1 - v) + c * root * v - inside.centre
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    off = inside.epsilon * normal
+    off = inside.epsilon[0] * normal
     both = np.concatenate([point + off, point - off]), np.concatenate([normal, -normal])
     return Places(both[0].astype(np.float32), both[1].astype(np.float32))

@@ -43,7 +43,7 @@ def window_exchange(
     columns = len(groups) * bins.size
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
-        normal = mi.Vector3f(*map(float, groups[paths.group].frame[2]))
+        normal = tracer.exterior_normal(paths.group)
         # a back's incident patch lies before the window as the front's does, mirrored
         inward = paths.outward - normal * (2 * dr.dot(normal, paths.outward))
         path = dr.arange(mi.UInt32, dr.width(paths.patch))

@@ -8,42 +8,35 @@ from pathlib import Path
 import click
 
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, IFC_FILE
-from scenes.commands.quick_option import given, quick_option
+from scenes.commands.parameters import FILE
+from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
+    building_options,
+    directions_option,
     eye_height_option,
-    join_option,
-    needed_weather_option,
-    no_cache_option,
-    out_folder_option,
-    seed_option,
-    space_option,
-    subdivide_option,
-    system_option,
+    grid_option,
     write_ifc_option,
 )
 from scenes.comply.options import ComplyOptions
 from scenes.room.options import RoomOptions
 
+OWN = (  # parameters that `ComplyOptions` has by the same name, beside those of every command
+    "standards", "closed", "uses", "least_altitude_deg", "eye_height", "grid", "directions",
+)  # fmt: skip
 DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight chosen
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@needed_weather_option
+@building_options("all")
 @click.option(
     "--standard", "standards", multiple=True, required=True, metavar="NAME|FILE.toml",
-    help="Rules to check: en17037, lm83, leed-v4.1, breeam-hea01, well-v2, or a file of your own.",
+    help="Rules to check: en17037, leed-v4.1, any other of docs/comply.md, or a file of your own.",
 )  # fmt: skip
-@system_option
 @click.option(
     "--closed", type=FILE,
     help="BSDF XML file of every window with its blinds closed; default: the last state that the "
     "IFC holds, else LM-83's shade.",
 )  # fmt: skip
-@out_folder_option
-@space_option("spaces", "default: all")
-@join_option
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(
     "--day", default="03-21", show_default=True, metavar="MM-DD",
@@ -54,21 +47,19 @@ DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight c
     help="Least altitude of the sun that counts [deg]; default: the rule's for the country.",
 )  # fmt: skip
 @eye_height_option
-@click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
+@grid_option
+@directions_option
 @write_ifc_option("a level for each criterion of each room")
-@subdivide_option
-@seed_option
-@no_cache_option
-@quick_option
 def command(
     building: Path,
     *,
     weather: Path,
     system: Path | None,
-    closed: Path | None,
-    uses: Path | None,
     out: Path,
-    standards: tuple[str, ...],
+    spaces: tuple[str, ...],
+    join: tuple[str, ...],
+    furniture: bool,
+    apertures: tuple[str, ...],
     day: str,
     write_ifc: Path | None,
     quick: bool,
@@ -76,19 +67,20 @@ def command(
     **chosen,
 ) -> None:
     """The rooms of an IFC building against daylight rules: a dossier and a table of all values."""
-    own = {k: chosen.pop(k) for k in ("spaces", "join", "least_altitude_deg", "eye_height")}
-    glare = chosen.pop("annual_glare")
+    own = {name: chosen.pop(name) for name in OWN}
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = ComplyOptions(
-        building, weather, standards, system, closed, uses=uses, day=day_of(day),
-        annual_glare=glare, cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen), **own,
+        building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
+        RoomOptions.of(**chosen), day=day_of(day), **own,
     )  # fmt: skip
     from mitsuba_cfs.files import check_file
     from scenes.comply.files import read_files
     from scenes.result_folder import ResultFolder
 
-    folder = ResultFolder(out, "comply", inputs=(building, weather, system, closed, uses))
+    folder = ResultFolder(
+        out, "comply", inputs=(building, weather, system, own["closed"], own["uses"])
+    )
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=(building,))
     files = read_files(options)  # before anything heavy is loaded

@@ -7,13 +7,16 @@ from pathlib import Path
 import click
 
 from scenes import quick
-from scenes.commands.parameters import IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    aperture_option,
+    directions_option,
     eye_height_option,
     furniture_option,
     glare_sources_option,
     glare_sun_option,
+    grid_option,
     join_option,
     method_option,
     out_folder_option,
@@ -35,21 +38,17 @@ _DEFAULT = YearOptions(Path(), Path())
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=BUILDING_FILE, required=False, metavar="[BUILDING]")
 @weather_option
 @system_option
 @out_folder_option
 @space_option("space", "default: the first with a window", several=False)
 @join_option
 @furniture_option
+@aperture_option
 @view_option("views", "or a file of them", several=True)
-@click.option(
-    "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."
-)
-@click.option(
-    "--directions", type=click.IntRange(1, 64), default=_DEFAULT.directions, show_default=True,
-    help="Directions of every eye, the first to the biggest window.",
-)  # fmt: skip
+@grid_option
+@directions_option
 @eye_height_option
 @method_option(METHODS, "by paths there are single pictures, cfs picture", default=_DEFAULT.method)
 @click.option(
@@ -105,7 +104,7 @@ def command(
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.year_of_glare import outputs
+    from scenes.year_of_glare import outputs, page
     from scenes.year_of_glare.year import rate_views, read_year
 
     if options.quick:
@@ -116,6 +115,7 @@ def command(
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)
+            page.write_page(year, table, place / "report.html")
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
         f"{year.room}: {len(table)} view(s), {len(year.sky.lit)} hours with the sun up.  Highest "
@@ -127,6 +127,7 @@ def command(
     for note in year.notes:
         click.echo(f"note: {note}")
     click.echo(f"{out / 'views.csv'}")
+    click.echo(f"report: {out / 'report.html'}")
 
 
 def _error(row) -> str:

@@ -12,7 +12,8 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
-from scenes.commands.parameters import FILE
+from scenes.commands.parameters import BUILDING_FILE, FILE
+from scenes.commands.quick_option import quick_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.room.options import GLARE_SOURCES, GLARE_SUN
 
@@ -28,6 +29,10 @@ join_option = click.option(
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."
 )
+aperture_option = click.option(
+    "--aperture", "apertures", multiple=True, metavar="MATERIAL",
+    help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
+)  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="EPW file, hourly."
 )
@@ -42,6 +47,13 @@ u_option = click.option("--u", "u_value", type=click.FloatRange(0.1, 7), help="U
 eye_height_option = click.option(
     "--eye-height", type=click.FloatRange(0.3, 3), default=1.2, show_default=True,
     help="Of the eye above the floor [m].",
+)  # fmt: skip
+grid_option = click.option(
+    "--grid", type=click.FloatRange(0.1, 20), help="Eyes all over the room, so far apart [m]."
+)
+directions_option = click.option(
+    "--directions", type=click.IntRange(1, 64), default=1, show_default=True,
+    help="Directions of every eye, the first to the biggest window.",
 )  # fmt: skip
 seed_option = click.option(
     "--seed",
@@ -71,6 +83,9 @@ sky_ground_option = click.option(
     "--sky-ground", type=click.Choice(GROUNDS), default=GROUNDS[0], show_default=True,
     help="Luminance of the ground to the horizon: of a plain that reflects, or gendaylit's.",
 )  # fmt: skip
+annual_glare_option = click.option(
+    "--annual-glare", is_flag=True, help="Rate every hour with daylight."
+)
 no_cache_option = click.option(
     "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."
 )
@@ -96,6 +111,36 @@ def size_option(name: str, default: int, why: str) -> Option:
         "--size", name, type=click.IntRange(16, 4096), default=default, show_default=True,
         help=f"Pixels of a picture's longer side; {why}.",
     )  # fmt: skip
+
+
+def building_options(spaces: str) -> Option:
+    """The argument and the options that `cfs run` and `cfs comply` share; `spaces` by default."""
+    shared: Sequence[Option] = (
+        click.argument("building", type=BUILDING_FILE, metavar="BUILDING"),
+        needed_weather_option,
+        system_option,
+        out_folder_option,
+        space_option("spaces", f"default: {spaces}"),
+        join_option,
+        furniture_option,
+        aperture_option,
+        annual_glare_option,
+        subdivide_option,
+        glare_sources_option,
+        glare_sun_option,
+        sun_option,
+        sky_ground_option,
+        seed_option,
+        no_cache_option,
+        quick_option,
+    )
+
+    def decorated(command: Callable) -> Callable:
+        for option in reversed(shared):
+            command = option(command)
+        return command
+
+    return decorated
 
 
 def samples_option(default: int, why: str) -> Option:

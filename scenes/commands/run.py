@@ -8,26 +8,9 @@ import click
 
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
-from scenes.commands.parameters import FILE, IFC_FILE
-from scenes.commands.quick_option import given, quick_option
-from scenes.commands.room_options import (
-    furniture_option,
-    glare_sources_option,
-    glare_sun_option,
-    join_option,
-    method_option,
-    needed_weather_option,
-    no_cache_option,
-    out_folder_option,
-    seed_option,
-    size_option,
-    sky_ground_option,
-    space_option,
-    subdivide_option,
-    sun_option,
-    system_option,
-    u_option,
-)
+from scenes.commands.parameters import FILE
+from scenes.commands.quick_option import given
+from scenes.commands.room_options import building_options, method_option, size_option, u_option
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
@@ -36,16 +19,10 @@ _DEFAULT = RoomOptions()
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@needed_weather_option
-@system_option
-@out_folder_option
+@building_options("all with a window")
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
-@space_option("spaces", "default: all with a window")
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
-@join_option
-@furniture_option
 @click.option(
     "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
@@ -67,15 +44,10 @@ _DEFAULT = RoomOptions()
     "--operation", type=FILE,
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
-@click.option("--annual-glare", is_flag=True, help="Rate every hour with daylight.")
-@subdivide_option
-@glare_sources_option
-@glare_sun_option
-@sun_option
-@sky_ground_option
-@seed_option
-@no_cache_option
-@quick_option
+@click.option(
+    "--explore", is_flag=True,
+    help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
+)  # fmt: skip
 def command(
     building: Path,
     *,
@@ -87,19 +59,24 @@ def command(
     g_value: float | None,
     join: tuple[str, ...],
     furniture: bool,
+    apertures: tuple[str, ...],
     operation: Path | None,
     no_cache: bool,
+    explore: bool,
     quick: bool,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
+    """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
+    if explore and chosen["method"] == "point-in-time":
+        raise click.UsageError("--explore needs --method three-phase or five-phase")
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
-        building, weather, system, operation, spaces, join, furniture, u_value, g_value,
-        cache=not no_cache, quick=quick, room=RoomOptions.of(**chosen),
+        building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
+        RoomOptions.of(**chosen), operation=operation, explore=explore,
+        u_value=u_value, g_value=g_value,
     )  # fmt: skip
     run_to_folder(options, out)
 
@@ -117,8 +94,9 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.explore.folder import write_explorer
     from scenes.report import write_report
-    from scenes.run.outputs import write_results
+    from scenes.run.outputs import EXPLORER, write_results
     from scenes.run.run import run_job
 
     if options.quick:
@@ -128,7 +106,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
             options, progress, files, on_room=_print_summary, on_building=_print_account
         )
         progress("results", 0.0)
-        write_results(result, folder, write_report)
+        write_results(result, folder, write_report, write_explorer if options.explore else None)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:
@@ -136,6 +114,8 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+    if options.explore:
+        click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
 
 
 def _print_account(building) -> None:

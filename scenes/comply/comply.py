@@ -7,20 +7,22 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy
 from mitsuba_cfs.metrics.lm83 import sunlit_hours
-from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from scenes.comply.assess import assess_building, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import Findings, GridLight, calendar_of
+from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
+from scenes.comply.glare import seat_glare
 from scenes.comply.glass import windows_without_view
+from scenes.comply.heat import room_heat
 from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
@@ -37,7 +39,7 @@ from scenes.run.building import read_building
 from scenes.run.inputs import named_spaces
 from scenes.run.rooms import RoomSeries
 
-LIGHT, RAYS = frozenset({"open", "operated", "glare"}), frozenset({"view", "sun"})
+LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat"}), frozenset({"view", "sun"})
 
 
 def check_building(
@@ -51,7 +53,13 @@ def check_building(
     if options.building is None:
         raise ValueError("a check of a file needs its building")
     steps = part(progress, 0.1, 1.0)
-    building = read_building(options.building, join=options.join, progress=steps)
+    building = read_building(
+        options.building,
+        join=options.join,
+        furniture=options.furniture,
+        apertures=options.apertures,
+        progress=steps,
+    )
     return check_rooms(building, options, files, progress)
 
 
@@ -102,7 +110,9 @@ class Check:
             windows = [w for space in chosen for w in space.windows]
         systems = fill_windows(windows, files.given, building.file) if self.lit else {}
         self.systems: dict[str, States] = {guid: states[:1] for guid, states in systems.items()}
-        if "operated" in self.parts:
+        # LM-83's default shade is for its own sum alone, no rating of glare
+        self.shaded = files.closed is not None or min(map(len, systems.values()), default=0) > 1
+        if "operated" in self.parts or (self.shaded and self.moving):
             self.systems = open_and_closed(systems, files.closed)
         self.building = traced_building(building, self.systems)
         self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
@@ -116,8 +126,17 @@ class Check:
     @property
     def lit(self) -> bool:
         """Whether the rules look at light at all."""
-        glare = "glare" in self.parts and self.options.annual_glare
-        return bool(self.parts & {"open", "operated"}) or glare
+        return bool(self.parts & {"open", "operated", "heat"}) or self.glaring
+
+    @property
+    def moving(self) -> bool:
+        """Whether something that real blinds change is looked at, LM-83's own sum apart."""
+        return self.glaring or "heat" in self.parts
+
+    @property
+    def glaring(self) -> bool:
+        """Whether glare is rated."""
+        return "glare" in self.parts and self.options.room.outputs.annual_glare
 
     def uses_of(self, spaces: list[Space]) -> dict[str, RoomUse]:
         """The use of each room by GUID; rooms without a window and without a use count as none."""
@@ -164,7 +183,8 @@ class Check:
             return {s.guid: RoomLights(s, {}, none) for s in spaces}, [], []
         start, options = time.monotonic(), self.options
         self.progress("sky", 0.0)
-        skies = skies_for(self.files.weather, options.room.method, options.room.sampling)
+        room = options.room
+        skies = skies_for(self.files.weather, room.method, room.sampling, **room.sky)
         self.progress("sky", 1.0)
         cache = MatrixCache.of_user() if options.cache else None
 
@@ -192,18 +212,32 @@ class Check:
         operated = {
             distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts
         }
-        found, dgp = lights_of(room, operated), None
-        if self.options.annual_glare and "glare" in self.parts:
-            used = working_hours(self.files.weather, *self.options.room.occupancy.hours)
-            dgp = room.annual_glare()["dgp"].fillna(0.0).to_numpy()[used]
+        if self.moving and self.shaded:
+            operated = operated or {0}
+        found = lights_of(room, operated)
+        closed = next((one.closed for one in found if one.closed is not None), None)
+        closed = closed if self.shaded else None
+        glare = self._glare(room, closed) if self.glaring else None
+        heat = room_heat(room, closed) if "heat" in self.parts else None
+        of_room = Findings(self.calendar, glare=glare, heat=heat)
         lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
         values = {
-            name: values_of(rules[name], Findings(self.calendar, light, dgp=dgp), LIGHT)
+            name: values_of(rules[name], replace(of_room, light=light), LIGHT)
             for name, light in lights.items()
         }
         summaries = {id(light): self._summary(light) for light in found}
         by_rule = {name: summaries[id(light)] for name, light in lights.items()}
-        return RoomLights(space, by_rule, values, tuple(g.name for g in room.windows.groups))
+        groups = tuple(g.name for g in room.windows.groups)
+        return RoomLights(space, by_rule, values, groups, glare)
+
+    def _glare(self, room: RoomSimulation, closed: NDArray[np.bool_] | None) -> SeatGlare:
+        """Glare of a room's seats with its blinds closed [H, G]; None: open all year."""
+        state = None if closed is None else closed[room.skies.lit].T.astype(np.int64)
+        options = self.options
+        return seat_glare(
+            room, state, grid=options.grid, directions=options.directions,
+            eye_height=options.eye_height,
+        )  # fmt: skip
 
     def _summary(self, light: GridLight) -> GridSummary:
         ten = self.calendar.ten
@@ -214,6 +248,7 @@ class Check:
             daylight_autonomy(light_of_use, ten),
             sunlit_hours(light.direct, ten, step_h=self.calendar.step_h),
             None if light.closed is None else light.closed[ten].mean(axis=0),
+            None if light.free is None else free_shares(light.free[ten]),
         )
 
     def room(
@@ -255,8 +290,17 @@ class Check:
                 "walls, are the utilised area; furniture does not count."
             )
             found += self.glass
-        if "glare" in self.parts and not options.annual_glare:
+        if "glare" in self.parts and not self.glaring:
             found.append("Glare was not computed: --annual-glare rates every hour with daylight.")
+        elif self.glaring:
+            blinds = "blinds closed by LM-83's rule" if self.shaded else "every window open"
+            found.append(f"Glare is rated with {blinds}.")
+        if "heat" in self.parts:
+            blinds = "blinds closed when LM-83 closes some" if self.shaded else "no blinds"
+            found.append(
+                f"Temperatures are those without heating and cooling, {blinds}, "
+                f"{options.room.infiltration_ach:g} air changes an hour, gains of the hours of use."
+            )
         if "open" in self.parts and self.calendar.median_diffuse is None:
             found.append("The weather file has no diffuse illuminance: no daylight factor method.")
         found += [
@@ -267,8 +311,15 @@ class Check:
         return found
 
 
+def free_shares(free: NDArray[np.bool_]) -> tuple[float, float]:
+    """Shares of the hours in which some and in which all window groups [H, G] are seen through."""
+    return float(np.mean(free.any(axis=1))), float(np.mean(free.all(axis=1)))
+
+
 def moved_lights(found: RoomLights, space: Space) -> RoomLights:
     """The light of a template room for one equal to it, moved to where that stands."""
     shift = corner(space) - corner(found.space)
     grids = {name: replace(grid, points=grid.points + shift) for name, grid in found.grids.items()}
-    return replace(found, space=space, grids=grids, template=found.space.label)
+    glare = found.glare and replace(found.glare, eyes=found.glare.eyes + shift)
+    template = found.space.label
+    return replace(found, space=space, grids=grids, glare=glare, template=template)

@@ -18,7 +18,7 @@ MOST_BARS = 12  # openings with a bar of their own
 
 def plans(result: Compliance, room: CheckedRoom) -> tuple[FloorPlan, ...]:
     """Plans of what the rules look at in a room."""
-    return (*_view_plans(result, room), *_light_plans(room))
+    return (*_view_plans(result, room), *_light_plans(room), *_glare_plans(room))
 
 
 def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
@@ -61,6 +61,20 @@ def _light_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
             yield plan(frame, grid.sunlit_hours, scale, title="Sunlit hours", explanation=text)
 
 
+def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
+    glare = None if room.light is None else room.light.glare
+    if glare is None or len(glare.eyes) == 1:
+        return
+    eyes, seat = np.unique(glare.eyes, axis=0, return_inverse=True)
+    worst = np.zeros(len(eyes))  # of the directions of each eye
+    np.maximum.at(worst, seat.ravel(), glare.not_exceeded())
+    frame = plan_frame(room.space, eyes)
+    scale = ColourScale(0.2, 0.6, "Daylight glare probability", "")
+    blinds = "blinds operated" if glare.operated else "blinds open"
+    text = f"Exceeded in 5 % of the hours of use, in each seat's worst direction, {blinds}."
+    yield plan(frame, worst, scale, title="Glare", explanation=text, digits=2)
+
+
 def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
     """When the sun may shine on each opening, and on any."""
     wanted = any("sun" in rule.parts for rule in result.rules.values())
@@ -91,5 +105,5 @@ def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
         tuple(Tick(100 * (h - FIRST_HOUR) / span, str(h), "") for h in hours),
         tuple(Tick(100 * (count - i - 0.5) / count, name, "", False)
               for i, (name, _) in enumerate(rows)),
-        tuple(marks), height=40 + 26 * count,
+        tuple(marks), height=30 + 18 * count,
     )  # fmt: skip

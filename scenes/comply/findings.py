@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mitsuba_cfs.glare.classes import exceeded_share, hour_not_exceeded
 from mitsuba_cfs.metrics.schedules import daylight_hours, lm83_hours
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.sunlight import SunExposure
@@ -29,6 +30,7 @@ class GridLight:
     factor: FloatArray  # [S] daylight factor, 0 to 1, open
     operated: NDArray[np.float32] | None = None  # [H, S] [lx] blinds as LM-83 moves them
     closed: NDArray[np.bool_] | None = None  # [H, G] when the blinds of each group are closed
+    free: NDArray[np.bool_] | None = None  # [H, G] when one sees out through each group
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,33 @@ class Calendar:
 
 
 @dataclass(frozen=True, slots=True)
+class SeatGlare:
+    """Glare of the seats of a room in the hours of use."""
+
+    eyes: FloatArray  # [V, 3] [m]
+    directions: FloatArray  # [V, 3] unit vectors
+    dgp: FloatArray  # [V, N] daylight glare probability, 0 in the dark
+    operated: bool  # blinds moved, else open all year
+
+    def exceeded(self, limit: float) -> float:
+        """Share (0 to 1) of the hours above a limit at the seat that has most of them."""
+        return max(exceeded_share(row, limit) for row in self.dgp)
+
+    def not_exceeded(self) -> FloatArray:
+        """DGP [V] that is exceeded in 5 % of the hours of use."""
+        return np.array([hour_not_exceeded(row) for row in self.dgp])
+
+
+@dataclass(frozen=True, slots=True)
+class RoomHeat:
+    """The temperatures of a room without heating and cooling."""
+
+    operative_c: FloatArray  # [H]
+    outdoor_c: FloatArray  # [H]
+    occupied: NDArray[np.bool_]  # [H] the hours of use
+
+
+@dataclass(frozen=True, slots=True)
 class Findings:
     """What was computed of a room; None is not computed."""
 
@@ -60,7 +89,8 @@ class Findings:
     light: GridLight | None = None  # on the grid of the rules that look at it
     view: ViewOut | None = None
     sun: SunExposure | None = None
-    dgp: FloatArray | None = None  # [N] of the hours of use
+    glare: SeatGlare | None = None
+    heat: RoomHeat | None = None
 
     @property
     def daylight_hours(self) -> NDArray[np.bool_]:

@@ -12,6 +12,7 @@ from bim.sensors import plane_sides
 from mitsuba_cfs.metrics.en17037 import greatest_cell
 from mitsuba_cfs.metrics.lm83 import blinds_operated
 from scenes.comply.findings import GridLight
+from scenes.comply.glass import sight_through
 from scenes.comply.rules import GridTable
 from scenes.room.daylight import grid_points, overcast_factor
 from scenes.room.options import SensorGrid
@@ -31,8 +32,7 @@ def sensor_grid_of(space: Space, table: GridTable) -> SensorGrid:
 def lights_of(room: RoomSimulation, operated: Iterable[int]) -> list[GridLight]:
     """The light on each grid of a room.
 
-    The windows' first state is open, their second closed.  The blinds of a window group are closed
-    in the hours in which the sun through it, all open, gives 1000 lx to over 2 % of the points.
+    The windows' first state is open, their second closed; LM-83's rule moves them by group.
 
     Args: operated: numbers of the grids whose light with operated blinds is wanted.
     """
@@ -44,18 +44,20 @@ def lights_of(room: RoomSimulation, operated: Iterable[int]) -> list[GridLight]:
     opened, factor = light.illuminance(), overcast_factor(light)
     through = light.direct_sun_by_group() or []
     points = room.scene.points
+    seen = [room.windows.of_state(j, lambda one: sight_through(one).is_view) for j in (0, 1)]
     found, first = [], 0
     for number, grid in enumerate(room.grids):
         count = len(grid_points(room.space, grid))
         own = slice(first, first + count)
         first += count
         direct = [part[own] for part in through]
-        blinds = closed = None
+        blinds = closed = free = None
         if number in operated:
             state = blinds_operated([part.T for part in direct]).astype(np.int64)  # [G, L]
             blinds, closed = year(light.illuminance(state)[own]), sky.whole_year(state).T > 0
+            free = np.where(closed, seen[1], seen[0])
         sun = np.sum(direct, axis=0) if direct else np.zeros_like(opened[own])
         found.append(
-            GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed)
+            GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed, free)
         )
     return found

@@ -5,50 +5,15 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from mitsuba_cfs.glare.classes import exceeded_share
 from mitsuba_cfs.metrics.autonomy import area_share, daylight_autonomy
 from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, reached_on_area
 from mitsuba_cfs.metrics.lm83 import annual_sunlight_exposure
 from scenes.comply.findings import Findings
-from scenes.toml_file import Positive, Share, TomlTable
-
-ROUNDING = 1e-9  # of shares of an area
-
-
-class Need(TomlTable):
-    """A limit of a quantity of a room."""
-
-    at_least: float | None = None
-    at_most: float | None = None
-
-    parts: ClassVar[frozenset[str]] = frozenset()  # of `Findings` that it needs
-    unit: ClassVar[str] = ""  # "%" values are shares and shown times 100
-    digits: ClassVar[int] = 0
-
-    @model_validator(mode="after")
-    def _has_one_limit(self) -> Need:
-        if (self.at_least is None) == (self.at_most is None):
-            raise ValueError("expected either at_least or at_most")
-        return self
-
-    @property
-    def words(self) -> str:
-        """The quantity in words."""
-        raise NotImplementedError
-
-    def value(self, room: Findings) -> float | None:
-        """The quantity of a room; None where it was not computed."""
-        raise NotImplementedError
-
-    def met(self, value: float | None) -> bool | None:
-        """Whether a value keeps the limit; None where there is none."""
-        if value is None:
-            return None
-        if self.at_least is not None:
-            return value >= self.at_least - ROUNDING
-        return value <= (self.at_most or 0.0) + ROUNDING
+from scenes.comply.heat_needs import ComfortShare, DegreeHours
+from scenes.comply.need import Need
+from scenes.toml_file import Positive, Share
 
 
 class ReachedLux(Need):
@@ -156,7 +121,7 @@ class SunHours(Need):
 
 
 class DgpExceeded(Need):
-    """EN 17037: share of the hours of use in which the daylight glare probability is above."""
+    """EN 17037: share of the hours of use in which DGP is above, at the worst of the seats."""
 
     what: Literal["dgp_exceeded"]
     limit: Share
@@ -168,11 +133,34 @@ class DgpExceeded(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"share of the hours of use with a daylight glare probability above {self.limit:g}"
+        return (
+            f"share of the hours of use with a daylight glare probability above {self.limit:g}, "
+            "at the worst seat"
+        )
 
     def value(self, room: Findings) -> float | None:
         """Share, 0 to 1."""
-        return None if room.dgp is None else exceeded_share(room.dgp, self.limit)
+        return None if room.glare is None else room.glare.exceeded(self.limit)
+
+
+class ViewFree(Need):
+    """Share of LM-83's hours in which one sees out through some window, blinds operated."""
+
+    what: Literal["view_free"]
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open", "operated"})
+    unit: ClassVar[str] = "%"
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return "share of 8 to 18 o'clock in which blinds leave the view through some window free"
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        if room.light is None or room.light.free is None:
+            return None
+        return float(np.mean(room.light.free[room.ten_hours].any(axis=1)))
 
 
 class SpatialAutonomy(Need):
@@ -300,16 +288,53 @@ class WorstHours(Need):
         return float(room.step_h * np.count_nonzero(room.light.open >= self.lux, axis=0).min())
 
 
+class LightingEnergy(Need):
+    """Yearly energy of lamps that are dimmed to what daylight lacks, per floor area (LENI)."""
+
+    what: Literal["leni"]
+    lux: Positive  # that lamps and daylight keep together
+    power_w_m2: Positive  # of the lamps where there is no daylight
+    standby_kwh_m2: Annotated[float, Field(ge=0)] = 0.0  # of controls and emergency lights, a year
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    unit: ClassVar[str] = "kWh/m² a"
+    digits: ClassVar[int] = 1
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return (
+            f"energy of lamps of {self.power_w_m2:g} W/m², dimmed to {self.lux:g} lx, "
+            "8 to 18 o'clock"
+        )
+
+    def value(self, room: Findings) -> float | None:
+        """Energy [kWh/(m2 a)]; blinds operated where that is known.
+
+        Source: EN 15193-1's indicator LENI = W/A; hour by hour in place of its dependency factors.
+        """
+        if room.light is None:
+            return None
+        light = room.light.open if room.light.operated is None else room.light.operated
+        lacking = np.maximum(1.0 - light[room.ten_hours] / self.lux, 0.0)
+        hours = room.step_h * float(lacking.mean(axis=1, dtype=float).sum())
+        return self.power_w_m2 * hours / 1000 + self.standby_kwh_m2
+
+
 AnyNeed = Annotated[
     ReachedLux
     | ReachedFactor
     | ViewShare
     | SunHours
     | DgpExceeded
+    | ViewFree
     | SpatialAutonomy
     | SunlightExposure
     | Equinox
     | MeanHours
-    | WorstHours,
+    | WorstHours
+    | LightingEnergy
+    | DegreeHours
+    | ComfortShare,
     Field(discriminator="what"),
 ]

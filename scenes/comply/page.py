@@ -13,11 +13,10 @@ from scenes.comply.drawings import plans, sun_bars
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import RuleTable
 from scenes.figures.chart import Chart
-from scenes.figures.plan import FloorPlan
 from scenes.quick import NOTE
 from scenes.report.numbers import rounded
 from scenes.report.page import TEMPLATES, environment
-from scenes.report.room import facts
+from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Column, Table
 
 STYLE = files(__package__) / "templates" / "dossier.css"
@@ -34,14 +33,10 @@ class DossierRule:
 
 
 @dataclass(frozen=True, slots=True)
-class DossierRoom:
-    """The section of one room."""
+class DossierRoom(RoomSection):
+    """The section of one room in a dossier."""
 
-    anchor: str
-    name: str
-    facts: tuple[tuple[str, str], ...]
     tables: tuple[Table, ...]
-    plans: tuple[FloorPlan, ...]
     sun: Chart | None
     openings: Table | None
 
@@ -83,8 +78,8 @@ def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierR
         f"room-{number}",
         room.space.label,
         room_facts(room),
-        tuple(table for table in found if table.rows),
         plans(result, room),
+        tuple(table for table in found if table.rows),
         sun_bars(result, room),
         tables.openings_table(room),
     )
@@ -97,14 +92,18 @@ def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
     if not room.use.occupied:
         rows.append(("Occupied", "not regularly: left out of what looks at occupied rooms"))
     if room.light is not None:
+        grids = list(room.light.grids.values())
         shares = {
             f"{name}: {rounded(100 * share, 0)} %": None
-            for grid in room.light.grids.values()
+            for grid in grids
             if grid.closed is not None
             for name, share in zip(room.light.groups, grid.closed.tolist(), strict=True)
         }
         if shares:
             rows.append(("Blinds closed, of 8 to 18 o'clock", ", ".join(shares)))
+        for some, every in {grid.view_free: None for grid in grids if grid.view_free}:
+            words = f"{rounded(100 * some, 0)} %, through all {rounded(100 * every, 0)} %"
+            rows.append(("View free through some window, of 8 to 18 o'clock", words))
     return tuple(rows)
 
 

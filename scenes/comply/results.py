@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from bim.model import Building, Problem, Space
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.assess import BuildingVerdict, RoomVerdict
-from scenes.comply.findings import Calendar
-from scenes.comply.needs import Need
+from scenes.comply.findings import Calendar, SeatGlare
+from scenes.comply.need import Need
 from scenes.comply.rules import RuleTable
 from scenes.comply.sunlight import SunDay, SunExposure
 from scenes.comply.uses import RoomUse
@@ -30,6 +30,7 @@ class GridSummary:
     autonomy: FloatArray  # [S] share of LM-83's hours with 300 lx, as operated where that is known
     sunlit_hours: FloatArray  # [S] [h] of LM-83's with 1000 lx of direct sun, blinds open
     closed: FloatArray | None = None  # [G] share of LM-83's hours with closed blinds, by group
+    view_free: tuple[float, float] | None = None  # shares of them: some windows free, all free
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,7 @@ class RoomLights:
     grids: Mapping[str, GridSummary]  # by rule
     values: Mapping[str, Mapping[Need, float | None]]  # by rule
     groups: tuple[str, ...] = ()  # names of the window groups
+    glare: SeatGlare | None = None
     template: str = ""  # name of the equal room that was computed; "": this one
 
 

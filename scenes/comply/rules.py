@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from mitsuba_cfs.errors import DataError
-from scenes.comply.needs import AnyNeed, Need
+from scenes.comply.need import Need
+from scenes.comply.needs import AnyNeed
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 FOLDER = files(__package__) / "rules"

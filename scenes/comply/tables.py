@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from scenes.comply.assess import NOT_FOR_IT, RoomVerdict
-from scenes.comply.needs import Need
+from scenes.comply.need import Need
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import LevelTable
 from scenes.report.numbers import MISSING, rounded

@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.glare.classes import hour_not_exceeded, protection_level
+from scenes.provision_levels import provision_levels
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded, significant
 from scenes.report.tables import glare_class, spoken, step_hours
 from scenes.results import RoomYear, RunResult
 
 WARM_C = 26.0  # operative temperature above which hours are counted
-LEVELS = ("none", "minimum", "medium", "high")  # of EN 17037
 PROTECTION = {"high": "0.35", "medium": "0.40", "minimum": "0.45"}  # DGP
 GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
 
@@ -150,7 +150,7 @@ def _provision(room: RoomYear) -> Card | None:
     level = metrics.get("en17037_level")
     if level is None:
         return None
-    index = LEVELS.index(level) if isinstance(level, str) else int(level)
+    index, levels = int(level), provision_levels()
     target, least = metrics.get("en17037_target_lx"), metrics.get("en17037_minimum_lx")
     words = "level of daylight provision by EN 17037"
     if target is not None and least is not None:
@@ -158,7 +158,7 @@ def _provision(room: RoomYear) -> Card | None:
             f": in half of the daylight hours half of the room has {significant(target)} lx or "
             f"more and nearly all of it {significant(least)} lx"
         )
-    verdict = ("below 300 and 100 lx", "300 and 100 lx", "500 and 300 lx", "750 and 500 lx")[index]
+    verdict = (f"below {levels[0].words}", *(one.words for one in levels))[index]
     grade = (POOR, FAIR, GOOD, GOOD)[index]
     return Card(
         "Daylight provision", q.values[index].capitalize(), "", words, verdict, grade, q.meaning

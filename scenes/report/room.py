@@ -24,14 +24,20 @@ from scenes.results import RoomYear, RunResult
 
 
 @dataclass(frozen=True, slots=True)
-class RoomPage:
-    """The section of one room."""
+class RoomSection:
+    """What every page shows of a room."""
 
     anchor: str
     name: str
     facts: tuple[tuple[str, str], ...]
-    cards: tuple[Card, ...]
     plans: tuple[FloorPlan, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RoomPage(RoomSection):
+    """The section of one room in the report of a run."""
+
+    cards: tuple[Card, ...]
     light: Chart
     daylight_tables: tuple[tables.Table, ...]
     error_words: str

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.metrics.room import room_metrics
 from mitsuba_cfs.sky.weather import Weather
+from scenes.provision_levels import level_number
 
 SENSOR_COLUMNS = {  # column of a run: (column of the library, factor)
     "da300": ("daylight_autonomy", 100.0),
@@ -53,5 +54,5 @@ def daylight_metrics(
     if metrics.annual_sunlight_exposure is not None:
         room["ase1000_250"] = 100.0 * metrics.annual_sunlight_exposure
     room["daylight_factor"] = 100.0 * float(np.mean(daylight_factor))
-    room["en17037_level"] = float(metrics.daylight_provision.level)
+    room["en17037_level"] = float(level_number(metrics.daylight_provision))
     return table, room

@@ -24,16 +24,16 @@ def thermal_result(
     room: RoomZone,
     result: ZoneResult,
     weather: Weather,
-    occupied: NDArray[np.bool_],
+    felt: dict[str, NDArray[np.float64]],
     fenestration: Iterator[dict[str, float | str]],
 ) -> ThermalResult:
     """The tables of a room's year.
 
-    Args: occupied: [H]; fenestration: `fenestration_table` of its windows.
+    Args: felt: `felt_by`; fenestration: `fenestration_table` of its windows.
     """
-    comfort, summary = _comfort(result, weather, occupied)
+    comfort, summary = _comfort(result, weather, room.occupied)
     return ThermalResult(
-        _temperatures(result, room.zone, weather),
+        _temperatures(result, room.zone, weather).assign(**felt),
         pd.DataFrame(room.gains, index=weather.midpoints).rename_axis("time"),
         comfort,
         summary,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 
-from bim.ifc.building import STAGES, read_ifc
+from bim.building_file import STAGES, ReadOptions, read_building_file
 from bim.model import Building
 from mitsuba_cfs.progress import Progress, silent, summed
 
@@ -16,16 +15,19 @@ def read_building(
     *,
     join: Sequence[str] = (),
     furniture: bool = False,
+    apertures: Sequence[str] = (),
     progress: Progress = silent,
 ) -> Building:
-    """The building of an IFC file, with the corrections kept beside it.
+    """The building of an IFC file, with the corrections kept beside it, or of another format.
 
     Args:
         join: rooms to make one, as "Hall + Living".
         furniture: whether what stands in the rooms is in their light and views.
+        apertures: materials of a Radiance scene's surfaces that are windows.
 
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
         `problems`.
     """
     steps = summed(progress, "inputs", STAGES)
-    return read_ifc(Path(path), join=join, furniture=furniture, progress=steps)
+    options = ReadOptions(tuple(join), furniture, tuple(apertures))
+    return read_building_file(path, options, steps)

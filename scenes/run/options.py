@@ -1,4 +1,4 @@
-"""Inputs and choices of a run."""
+"""Inputs and choices of commands that compute the rooms of a building, and those of a run."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ from scenes.room.options import RoomOptions
 
 
 @dataclass(frozen=True, slots=True)
-class JobOptions:
-    """Inputs and choices of a run."""
+class BuildingOptions:
+    """Inputs and choices of every command that computes the rooms of a building."""
 
     building: Path | None  # None: not from a file
     weather: Path | None
     system: Path | None = None  # of every window; None: what the building's file holds
-    operation: Path | None = None
-    spaces: tuple[str, ...] = ()  # names or GUIDs; none: every space that has a window
+    spaces: tuple[str, ...] = ()  # names or GUIDs; none: all that the command is for
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     furniture: bool = False  # whether what stands in the rooms is in their light and views
-    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
-    g_value: float | None = None  # at normal incidence
+    apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows; none: all of glass
     cache: bool = True  # keep traced matrices and find them again
     quick: bool = False  # said in the results; what it chooses is in `scenes.quick`
     room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
@@ -30,3 +28,13 @@ class JobOptions:
         """Every choice by its name, those of the rooms first."""
         own = [one.name for one in fields(self) if one.name != "room"]
         return self.room.named() | {name: getattr(self, name) for name in own}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobOptions(BuildingOptions):
+    """Inputs and choices of a run."""
+
+    operation: Path | None = None
+    explore: bool = False  # every hour's picture in every shading state, for the explorer
+    u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
+    g_value: float | None = None  # at normal incidence

@@ -140,7 +140,11 @@ def read_inputs(
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
     building = read_building(
-        options.building, join=options.join, furniture=options.furniture, progress=steps
+        options.building,
+        join=options.join,
+        furniture=options.furniture,
+        apertures=options.apertures,
+        progress=steps,
     )
     inputs = job_inputs(building, options.spaces, files)
     progress("inputs", 1.0)
@@ -192,7 +196,8 @@ def _rooms(
     def compute(space: Space, steps: Progress) -> RoomYear:
         return compute_room(
             inputs.building, space, inputs.systems, inputs.weather, options.room,
-            operation=inputs.operation, skies=skies, cache=cache, progress=steps,
+            operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
+            progress=steps,
         )  # fmt: skip
 
     return RoomSeries(

@@ -7,18 +7,23 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
+from bim.defaults import CLEAR_GLAZING
 from bim.gloss_materials import gltf_factors, mitsuba_bsdf
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import read_corrections
+from bim.model import Element
+from bim.outdoors import mirrors_in_view
 from bim.shoebox import shoebox
+from bim.solids import triangles_of
 from bim.to_gltf import write_gltf
 from bim.to_mitsuba import write_mitsuba
 from bim.to_radiance import write_radiance
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import dielectric, lacquer, mirror, pane
-from tests.bim.small_ifc import box_room
+from tests.bim.small_ifc import SmallIfc, box_room
 
 
 def building_with(tmp_path, style: str = "wall", **entries):
@@ -80,6 +85,53 @@ def test_glass_that_says_so_mirrors_the_outdoors(tmp_path):
     assert window.gloss == pane() and window.reflectance_visible == 0.0
     plain = building_with(tmp_path, "glass")
     assert all(e.gloss is None for e in plain.elements)
+
+
+def pane_before_the_window(low, size) -> Element:
+    """A pane whose style says nothing, as the outdoors are read."""
+    body = Manifold.cube(size).translate(low)
+    body = triangles_of(body)[0]
+    return Element("pane", "pane", "IfcPlate", body, 0.0, 0.0, gloss=CLEAR_GLAZING)
+
+
+def test_panes_that_a_window_sees_mirror_as_clear_glazing():
+    """The face opposite the window; edges, the far face and the window's own facade do not."""
+    (window,) = shoebox().spaces[0].windows  # faces south from y = 0
+    opposite = pane_before_the_window((0, -12.02, 0), (4, 0.02, 3))
+    beside = pane_before_the_window((5, -0.05, 0), (2, 0.02, 3))
+    behind = pane_before_the_window((0, 9, 0), (2, 0.02, 3))
+    parts, problems = mirrors_in_view([opposite, beside, behind], [window])
+    bright = [part for part in parts if part.gloss is not None]
+    assert [part.triangles[..., 1].mean() for part in bright] == [pytest.approx(-12.0)]
+    assert bright[0].gloss is CLEAR_GLAZING and bright[0].reflectance_visible == 0.0
+    assert sum(len(part.triangles) for part in parts) == 3 * len(opposite.triangles)
+    assert {part.reflectance_visible for part in parts if part.gloss is None} == {0.15}
+    (problem,) = problems
+    assert problem.what.startswith("1 panes outdoors before a window (first pane)")
+
+
+def test_clear_glazing_mirrors_as_two_panes():
+    """Two panes of 1.52 without absorption: rho = 4 r / (1 + 3 r), r of one surface."""
+    r = (0.52 / 2.52) ** 2
+    two = pane(1.52, 1.0, panes=2).at_normal
+    assert two == pytest.approx(4 * r / (1 + 3 * r), rel=1e-6)
+    assert CLEAR_GLAZING.at_normal == pytest.approx(0.15, abs=0.005)
+    assert CLEAR_GLAZING.reflectance(0.0) == pytest.approx(1.0)
+
+
+def test_the_outdoors_of_a_file_mirror_by_default(tmp_path):
+    """A glass pane 10 m before the window of a file that says nothing of its gloss."""
+    model = box_room()
+    (body,) = model.by_type("IfcGeometricRepresentationSubContext")
+    small = SmallIfc(model, body, model.by_type("IfcBuildingStorey")[0], 1.0)
+    glass = small.style("sheer", 0.9, 0.8)
+    small.box("IfcPlate", "opposite", (0.0, -10.0, 0.0), (4.0, 0.02, 3.0), glass)
+    path = tmp_path / "street.ifc"
+    model.write(str(path))
+    found = read_ifc(path)
+    panes = [e for e in found.elements if e.name == "opposite" and e.gloss is not None]
+    assert panes and all(e.gloss is CLEAR_GLAZING for e in panes)
+    assert any("panes outdoors" in problem.what for problem in found.problems)
 
 
 def test_corrections_give_a_gloss(tmp_path):

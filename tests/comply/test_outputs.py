@@ -54,7 +54,7 @@ needs = [{what = "sun_hours", at_least = 1.5}]
 def options(tmp_path_factory) -> ComplyOptions:
     path = tmp_path_factory.mktemp("rule") / "rays.toml"
     path.write_text(RULE)
-    return ComplyOptions(None, WEATHER, (str(path),))
+    return ComplyOptions(None, WEATHER, standards=(str(path),))
 
 
 def files_of(options: ComplyOptions, **more) -> ComplyFiles:
@@ -142,6 +142,50 @@ def test_topics_are_of_rooms_that_miss_something(result, tmp_path):
     assert "clause 7.2" in text and "0.00 h, ≥ 1.5 h for met" in text
 
 
+STRICT = """
+title = "Strict"
+edition = "1"
+source = ["made"]
+grid = {height = 0.8, margin = 0.5}
+[[criterion]]
+key = "sun"
+title = "Sun"
+clause = "1.1"
+[[criterion.level]]
+name = "met"
+needs = [{what = "sun_hours", at_least = 6.0}]
+"""
+
+
+def test_a_failing_room_is_found_again_from_its_topic(tmp_path):
+    """From the BCF file alone into the model: the topic's GUID is the space of its title."""
+    import ifcopenshell
+
+    rule = tmp_path / "strict.toml"
+    rule.write_text(STRICT)
+    options = ComplyOptions(OFFICE, WEATHER, standards=(str(rule),))
+    files = files_of(options, rules={"strict": read_rule(str(rule))})
+    write_compliance(
+        check_rooms(read_building(OFFICE), options, files), ResultFolder(tmp_path / "out", "comply")
+    )
+    table = pd.read_csv(tmp_path / "out" / "values.csv").set_index("guid")
+    failing = set(table.index[table.met == "no"])
+    assert 0 < len(failing) < len(table)
+    model, found = ifcopenshell.open(OFFICE), set()
+    with zipfile.ZipFile(tmp_path / "out" / "issues.bcf") as archive:
+        for name in (n for n in archive.namelist() if n.endswith("markup.bcf")):
+            markup = ElementTree.fromstring(archive.read(name))
+            view = markup.find("Viewpoints").findtext("Viewpoint")
+            shown = ElementTree.fromstring(archive.read(f"{name.partition('/')[0]}/{view}"))
+            space = model.by_guid(shown.find("Components/Selection/Component").get("IfcGuid"))
+            assert space.is_a("IfcSpace")
+            assert markup.find("Topic").findtext("Title").startswith(f"{space.Name}")
+            value = table.loc[space.GlobalId].value
+            assert f"{value:.2f} h, ≥ 6 h" in markup.find("Topic").findtext("Description")
+            found.add(space.GlobalId)
+    assert found == failing
+
+
 def test_levels_go_into_the_ifc(options, tmp_path):
     """A property set on each room of a real file."""
     import ifcopenshell
@@ -168,7 +212,7 @@ def test_levels_go_into_the_ifc(options, tmp_path):
 def test_least_altitude_of_the_sun(site, altitude, source):
     weather = replace(read_weather(WEATHER), site=site)
     rules = {"en17037": read_rule("en17037")}
-    options = ComplyOptions(None, None, ("en17037",))
+    options = ComplyOptions(None, None, standards=("en17037",))
     found, said = least_altitude(options, rules, weather)
     assert found == altitude and source in said
     own = replace(options, least_altitude_deg=5.0)
@@ -184,7 +228,7 @@ def test_a_building_without_windows_is_said(options):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--standard", "en17073"], "no rule 'en17073'; there are breeam-hea01, en17037"),
+        (["--standard", "en17073"], "no rule 'en17073'; there are breeam-hea01, din4108-2"),
         (["--standard", "en17037", "--day", "03-22"], "expected a day from 02-01 to 03-21"),
         (["--standard", "en17037", "--day", "02-30"], "expected a day from 02-01 to 03-21"),
         (["--standard", "en17037", "--day", "noon"], "expected a day from 02-01 to 03-21"),
@@ -201,7 +245,7 @@ def test_wrong_choices_are_named_first(words, said, tmp_path):
 def test_files_are_read_by_their_options(tmp_path):
     path = tmp_path / "house.toml"
     path.write_text(RULE)
-    options = ComplyOptions(OFFICE, WEATHER, ("en17037", str(path)))
+    options = ComplyOptions(OFFICE, WEATHER, standards=("en17037", str(path)))
     found = read_files(options)
     assert list(found.rules) == ["en17037", "house"]
     assert found.given.light_only and isinstance(Path(str(path)), Path)

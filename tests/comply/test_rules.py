@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ from scenes.comply.assess import (
     assess_room,
     values_of,
 )
-from scenes.comply.findings import Findings, GridLight, calendar_of
+from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
 from scenes.comply.sunlight import SunExposure
 from scenes.comply.uses import RoomUse
@@ -64,30 +66,21 @@ def test_each_rule_is_whole(name):
             assert level.over != "area mean" or len(level.needs) == 1
 
 
-def test_provision_is_that_of_the_library(calendar):
-    """Method 2 of the rule file and `daylight_provision` find one level, for many rooms."""
-    random = np.random.default_rng(1)
-    found = set()
-    for scale in np.geomspace(100, 3000, 24):
-        lux = random.gamma(2.0, scale / 2, (8760, 1)) * random.uniform(0.2, 1.8, (1, 20))
-        wanted = en17037.daylight_provision(lux.astype(np.float32), calendar.daylight)
-        level = reached("en17037", Findings(calendar, light(lux)))["provision"]
-        found.add(level)
-        assert level == {0: NOT_MET}.get(wanted.level, wanted.level.name.lower())
-    assert found == {NOT_MET, "minimum", "medium", "high"}
-
-
-def test_daylight_factor_is_that_of_the_library(calendar):
-    """Method 1 with the file's median diffuse illuminance."""
-    found = set()
-    for scale in np.geomspace(0.005, 0.2, 30):
-        factor = scale * np.linspace(0.3, 1.7, 20)
-        wanted = en17037.daylight_factor_level(factor, calendar.median_diffuse)
-        findings = Findings(calendar, light(np.zeros((8760, 20)), factor=factor))
-        level = reached("en17037", findings)["daylight_factor"]
-        found.add(level)
-        assert level == {0: NOT_MET}.get(wanted, wanted.name.lower())
-    assert len(found) == 4
+def test_daylight_factors_are_those_of_table_a3(calendar):
+    """London, 14,100 lx: 2.1, 3.5, 5.3 % and 0.7, 2.1, 3.5 %, as printed; half of it is enough."""
+    london = replace(calendar, median_diffuse=14_100.0)
+    printed = {"minimum": (2.1, 0.7), "medium": (3.5, 2.1), "high": (5.3, 3.5)}
+    rule = next(c for c in read_rule("en17037").criterion if c.key == "daylight_factor")
+    for level in rule.level:
+        limits = [100 * need.at_least / 14_100 for need in level.needs]
+        assert tuple(round(v, 1) for v in limits) == printed[level.name]
+    for name, (target, least) in printed.items():
+        factor = np.array([target] * 10 + [least] * 9 + [0.0]) / 100
+        findings = Findings(london, light(np.zeros((8760, 20)), factor=factor + 0.0005))
+        assert reached("en17037", findings)["daylight_factor"] == name
+        factor[9] = least / 100  # 45 % of the area alone has the target
+        findings = Findings(london, light(np.zeros((8760, 20)), factor=factor + 0.0005))
+        assert reached("en17037", findings)["daylight_factor"] != name
 
 
 def test_rooflights_have_a_table_of_their_own(calendar):
@@ -129,7 +122,9 @@ def test_levels_of_glare(calendar, share, value, level):
     base = {"minimum": 0.45, "medium": 0.40, "high": 0.35}.get(level, 0.2)
     dgp = np.full(1000, base)
     dgp[: int(1000 * share)] = value
-    assert reached("en17037", Findings(calendar, dgp=dgp))["glare"] == level
+    calm = np.full(len(dgp), 0.1)
+    seats = SeatGlare(np.zeros((2, 3)), np.zeros((2, 3)), np.stack([calm, dgp]), True)
+    assert reached("en17037", Findings(calendar, glare=seats))["glare"] == level  # the worse seat
 
 
 def test_what_was_not_computed_is_no_failure(calendar):

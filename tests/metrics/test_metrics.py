@@ -8,7 +8,6 @@ import pytest
 
 from mitsuba_cfs.metrics import autonomy, en17037, lm83, schedules
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
-from mitsuba_cfs.metrics.en17037 import Level
 from mitsuba_cfs.metrics.room import room_metrics
 from mitsuba_cfs.sky.weather import Weather
 
@@ -146,12 +145,30 @@ def test_annual_sunlight_exposure_needs_more_than_250_hours():
 
 
 def test_blinds_close_on_more_than_two_percent():
-    direct = np.zeros((3, 100))
-    direct[1, :2], direct[2, :3] = 1000.0, 1000.0
-    np.testing.assert_array_equal(lm83.blinds_closed(direct), [False, False, True])
+    direct = np.zeros((1, 3, 100))
+    direct[0, 1, :2], direct[0, 2, :3] = 1000.0, 1000.0
+    np.testing.assert_array_equal(lm83.blinds_operated(direct), [[False, False, True]])
     weights = np.ones(100)
     weights[0] = 3.0
-    np.testing.assert_array_equal(lm83.blinds_closed(direct, areas=weights), [False, True, True])
+    found = lm83.blinds_operated(direct, areas=weights)
+    np.testing.assert_array_equal(found, [[False, True, True]])
+
+
+def test_blinds_close_no_further_than_two_percent_ask():
+    """What counts is the sun of all open groups; the combination with most of it left is taken."""
+    direct = np.zeros((3, 6, 100))
+    direct[0, 0, :2], direct[1, 0, 2:4] = 1000.0, 1000.0  # 2 and 2: one of them closes, the last
+    direct[0, 1, :1], direct[1, 1, 2:4] = 1000.0, 1000.0  # 1 and 2: the first closes, 2 are left
+    direct[0, 2, :5], direct[1, 2, 5:7] = 1000.0, 1000.0  # 5 and 2: the second may stay open
+    direct[0, 3, :5], direct[1, 3, 5:9] = 1000.0, 1000.0  # 5 and 4: neither may
+    direct[:, 4, :3] = 400.0  # three groups make 1200 lx together: any two make none
+    direct[2, 5, :1] = 5000.0  # 1 %
+    wanted = [
+        [False, True, True, True, False, False],
+        [True, False, False, True, False, False],
+        [False, False, False, False, True, False],
+    ]
+    np.testing.assert_array_equal(lm83.blinds_operated(direct), wanted)
 
 
 def test_each_group_has_its_own_blinds():
@@ -164,39 +181,27 @@ def test_each_group_has_its_own_blinds():
 # --- EN 17037 ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("lower", "upper", "level"),
-    [
-        (99, 9000, Level.NONE),
-        (100, 299, Level.NONE),
-        (100, 300, Level.MINIMUM),
-        (299, 9000, Level.MINIMUM),
-        (300, 500, Level.MEDIUM),
-        (499, 9000, Level.MEDIUM),
-        (500, 749, Level.MEDIUM),
-        (500, 750, Level.HIGH),
-    ],
-)
 @pytest.mark.parametrize("rule", en17037.RULES)
-def test_levels_of_table_a1(lower, upper, level, rule):
+def test_illuminances_that_decide_the_level(rule):
     """Half of twenty sensors bright, nine dim and one dark, in half of the hours."""
-    plane = np.array([upper] * 10 + [lower] * 9 + [0.0])
+    plane = np.array([700.0] * 10 + [120.0] * 9 + [0.0])
     values = np.where(np.arange(10)[:, None] < 5, plane, 0.0)
     found = en17037.daylight_provision(values, ALL, rule=rule)
-    assert found == en17037.DaylightProvision(level, upper, lower)
+    assert found == en17037.DaylightProvision(700.0, 120.0)
+    nothing = en17037.DaylightProvision(0.0, 0.0)
     short = np.where(np.arange(10)[:, None] < 4, plane, 0.0)  # two hours of five too few
-    assert en17037.daylight_provision(short, ALL, rule=rule).level == Level.NONE
+    assert en17037.daylight_provision(short, ALL, rule=rule) == nothing
     dark = np.append(plane[:-2], [0.0, 0.0])[None, :].repeat(10, axis=0)  # 90 % of the area
-    assert en17037.daylight_provision(dark, ALL, rule=rule).level == Level.NONE
+    assert en17037.daylight_provision(dark, ALL, rule=rule).minimum_illuminance == 0.0
 
 
-@pytest.mark.parametrize(("lux", "level"), [(299, 0), (300, 1), (500, 2), (750, 3)])
-def test_rooflights_have_one_target_on_95_percent(lux, level):
-    values = np.tile(np.array([lux] * 19 + [0.0]), (10, 1))
+def test_rooflights_have_their_target_on_95_percent():
+    values = np.tile(np.array([500.0] * 19 + [0.0]), (10, 1))
     found = en17037.daylight_provision(values, ALL, horizontal_openings=True)
-    assert found.level == level
-    less = np.tile(np.array([lux] * 18 + [0.0] * 2), (10, 1))
-    assert en17037.daylight_provision(less, ALL, horizontal_openings=True).level == 0
+    assert found.target_illuminance == 500.0
+    less = np.tile(np.array([500.0] * 18 + [0.0] * 2), (10, 1))
+    found = en17037.daylight_provision(less, ALL, horizontal_openings=True)
+    assert found.target_illuminance == 0.0
 
 
 def test_the_two_rules_differ_when_light_wanders():
@@ -205,19 +210,8 @@ def test_the_two_rules_differ_when_light_wanders():
     values = np.stack([np.where(morning, 400.0, 50.0), np.where(morning, 50.0, 400.0)], axis=1)
     hourly = en17037.daylight_provision(values, ALL)
     sensor = en17037.daylight_provision(values, ALL, rule="sensor")
-    assert (hourly.level, sensor.level) == (Level.NONE, Level.MINIMUM)
+    assert (hourly.target_illuminance, sensor.target_illuminance) == (400, 400)
     assert (hourly.minimum_illuminance, sensor.minimum_illuminance) == (50, 400)
-
-
-def test_daylight_factor_targets_are_those_of_table_a3():
-    """London, 14,100 lx: 2.1, 3.5, 5.3 % and 0.7, 2.1, 3.5 %, as printed."""
-    targets = en17037.daylight_factor_targets(14_100)
-    printed = [(round(100 * a, 1), round(100 * b, 1)) for a, b in targets.values()]
-    assert printed == [(2.1, 0.7), (3.5, 2.1), (5.3, 3.5)]
-    factors = daylight_factor(np.array([600.0] * 10 + [200.0] * 9 + [0.0]), 10_000.0)
-    assert en17037.daylight_factor_level(factors, 14_100) == Level.MINIMUM
-    assert en17037.daylight_factor_level(factors / 3, 14_100) == Level.NONE
-    assert en17037.daylight_factor_level(factors, 14_100, horizontal_openings=True) == Level.NONE
 
 
 def test_reached_on_area_and_in_time():
@@ -249,11 +243,10 @@ def test_room_metrics_use_each_standards_schedule():
     assert found.sunlit_hours[0] == 3650
     half = schedules.daylight_hours(weather)
     assert found.mean_illuminance[0] == pytest.approx(500 * (ten & half).sum() / 4380)
-    assert found.daylight_provision.level == Level.NONE
     assert found.daylight_provision.target_illuminance == 500
     table, room = found.by_sensor(), found.of_room()
     assert list(table["daylight_autonomy"]) == [1, 1, 0] and table.index.name == "sensor"
-    assert room["en17037_level"] == "none" and room["udi_300_3000"] == pytest.approx(2 / 3)
+    assert room["en17037_target_lx"] == 500 and room["udi_300_3000"] == pytest.approx(2 / 3)
     assert room_metrics(light, weather).annual_sunlight_exposure is None
     # 2005's limits: 100 and 2000 lx are useful, 2500 is not, though it is by those of 2012
     bounds = np.where(ten[:, None], [100.0, 2000.0, 2500.0, 99.0], 0.0)
@@ -270,7 +263,7 @@ def test_room_level_counts_the_daylight_hours():
     lit[np.flatnonzero(schedules.lm83_hours(weather) & ~lit)[:175]] = True
     found = room_metrics(np.where(lit[:, None], 800.0, 0.0), weather)
     assert lit.sum() == 2000 and found.spatial_daylight_autonomy == 1
-    assert found.daylight_provision == en17037.DaylightProvision(Level.NONE, 0.0, 0.0)
+    assert found.daylight_provision == en17037.DaylightProvision(0.0, 0.0)
 
 
 @pytest.mark.parametrize(

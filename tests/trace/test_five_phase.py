@@ -357,3 +357,14 @@ def test_windows_reflect_the_light_of_the_room_as_paths_have_it(kind):
     gain = found[0.4] / found[0.0] - 1
     print("gain by reflection", gain.ravel())
     assert gain[1] > 0.1  # far above the tolerance: black windows would not pass
+
+
+@pytest.mark.parametrize("lit", [1.0, 0.02])
+def test_product_with_the_sun_alone_is_that_with_any_sky(lit):
+    random = np.random.default_rng(1)
+    matrix = random.random((2, 7, 40)).astype(np.float32)
+    sky = (random.random((40, 50)) * (random.random((40, 50)) < lit)).astype(np.float32)
+    sky[3, 10] = 1.0
+    found = phases.times_sky(matrix, sky)
+    assert found.dtype == np.float32 and found.flags.c_contiguous
+    np.testing.assert_allclose(found, np.matmul(matrix, sky), rtol=1e-5, atol=1e-6)

@@ -1,0 +1,61 @@
+"""What rules ask of the heat of a room: degree hours, hours in an adaptive band."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from scenes.comply.findings import Findings
+from scenes.comply.need import Need
+from thermal.comfort import adaptive_comfort, running_mean_en16798
+
+
+class DegreeHours(Need):
+    """Kelvin times hours in which the operative temperature is above a limit."""
+
+    what: Literal["degree_hours"]
+    above_c: float
+    all_hours: bool = False  # of the day, as in dwellings; else those of use
+
+    parts: ClassVar[frozenset[str]] = frozenset({"heat"})
+    unit: ClassVar[str] = "K h"
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        when = "of the year" if self.all_hours else "of use"
+        return f"degree hours above {self.above_c:g} °C in the hours {when}"
+
+    def value(self, room: Findings) -> float | None:
+        """Degree hours [K h]."""
+        if room.heat is None:
+            return None
+        above = np.maximum(room.heat.operative_c - self.above_c, 0.0)
+        counted = above if self.all_hours else above[room.heat.occupied]
+        return float(room.step_h * counted.sum())
+
+
+class ComfortShare(Need):
+    """Share of the hours of use in which the operative temperature is in an adaptive band."""
+
+    what: Literal["comfort"]
+    band: Literal["EN 16798-1 I", "EN 16798-1 II", "EN 16798-1 III"]
+
+    parts: ClassVar[frozenset[str]] = frozenset({"heat"})
+    unit: ClassVar[str] = "%"
+    digits: ClassVar[int] = 1
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return f"share of the hours of use in the adaptive band {self.band}, where it applies"
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1, of the hours whose running mean outdoors is in the band's range."""
+        if room.heat is None:
+            return None
+        mean = running_mean_en16798(room.heat.outdoor_c)
+        found = adaptive_comfort(room.heat.operative_c, mean, self.band)
+        counted = room.heat.occupied & found.applicable
+        return float(np.mean(found.comfortable[counted])) if counted.any() else None

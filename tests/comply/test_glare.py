@@ -1,0 +1,66 @@
+"""Glare at the seats of a room: the one seat is that of a run, blinds and places change it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.metrics.schedules import working_hours
+from mitsuba_cfs.sky.epw import read_epw
+from scenes.comply.blinds import open_and_closed
+from scenes.comply.glare import seat_glare
+from scenes.demo import WEATHER
+from scenes.fenestration.systems import FenestrationSystem
+from scenes.room.options import RoomOptions
+from scenes.room.room import RoomSimulation, skies_for
+from scenes.room_views import eyes_of
+
+EVERY = 211  # hour with the sun up
+
+
+def test_eyes_all_over_a_room():
+    """Four metres by six, 0.5 m off the walls: eyes 1 m apart, each in four directions."""
+    space = shoebox(4.0, 6.0).spaces[0]
+    eyes = eyes_of(space, 1.0, 4, 1.2, 64)
+    positions = np.unique([each.view.position for each in eyes], axis=0)
+    assert len(eyes) == 4 * len(positions) and len(positions) == 15
+    np.testing.assert_allclose(positions[:, 2], 1.2)
+    first = np.array([each.view.direction for each in eyes[:4]])
+    np.testing.assert_allclose(first.sum(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(first[0], [0.0, -1.0, 0.0], atol=1e-12)  # to the window
+    assert len(eyes_of(space, None, 1, 1.2, 64)) == 1
+
+
+@pytest.mark.slow
+def test_seats_and_blinds(variant):
+    weather = read_epw(WEATHER)
+    building = shoebox(3.0, 4.0, windows=[WindowRectangle(0.5, 0.8, 2.0, 1.8)])
+    space = building.spaces[0]
+    klems = specular_klems(Glazing("clear", 0.7, 0.1, 0.1, 2), KLEMS_FULL)
+    clear = FenestrationSystem("clear", klems, klems, source="made")
+    systems = open_and_closed({w.guid: (clear,) for w in space.windows}, None)
+    options = RoomOptions.of(
+        sky_subdivision=1, sensor_samples=256, patch_samples=128, sun_points=16, picture_size=48,
+        picture_samples=4, sensor_spacing=1.5,
+    )  # fmt: skip
+    skies = skies_for(weather, "five-phase", options.sampling)
+    skies = skies.part(np.arange(0, len(skies.lit), EVERY))
+    room = RoomSimulation(building, space, systems, weather, options, skies=skies)
+    chosen = {"directions": 1, "eye_height": 1.2}
+    one = seat_glare(room, None, grid=None, **chosen)
+    used = working_hours(weather, *options.occupancy.hours)
+    run = room.annual_glare()["dgp"].fillna(0.0).to_numpy()[used]
+    np.testing.assert_allclose(one.dgp[0], run, atol=1e-9)
+    assert not one.operated and one.exceeded(0.35) == np.mean(run > 0.35)
+    closed = np.ones((len(room.windows.groups), len(skies.lit)), dtype=np.int64)
+    dim = seat_glare(room, closed, grid=None, **chosen)
+    lit = one.dgp[0] > 0.3
+    assert lit.any() and (dim.dgp[0][lit] < one.dgp[0][lit]).all() and dim.operated
+    seats = seat_glare(room, None, grid=2.0, **chosen)
+    worst = seats.dgp.max(axis=1)
+    assert (
+        len(worst) > 1 and worst[np.argmin(seats.eyes[:, 1])] > worst[np.argmax(seats.eyes[:, 1])]
+    )
