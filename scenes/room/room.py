@@ -57,6 +57,7 @@ from scenes.room.humidity import felt_by, room_humidity
 from scenes.room.operation import Operation
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import ComfortTable, OperationTables
+from scenes.room.operation_year import operation_result
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.solar import RoomSun
@@ -394,23 +395,6 @@ class RoomSimulation:
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""
-        most = max(self.windows.systems, key=len)
-        hours = pd.DataFrame(
-            {
-                "shading_state": self.state,
-                "heating_w": balance.heating,
-                "cooling_w": balance.cooling,
-                "lighting_w": self.zone.lamps,
-            },
-            index=self.weather.midpoints,
-        ).rename_axis("time")
-        summary = {
-            "heating_kwh": balance.heating.sum() / 1e3,
-            "cooling_kwh": balance.cooling.sum() / 1e3,
-            "lighting_kwh": self.zone.lamps.sum() / 1e3,
-            "peak_heating_w": balance.heating.max(),
-            "peak_cooling_w": balance.cooling.max(),
-        }
-        names = tuple(system.name for system in most)
-        summary = {key: float(value) for key, value in summary.items()}
-        return OperationResult(names, hours, summary, self.operation.control.rule)
+        names = tuple(system.name for system in max(self.windows.systems, key=len))
+        rule = self.operation.control.rule
+        return operation_result(self.zone, balance, self.weather, names, rule)
