@@ -14,6 +14,7 @@ insulation of the first energy standards; each use is reported as a problem of t
 from __future__ import annotations
 
 from bim.model import Construction, MaterialLayer
+from mitsuba_cfs.gloss import pane
 
 ROOM_REFLECTANCE = {
     "floor": 0.2,
@@ -28,6 +29,7 @@ FACADE_REFLECTANCE = 0.3
 FURNITURE_REFLECTANCE = 0.5
 SITE_REFLECTANCE = 0.2  # EN 17037:2018, B.3: ground outdoors
 GLASS_REFLECTANCE = 0.15
+CLEAR_GLAZING = pane(transmissivity=0.985, panes=2)  # what that glazing mirrors, 0.15 straight on
 EMISSIVITY = 0.9
 FRAME_FRACTION = 0.3  # of the opening: EN ISO 10077-1:2017, annex (typical window, 30 % frame)
 LOWEST_REFLECTANCE, HIGHEST_REFLECTANCE = 0.02, 0.9  # black paint; fresh white paint

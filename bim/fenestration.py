@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.errors import DataError
 from thermal.closure import Closure
@@ -40,6 +41,7 @@ class ShadingState:
     closure: Closure | None = None  # of the thermal model
     shading_position: str | None = None  # "none", "external", "internal", "integrated"
     file: Path | None = None  # of the BSDF, where the model names it only
+    angular: AngularTable | None = None  # visible, of a specular system: exact at every angle
     of_type: str | None = None  # name of the window type that holds it; None: the window itself
 
     @property

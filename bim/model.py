@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.account import Account
+from bim.fenestration import ShadingState
+from bim.georeference import Georeference
 from bim.names import found_by_name, label_of
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import Gloss
@@ -131,6 +133,7 @@ class Window:
     type_name: str = ""
     solar_transmittance: float | None = None  # as the file states it
     panes: int | None = None  # of the glazing, as the file states it
+    states: tuple[ShadingState, ...] = ()  # of a file that is no IFC: what it holds of the window
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
     area: float = field(init=False)  # of the glass [m2]
 
@@ -232,6 +235,7 @@ class Building:
     elevation: float = 0.0  # above the sea [m]
     file: Path | None = None  # that it was read from
     account: Account | None = None  # what of the file came through; None where there is no file
+    georeference: Georeference | None = None  # where it lies on a map, as its file states it
 
     @property
     def windows(self) -> tuple[Window, ...]:

@@ -107,3 +107,13 @@ def folder_names(items: Sequence[Named]) -> list[str]:
         name if name and folded.count(name.casefold()) == 1 else f"{name}_{item.guid}"
         for name, item in zip(names, items, strict=True)
     ]
+
+
+def numbered(names: Iterable[str]) -> list[str]:
+    """Names with a number behind those that come again."""
+    seen: dict[str, int] = {}
+    result = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        result.append(name if seen[name] == 1 else f"{name} {seen[name]}")
+    return result

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
 from bim.model import Element, Problem, Space, Window
 from bim.planes import area_vectors, merged_polygons, plane_through
 from bim.rays import hemisphere, ray_mesh
@@ -18,6 +19,8 @@ AT_ONCE = 0.35  # what stops rays this near before the glass lies on the window 
 CUT_DEPTH = 0.6  # how far a wall before the glass is cut open [m]
 SITE_CLASSES = ("IfcSite", "IfcGeographicElement")
 RAYS = 36
+FACE = 0.99  # cosine to the biggest part of a pane from which another is of its faces
+BEFORE_GLASS = 0.5  # what is nearer to a window's plane is of its own facade [m]
 GRAZING = 0.3  # cosine: flatter rays meet the reveals of every window
 
 
@@ -33,7 +36,7 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
     """Elements with holes cut, or left out, where they lie on the glass of a window."""
     elements = list(elements)
     problems: list[Problem] = []
-    for _ in range(3):  # a second element may lie behind the first
+    for _ in range(3 if elements else 0):  # a second element may lie behind the first
         mesh = ray_mesh(np.concatenate([e.triangles for e in elements] or [np.empty((0, 3, 3))]))
         owner = np.repeat(np.arange(len(elements)), [len(e.triangles) for e in elements])
         covers: dict[int, list[Window]] = {}
@@ -54,6 +57,52 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
             problems.append(Problem(element.guid, what, done))
             elements[index : index + 1] = [] if opened is None else [opened]
     return Outdoors(tuple(elements), tuple(problems))
+
+
+def mirrors_in_view(
+    elements: Sequence[Element], windows: Sequence[Window]
+) -> tuple[list[Element], list[Problem]]:
+    """Elements of which the default's panes mirror where a window may see them, and what that is.
+
+    The rest, such as edges of panes and panes beside the window in its own facade, reflect as much
+    diffusely: no window sees them, and every plane that mirrors costs rays.
+    """
+    result: list[Element] = []
+    seen: list[Element] = []
+    for element in elements:
+        if element.gloss is not CLEAR_GLAZING:
+            result.append(element)
+            continue
+        mirrors = _faces_in_view(element.triangles, windows)
+        if mirrors.any():
+            seen.append(replace(element, triangles=element.triangles[mirrors]))
+            result.append(seen[-1])
+        if not mirrors.all():
+            plain = {
+                "reflectance_visible": GLASS_REFLECTANCE,
+                "reflectance_solar": GLASS_REFLECTANCE,
+            }
+            rest = element.triangles[~mirrors]
+            result.append(replace(element, triangles=rest, gloss=None, **plain))
+    if not seen:
+        return result, []
+    what = f"{len(seen)} panes outdoors before a window (first {seen[0].name}): no style says GLASS"
+    return result, [Problem(seen[0].guid, what, "mirror as clear double glazing, 15 % straight on")]
+
+
+def _faces_in_view(triangles: NDArray[np.float64], windows: Sequence[Window]) -> NDArray[np.bool_]:
+    """Triangles [T] of a pane's two faces that some window may see."""
+    vectors = area_vectors(triangles)
+    areas = np.linalg.norm(vectors, axis=1)
+    normals = vectors / np.maximum(areas, 1e-300)[:, None]
+    along = np.abs(normals @ normals[np.argmax(areas)]) > FACE
+    middles = triangles.mean(axis=1)
+    found = np.zeros(len(triangles), dtype=bool)
+    for window in windows:
+        before = ((triangles - window.centre) @ window.normal).max(axis=1) > BEFORE_GLASS
+        towards = np.einsum("ij,ij->i", window.centre - middles, normals) > 0
+        found |= along & before & towards
+    return found
 
 
 def _covering(window: Window, own: set[str], elements, mesh, owner) -> set[int]:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+import shapely.ops
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
 
 from bim.model import Space
 from bim.planes import SMALLEST_AREA
+from bim.shell import welded
 from mitsuba_cfs.errors import RoomError
 
 OFF_THE_VERTEX = 1.3e-5  # the cut is made this much higher, off sills at a round height [m]
-GRID = 1e-7  # coordinates of a cut are rounded to this [m]
+GRID = 1e-7  # shorter edges of a cut are left out [m]
+SAME = 1e-6  # ends of a cut's edges this near are one point [m]
 
 
 def horizontal_section(triangles: NDArray[np.float64], z: float) -> shapely.Geometry:
@@ -22,14 +27,32 @@ def horizontal_section(triangles: NDArray[np.float64], z: float) -> shapely.Geom
     edges = _cut_edges(triangles, z + OFF_THE_VERTEX)
     if not len(edges):
         return shapely.Polygon()
-    lines = shapely.set_precision(shapely.linestrings(edges), GRID)
-    cells = shapely.get_parts(shapely.polygonize([shapely.union_all(lines)]))
+    edges = _closed(edges)
+    cells = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.linestrings(edges))]))
     inside = [
         cell
         for cell in cells
         if cell.area > SMALLEST_AREA and abs(winding_number(_inner_point(cell), edges)) > 0.5
     ]
     return shapely.union_all(inside) if inside else shapely.Polygon()
+
+
+def _closed(edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directed edges [E, 2, 2] whose ends meet exactly, and edges over the gaps of the outline.
+
+    From each end that no edge goes on from, one leads to a start that none arrives at, all of them
+    together as short as can be: rooms whose drawing leaves slits have an outline too.
+    """
+    points = welded(edges.reshape(-1, 2), SAME)
+    ends = cKDTree(points).query(edges.reshape(-1, 2))[1].reshape(-1, 2)
+    ends = ends[ends[:, 0] != ends[:, 1]]
+    balance = np.bincount(ends[:, 1], minlength=len(points))
+    balance -= np.bincount(ends[:, 0], minlength=len(points))
+    last, first = (np.repeat(np.arange(len(points)), np.maximum(s * balance, 0)) for s in (1, -1))
+    apart = np.linalg.norm(points[last][:, None] - points[first], axis=-1)
+    chosen, to = linear_sum_assignment(apart)
+    gaps = np.column_stack([last[chosen], first[to]])
+    return points[np.concatenate([ends, gaps])]
 
 
 def winding_number(point: NDArray[np.float64], edges: NDArray[np.float64]) -> float:
@@ -160,9 +183,10 @@ def _along_longest_edge(
 def view_point(
     space: Space, eye_height: float = 1.2
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position [3] [m] in the middle of the room, horizontal direction [3] to its biggest window.
+    """Position [3] [m] in the middle of the room or nearest to it, horizontal direction [3].
 
-    Without a window the view is along the room's longest edge; 1.2 m is a seated eye (EN 17037).
+    It is that to the biggest window, without one along the room's longest edge; 1.2 m is a
+    seated eye (EN 17037).
 
     Raises: `RoomError` for a room that is lower.
     """
@@ -172,7 +196,8 @@ def view_point(
     section = section if free.is_empty else free
     middle = section.centroid
     if not section.buffer(-0.05).contains(middle):
-        middle = shapely.point_on_surface(section.buffer(-0.05) or section)
+        inner = section.buffer(-0.06)
+        middle = shapely.ops.nearest_points(section if inner.is_empty else inner, middle)[0]
     position = np.array([middle.x, middle.y, z])
     direction = np.array([0.0, 0.0, 0.0])
     if space.windows:

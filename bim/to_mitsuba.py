@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from bim.gloss_materials import mitsuba_bsdf
 from bim.model import Building, Space, Window
 from bim.sensors import view_point
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
@@ -18,6 +19,7 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.files import replacing, write_bytes
+from mitsuba_cfs.gloss import Gloss
 
 FIELD_OF_VIEW_DEG = 90.0
 PIXELS, SAMPLES, DEPTH = 512, 256, 8
@@ -34,9 +36,9 @@ def write_mitsuba(
 ) -> Path:
     """Write `scene.xml` and its meshes into a folder; the path of the XML.
 
-    The room's faces by kind and reflectance, its windows (shape `glass_*`) with their BSDF or,
-    where none is known, as plain panes, what stands outdoors, a sky of radiance 1 all round, and a
-    camera in the middle of the room that looks at its biggest window.
+    The room's faces by kind, reflectance and gloss, its windows (shape `glass_*`) with their BSDF
+    or, where none is known, as plain panes, what stands outdoors, a sky of radiance 1 all round,
+    and a camera in the middle of the room that looks at its biggest window.
 
     Args:
         band: reflectances of "visible" or "solar".
@@ -47,28 +49,25 @@ def write_mitsuba(
     (folder / "meshes").mkdir(parents=True, exist_ok=True)
     own = {window.guid for window in space.windows}
     outdoors = [element for element in building.elements if element.guid not in own]
-    parts: dict[tuple[str, float], list[NDArray[np.float64]]] = {}
-    for face in space.faces:
-        key = f"room_{face.kind.replace(' ', '_')}", round(face.reflectance(band), 4)
-        parts.setdefault(key, []).append(face.triangles[:, ::-1])  # normals into the room
-    for piece in space.furniture:
-        key = "furniture", round(piece.reflectance(band), 4)
-        parts.setdefault(key, []).append(piece.triangles)
-    for element in outdoors:
-        key = "outdoors", round(element.reflectance(band), 4)
-        parts.setdefault(key, []).append(element.triangles)
+    kinds: dict[tuple[str, float, Gloss | None], list[NDArray[np.float64]]] = {}
+    pieces = [
+        *((f"room_{f.kind.replace(' ', '_')}", f, f.triangles[:, ::-1]) for f in space.faces),
+        *(("furniture", piece, piece.triangles) for piece in space.furniture),
+        *(("outdoors", element, element.triangles) for element in outdoors),
+    ]  # the room's normals point into it
+    for name, part, triangles in pieces:
+        kind = name, round(part.reflectance(band), 4), part.gloss
+        kinds.setdefault(kind, []).append(triangles)
     scene = ElementTree.Element("scene", version="3.0.0")
     _camera(scene, space)
     ElementTree.SubElement(scene, "emitter", type="constant", id="sky").append(
         ElementTree.Element("spectrum", name="radiance", value="1")
     )
-    for (name, reflectance), triangles in parts.items():
-        label = f"{name}_{reflectance:.4f}"
+    for number, ((name, reflectance, gloss), triangles) in enumerate(kinds.items()):
+        label = f"{name}_{reflectance:.4f}" + ("" if gloss is None else f"_gloss_{number}")
         shape = _mesh(scene, folder, label, triangles)
         both = ElementTree.SubElement(shape, "bsdf", type="twosided")
-        diffuse = ElementTree.SubElement(both, "bsdf", type="diffuse")
-        value = f"{reflectance:.6g}"
-        ElementTree.SubElement(diffuse, "spectrum", name="reflectance", value=value)
+        both.append(mitsuba_bsdf(reflectance, gloss))
     for number, window in enumerate(space.windows):
         shape = _mesh(scene, folder, f"glass_{number}", [window.triangles])
         known = (bsdfs or {}).get(window.guid)

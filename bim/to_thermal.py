@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from bim.model import Construction, Face, Space, centroid
 from thermal.blackbox import Fenestration
-from thermal.zone import Gains, IdealLoads, Layer, OpaqueSurface, WindowElement, Zone
+from thermal.emitters import IdealLoads
+from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone
 
 # what lies beyond a face, in the words of `thermal`: a neighbour is taken to be as warm as the room
 OUTSIDE = {
@@ -106,7 +107,7 @@ def coupled_rooms(
         for i, guid in enumerate(room.neighbours):
             b = index.get(guid, -1) if guid else -1
             one = surfaces[a][i]
-            if b < 0 or one.partner:
+            if b < 0 or one.partner or one.outside == "known":
                 continue
             j = _other_side(one, spaces[a].guid, surfaces[b], rooms[b].neighbours)
             if j < 0:
@@ -183,7 +184,8 @@ def _other_side(
     """The surface of the room behind that is the other face, nearest in area; -1 for none."""
     best, gap = -1, SAME_AREA * one.area
     for j, (other, guid) in enumerate(zip(others, neighbours, strict=True)):
-        fits = guid == room and not other.partner and one.normal @ other.normal < OPPOSITE
+        free = not other.partner and other.outside != "known"
+        fits = guid == room and free and one.normal @ other.normal < OPPOSITE
         if fits and abs(other.area - one.area) <= gap:
             best, gap = j, abs(other.area - one.area)
     return best

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from bim.model import Building, Element, Face, Space, Window
+from bim.names import numbered
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 
@@ -65,7 +66,7 @@ def window_groups(space: Space) -> list[WindowGroup]:
         else:
             groups.append([window])
     groups.sort(key=lambda group: -round(sum(window.area for window in group), 6))
-    names = _unique([orientation_name(group[0]) for group in groups])
+    names = numbered([orientation_name(group[0]) for group in groups])
     return [
         WindowGroup(name, tuple(WindowSurface(w.name, w.triangles) for w in group))
         for name, group in zip(names, groups, strict=True)
@@ -78,13 +79,3 @@ def orientation_name(window: Window) -> str:
         return "roof"
     azimuth = np.degrees(np.arctan2(window.normal[0], window.normal[1]))
     return COMPASS[int(np.round(azimuth / 45)) % 8]
-
-
-def _unique(names: list[str]) -> list[str]:
-    """Names with a number behind those that come again."""
-    seen: dict[str, int] = {}
-    result = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        result.append(name if seen[name] == 1 else f"{name} {seen[name]}")
-    return result

@@ -62,12 +62,17 @@ def dielectric(index: float, roughness: float = 0.0) -> Gloss:
     return Gloss(_values(_fresnel(_cosines(), index).mean(axis=0)), roughness)
 
 
-def pane(index: float = 1.52, transmissivity: float = 0.9) -> Gloss:
-    """A pane of glass before something dark, both faces and all between: Radiance's `glass`.
+def pane(index: float = 1.52, transmissivity: float = 0.9, panes: int = 1) -> Gloss:
+    """Glass before something dark, all faces and all between; one pane is Radiance's `glass`.
 
-    Args: transmissivity: of the glass without its faces at normal incidence.
+    Args: transmissivity: of a pane without its faces at normal incidence; panes: that are alike,
+        one behind the other.
     """
-    return Gloss(_values(pane_shares(_cosines(), index, transmissivity)[1]))
+    tau, rho = polarised_shares(_cosines(), index, transmissivity)
+    whole = rho
+    for _ in range(panes - 1):
+        whole = rho + tau**2 * whole / np.maximum(1 - rho * whole, 1e-12)
+    return Gloss(_values(whole.mean(axis=0)))
 
 
 def lacquer(specular: float, roughness: float = 0.0) -> Gloss:

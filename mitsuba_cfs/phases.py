@@ -6,6 +6,19 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+DARK = 0.05  # share of a sky matrix's entries that are lit, below which only these are multiplied
+
+
+def times_sky(matrix: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
+    """A matrix [..., P] times a sky [P, H]; of the sun alone few patches are lit in an hour."""
+    matrix, sky = np.asarray(matrix), np.asarray(sky)
+    if not sky.size or np.count_nonzero(sky) > DARK * sky.size:
+        return np.matmul(matrix, sky)
+    rows = np.ascontiguousarray(matrix.reshape(-1, len(sky)).T)
+    found = sparse.csr_array(sky.T) @ rows
+    return np.ascontiguousarray(found.T).reshape(*matrix.shape[:-1], sky.shape[1])
 
 
 def window_radiance(daylight: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
@@ -15,7 +28,7 @@ def window_radiance(daylight: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
         daylight: daylight matrices D [G, K, P].
         sky: sky matrix s [P, H], luminance [cd/m2] or radiance [W/m2/sr].
     """
-    return np.matmul(np.asarray(daylight), np.asarray(sky))
+    return times_sky(daylight, sky)
 
 
 def room_side_radiance(
@@ -31,7 +44,7 @@ def room_side_radiance(
     if len(transmission) != len(daylight):
         raise ValueError(f"{len(transmission)} transmission matrices for {len(daylight)} groups")
     through = np.stack([np.asarray(t) @ d for t, d in zip(transmission, daylight, strict=True)])
-    return np.matmul(through, np.asarray(sky))
+    return times_sky(through, sky)
 
 
 def three_phase(
@@ -55,29 +68,26 @@ def three_phase(
 
 
 def sun_beams(
-    transmission: Sequence[ArrayLike],
-    through: ArrayLike,
+    beams: Sequence[ArrayLike],
     through_sun: ArrayLike,
     direct_daylight: ArrayLike,
     sun: ArrayLike,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The sun's straight beam on window patches, two ways [G, K, H].
 
-        diag(tau) D_d s_d        as T D s has it, with one transmittance in a whole patch
+        T_b D_d s_d              as T D s has it, with one transmittance in a whole patch
         diag(tau(sun)) D_d s_d   at the sun's own angle, as C_ds has it
 
     V T D s + (V - V_d) times the difference gives the beam that the room reflects its own angle
     too.  It takes away no more than V T D s - V_d T D_d s_d holds.
 
     Args:
-        transmission: for each group its T [K, K].
-        through: [G, K] tau, what of T's diagonal goes straight on,
-            `mitsuba_cfs.trace.direct_sun.patch_beams`.
+        beams: for each group what of its T goes straight on, T_b [K, K],
+            `mitsuba_cfs.bsdf.klems_peak.held_beams`.
         through_sun: [G, H] tau(sun), `mitsuba_cfs.trace.direct_sun.through_beams`.
         direct_daylight: D_d [G, K, P].
         sun: s_d [P, H], the sun alone on the sky's patches.
     """
-    window = np.matmul(np.asarray(direct_daylight), np.asarray(sun))
-    diagonal = np.stack([np.diag(np.asarray(T)) for T in transmission])
-    patches = np.minimum(np.asarray(through), diagonal)
-    return window * patches[:, :, None], window * np.asarray(through_sun)[:, None]
+    window = times_sky(direct_daylight, sun)
+    by_patch = np.stack([np.asarray(T) @ lit for T, lit in zip(beams, window, strict=True)])
+    return by_patch, window * np.asarray(through_sun)[:, None]

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.head import check_head
+from bim.building_file import check_building_file
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import Given, given_light
@@ -34,8 +33,7 @@ def read_files(options: PictureOptions) -> PictureFiles:
 
     Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
     """
-    check_head(options.building)
-    corrections_beside(options.building)
+    check_building_file(options.building)
     check_names(() if options.space is None else (options.space,))
     view = None if options.view is None else given_view(options.view)
     weather = read_weather(options.weather)

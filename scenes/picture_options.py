@@ -19,6 +19,7 @@ class PictureOptions:
     space: str | None = None  # name or GUID; None: the first room that has a window
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     furniture: bool = False  # whether what stands in the room is in its light and views
+    apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows; none: all of glass
     view: str | None = None  # Radiance view options, or a file of them
     eye_height: float = 1.2  # [m] above the floor, where no view is given
     size: int = 800  # [px] of the longer side

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bim.model import Building, Problem, Space
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
+from mitsuba_cfs.picture_year.year import PictureYear
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +110,21 @@ class OperationResult:
 
 
 @dataclass(frozen=True, slots=True)
+class ExploredRoom:
+    """A room in every hour and every shading state, for the explorer."""
+
+    states: tuple[str, ...]  # [J] names, from open to closed
+    operated: NDArray[np.int64]  # [H] state of each hour of the year
+    lit: NDArray[np.int64]  # [L] hours of the year with the sun up
+    pictures: tuple[PictureYear, ...]  # [J]
+    illuminance: tuple[NDArray[np.float32], ...]  # [J] of the sensors [S, L] [lx]
+    eye: NDArray[np.float32]  # [J, L] vertical illuminance [lx]
+    through: NDArray[np.float32]  # [J, G, L] transmittance of each window group's straight beam
+    sun_illuminance: NDArray[np.float32]  # [L] normal to the beam [lx]
+    windows: tuple[NDArray[np.float64], ...]  # [G] triangles [T, 3, 3] of each group [m]
+
+
+@dataclass(frozen=True, slots=True)
 class RoomYear:
     """The year of one room: its daylight, glare, heat and operation."""
 
@@ -121,6 +137,7 @@ class RoomYear:
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours asked for
     problems: tuple[Problem, ...] = ()  # that tracing found
+    explored: ExploredRoom | None = None  # where the explorer was asked for
     template: str = ""  # name of the equal room that was computed; "": this one
 
     @property

@@ -59,6 +59,7 @@ def room_picture(
     viewed = read_viewed_room(
         options.building, options.space, options.join, files.given, view_of, steps,
         furniture=options.furniture,
+        apertures=options.apertures,
     )  # fmt: skip
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)

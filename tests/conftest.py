@@ -9,7 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_cfs import llvm
+from tests.workers import (
+    pytest_collection_finish as pytest_collection_finish,
+)  # first: it sets what NumPy reads; a hook
+
+from mitsuba_cfs import llvm  # isort: skip
 from tests.left_out import pytest_terminal_summary as pytest_terminal_summary  # a hook
 
 llvm.select_library()

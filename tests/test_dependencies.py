@@ -6,6 +6,7 @@ import ast
 import re
 import tomllib
 from collections.abc import Iterable
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -28,6 +29,7 @@ def _name(requirement: str) -> str:
     return re.match(r"[\w.-]+", requirement)[0].lower().replace("_", "-")
 
 
+@cache
 def _modules() -> dict[str, set[str]]:
     """Top-level modules of each installed distribution."""
     found: dict[str, set[str]] = {}
@@ -43,21 +45,25 @@ def _modules() -> dict[str, set[str]]:
 
 def _used(folders: Iterable[str]) -> set[str]:
     """Modules imported or looked for, and with a dot all attributes, in all Python files."""
+    return set().union(*map(_used_in, folders))
+
+
+@cache
+def _used_in(folder: str) -> set[str]:
     used: set[str] = set()
-    for folder in folders:
-        for path in (REPOSITORY / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.Import):
-                    used |= {alias.name.partition(".")[0] for alias in node.names}
-                elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                    used.add(node.module.partition(".")[0])
-                elif isinstance(node, ast.Attribute):
-                    used.add(f".{node.attr}")
-                elif isinstance(node, ast.Call):
-                    called = ast.unparse(node.func).rpartition(".")[2]
-                    looked_for = called in {"find_spec", "importorskip"} and node.args
-                    if looked_for and isinstance(node.args[0], ast.Constant):
-                        used.add(str(node.args[0].value).partition(".")[0])
+    for path in (REPOSITORY / folder).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                used |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                used.add(node.module.partition(".")[0])
+            elif isinstance(node, ast.Attribute):
+                used.add(f".{node.attr}")
+            elif isinstance(node, ast.Call):
+                called = ast.unparse(node.func).rpartition(".")[2]
+                looked_for = called in {"find_spec", "importorskip"} and node.args
+                if looked_for and isinstance(node.args[0], ast.Constant):
+                    used.add(str(node.args[0].value).partition(".")[0])
     return used
 
 

@@ -21,7 +21,7 @@ RANKS = {
         {"compiled", "files", "surfaces", "variants"},
         {"bsdf", "images", "sky", "window_parts"},
         {"glare", "matrices", "metrics"},
-        {"trace"},
+        {"picture_year", "trace"},
         {"methods"},
     ),
     "scenes": (
@@ -32,6 +32,7 @@ RANKS = {
         {"fenestration", "cost", "report", "plots", "photovoltaics"},
         {"room"},
         {"run", "fenestration_exports"},
+        {"explore"},
         {"comply", "heat", "calibration", "picture_files", "simulation", "year_of_glare"},
         {"study", "view_picture"},
         {"study_report"},

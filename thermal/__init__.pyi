@@ -42,11 +42,30 @@ from .glazing_unit import (
     GlazingUnit as GlazingUnit,
     Openings as Openings,
 )
+from .ground import (
+    Footprint as Footprint,
+    GroundElement as GroundElement,
+    Soil as Soil,
+    basement as basement,
+    slab_on_ground as slab_on_ground,
+    suspended_floor as suspended_floor,
+)
 from .gvalue import ThermalData as ThermalData, thermal_data as thermal_data
 from .iso15099 import Iso15099Data as Iso15099Data, iso15099_data as iso15099_data
+from .emitters import HeatedSlab as HeatedSlab, IdealLoads as IdealLoads
+from .moisture import (
+    Humidity as Humidity,
+    MoistZone as MoistZone,
+    zone_humidity as zone_humidity,
+)
+from .ventilation import (
+    AirTransfer as AirTransfer,
+    Leakage as Leakage,
+    SupplyAir as SupplyAir,
+    WindowAiring as WindowAiring,
+)
 from .zone import (
     Gains as Gains,
-    IdealLoads as IdealLoads,
     Layer as Layer,
     OpaqueSurface as OpaqueSurface,
     WindowElement as WindowElement,

@@ -11,10 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from thermal import kernel, records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.conduction import CELL
+from thermal.drive import drive_of
 from thermal.errors import require
-from thermal.network import Network, framed, network
+from thermal.network import Network, network
+from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
 
+HOUR = 3600.0  # [s]
 AIR_GAS_CONSTANT = 287.055  # [J/(kg K)]
 
 
@@ -60,6 +63,10 @@ class ZoneResult:
     cooling: NDArray[np.float64]  # [H] ideal load [W], positive
     heat_flow: dict[str, NDArray[np.float64]]  # [H] into the zone, and "storage" (its increase)
     residual: NDArray[np.float64]  # [H] sum of the flows less the storage [W]
+    outdoor_air: NDArray[np.float64]  # [H] all of it [m3/s]
+    fan_air: NDArray[np.float64]  # [H] of it by fans [m3/s]
+    coil: NDArray[np.float64]  # [H] heat that brings supply air to its least temperature [W]
+    slab: NDArray[np.float64]  # [H] power of the heated (or cooled: negative) slab [W]
     warm_up_days: int
 
 
@@ -69,10 +76,12 @@ def simulate(
     solar: Solar,
     *,
     step_s: float = 600.0,
+    row_s: float = HOUR,
     options: BalanceOptions | None = None,
 ) -> ZoneResult:
     """The year of one zone; see `simulate_zones`."""
-    return simulate_zones([zone], climate, [solar], step_s=step_s, options=options)[0]
+    (found,) = simulate_zones([zone], climate, [solar], step_s=step_s, row_s=row_s, options=options)
+    return found
 
 
 def simulate_zones(
@@ -81,16 +90,20 @@ def simulate_zones(
     solar: Sequence[Solar],
     *,
     step_s: float = 600.0,
+    row_s: float = HOUR,
     options: BalanceOptions | None = None,
     air_links: ArrayLike | None = None,
+    transfers: Sequence[AirTransfer] = (),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[ZoneResult, ...]:
     """The years of zones that exchange heat through their partitions and openings.
 
     Args:
         zones, solar: one entry per zone, windows and surfaces in the zone's order.
-        step_s: a whole fraction of an hour [s]; backward Euler, so any length is stable.
+        step_s: a whole fraction of a row [s]; backward Euler: any length is stable.
+        row_s: length [s] of the climate's rows, which everywhere else are said to be hours.
         air_links: [Z, Z] air exchanged between zones through openings [m3/s], symmetric.
+        transfers: air that flows one way from zone to zone.
         progress: called with 0 and 1.
 
     Returns: one result per zone.
@@ -99,12 +112,15 @@ def simulate_zones(
     """
     options = BalanceOptions() if options is None else options
     require(len(zones) == len(solar) > 0, "solar", f"expected one entry for each of {len(zones)}")
-    steps = _steps_per_hour(step_s)
+    steps = _steps_per_row(step_s, row_s)
     if progress:
         progress(0.0)
     link = _links(air_links, len(zones))
-    net = network(zones, step_s=step_s, terrain=options.terrain, cell=options.cell, link=link)
-    drive, every = _drive(zones, climate.hours, solar, steps)
+    net = network(
+        zones, step_s=step_s, terrain=options.terrain, cell=options.cell,
+        link=link, transfers=transfers,
+    )  # fmt: skip
+    drive, every = drive_of(zones, climate, solar, steps, transfers)
     method = records.Method(
         steps=steps,
         step_s=float(step_s),
@@ -120,7 +136,8 @@ def simulate_zones(
     weather = _weather(climate, steps)
     state = _start(net, len(zones), options.start_c)
     work = _work(net, len(zones))
-    days = kernel.warm_up(net, state, work, weather, drive, method)
+    rows = min(round(24 * HOUR / row_s), climate.hours)
+    days = kernel.warm_up(net, state, work, weather, drive, method, rows=rows)
     means = kernel.hourly_means(climate.hours, state)
     kernel.advance(net, state, work, weather, drive, method, climate.hours, means)
     terms = means.terms / steps
@@ -136,10 +153,11 @@ def _choice(item: str, value: str, known: Sequence[str]) -> None:
     require(value in known, item, f"{value!r} is not of {', '.join(known)}")
 
 
-def _steps_per_hour(step_s: float) -> int:
-    steps = round(3600.0 / step_s) if step_s > 0 else 0
-    fits = steps >= 1 and abs(steps * step_s - 3600.0) < 1e-6
-    require(fits, "time step", f"{step_s} s is not a whole fraction of an hour")
+def _steps_per_row(step_s: float, row_s: float) -> int:
+    steps = round(row_s / step_s) if step_s > 0 else 0
+    fits = steps >= 1 and abs(steps * step_s - row_s) < 1e-6
+    whole = "an hour" if row_s == HOUR else f"{row_s:g} s"
+    require(fits, "time step", f"{step_s} s is not a whole fraction of {whole}")
     return steps
 
 
@@ -161,105 +179,12 @@ def _weather(climate: Climate, steps: int) -> records.OutdoorConditions:
     return records.OutdoorConditions(
         outdoor=outdoor,
         sky=to_steps(climate.sky_c, steps),
-        ground=to_steps(climate.ground_c, steps),
         speed=speed,
         windward=speed**0.89,
         leeward=speed**0.617,
         origin=np.stack([np.sin(direction), np.cos(direction)], axis=1),
         density=pressure / (AIR_GAS_CONSTANT * (outdoor + 273.15)),
     )
-
-
-def _drive(
-    zones: Sequence[Zone], hours: int, solar: Sequence[Solar], steps: int
-) -> tuple[records.Drive, int]:
-    rows = len(solar[0].inside)
-    fits = rows in (hours, hours * steps)
-    require(fits, "solar", f"expected {hours} or {hours * steps} rows, got {rows}")
-    inner, outer, states = [], [], []
-    for zone, sun in zip(zones, solar, strict=True):
-        zone_inner, zone_outer = _zone_sun(zone, sun, rows)
-        inner.append(zone_inner)
-        outer.append(zone_outer)
-        states.append(_states(zone, sun, hours))
-    drive = records.Drive(
-        inner=np.ascontiguousarray(np.concatenate(inner, axis=1)),
-        outer=np.ascontiguousarray(np.concatenate(outer, axis=1)),
-        state=np.ascontiguousarray(np.concatenate(states, axis=1)),
-        convective=_hourly([z.gains.convective for z in zones], hours, "convective gains"),
-        radiant=_hourly([z.gains.radiant for z in zones], hours, "radiant gains"),
-        airflow=_hourly(
-            [np.asarray(z.infiltration_ach) * z.volume / 3600.0 for z in zones],
-            hours,
-            "infiltration",
-        ),
-        heating_c=_set_points([z.loads.heating_c for z in zones], hours, steps),
-        cooling_c=_set_points([z.loads.cooling_c for z in zones], hours, steps),
-        limit=np.array([[z.loads.heating_limit, z.loads.cooling_limit] for z in zones]),
-    )
-    return drive, steps if rows == hours else 1
-
-
-def _zone_sun(zone: Zone, sun: Solar, rows: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sun at the inside [W] and the outside [W/m2] of the zone's faces [R, N]."""
-    walls, windows = len(zone.surfaces), len(zone.windows)
-    item = f"solar of zone {zone.name}"
-    for name, width in (
-        ("inside", walls),
-        ("facade", walls),
-        ("absorbed_outer", windows),
-        ("absorbed_inner", windows),
-    ):
-        got = getattr(sun, name).shape
-        require(got == (rows, width), item, f"{name}: expected {(rows, width)}, got {got}")
-    area = np.array([w.area for w in zone.windows])
-    glass_inside = sun.absorbed_inner
-    if sun.window_inside is not None:
-        glass_inside = glass_inside + np.asarray(sun.window_inside, dtype=float)
-    absorptance = np.array([s.absorptance_out for s in zone.surfaces])
-    outdoor = np.array([s.outside == "outdoor" for s in zone.surfaces])
-    frames = framed(zone)
-    at_frames = np.zeros((rows, len(frames)))
-    if frames and sun.window_facade is not None:
-        columns = [zone.windows.index(w) for w in frames]
-        at_frames = np.asarray(sun.window_facade)[:, columns]
-        at_frames = at_frames * np.array([w.frame_absorptance for w in frames])
-    inner = [sun.inside, glass_inside * area, np.zeros((rows, len(frames)))]
-    outer = [sun.facade * (absorptance * outdoor), sun.absorbed_outer, at_frames]
-    return np.concatenate(inner, axis=1), np.concatenate(outer, axis=1)
-
-
-def _states(zone: Zone, sun: Solar, hours: int) -> NDArray[np.int64]:
-    windows = len(zone.windows)
-    if sun.state is None:
-        return np.zeros((hours, windows), dtype=np.int64)
-    state = np.asarray(sun.state, dtype=np.int64)
-    item = f"shading state of zone {zone.name}"
-    require(state.shape == (hours, windows), item, f"expected {(hours, windows)}")
-    count = np.array([len(w.states) for w in zone.windows])
-    require(bool(np.all((state >= 0) & (state < count))), item, "a state that no window has")
-    return state
-
-
-def _hourly(values: Sequence[ArrayLike], hours: int, item: str) -> NDArray[np.float64]:
-    columns = []
-    for value in values:
-        array = np.asarray(value, dtype=float)
-        require(array.shape in ((), (hours,)), item, f"expected one value or {hours}")
-        require(not bool(np.any(np.isnan(array))), item, "missing values")
-        columns.append(np.broadcast_to(array, (hours,)))
-    return np.ascontiguousarray(np.stack(columns, axis=1))
-
-
-def _set_points(values: Sequence[ArrayLike], hours: int, steps: int) -> NDArray[np.float64]:
-    """Set points of every step [T, Z], from one value, hourly values, or values of every step."""
-    columns = []
-    for value in values:
-        array = np.asarray(value, dtype=float)
-        if array.shape == (hours,):
-            array = np.repeat(array, steps)
-        columns.append(array)
-    return _hourly(columns, hours * steps, "set point")
 
 
 def _start(net: Network, zones: int, start_c: float) -> records.State:
@@ -270,6 +195,7 @@ def _start(net: Network, zones: int, start_c: float) -> records.State:
         node=np.full(m, start_c),
         air=np.full(zones, start_c),
         load=np.zeros(zones),
+        opened=np.zeros(zones, dtype=np.bool_),
     )
 
 
@@ -283,6 +209,13 @@ def _work(net: Network, zones: int) -> records.Workspace:
         unknown=np.zeros(n + zones),
         air=np.zeros((zones, 2)),
         plant=np.zeros(zones, dtype=np.int64),
+        radiant=np.zeros(zones),
+        radiant_seen=np.tile([0.0, 0.0, 0.3], (zones, 1)),
+        flow=np.zeros(zones),
+        supply=np.zeros((zones, 3)),
+        carried=np.zeros(zones),
+        slab=np.zeros(zones),
+        source=np.zeros(m),
         still=np.zeros(m),
         film=np.zeros(n),
         outdoor=np.zeros((n, 5)),
@@ -329,5 +262,9 @@ def _result(
         cooling=np.maximum(-load, 0.0),
         heat_flow=flows,
         residual=terms[:, :-1].sum(axis=1) - terms[:, -1],
+        outdoor_air=means.air_flow[:, z, 0],
+        fan_air=means.air_flow[:, z, 1],
+        coil=means.power[:, z, 0],
+        slab=means.power[:, z, 1],
         warm_up_days=days,
     )

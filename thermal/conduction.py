@@ -31,6 +31,7 @@ class WallGrid:
 
     conductance: NDArray[np.float64]  # [N - 1] between neighbouring nodes [W/(m2 K)]
     capacity: NDArray[np.float64]  # [N] [J/(m2 K)]
+    width: NDArray[np.float64]  # [N - 1] between them [m]
 
     def inner_inverse(self, step_s: float) -> NDArray[np.float64]:
         """Inverse [N - 2, N - 2] of the inner nodes' matrix for a time step [s]."""
@@ -44,6 +45,7 @@ def wall_grid(layers: Sequence[Layer], *, cell: float = CELL) -> WallGrid:
     """The nodes of a wall whose layers go from outside to inside, cells at most `cell` [m] wide."""
     require(len(layers) > 0, "wall", "has no layers")
     conductance: list[float] = []
+    width: list[float] = []
     capacity: list[float] = [0.0]
     for layer in layers:
         massless = layer.density * layer.heat_capacity == 0.0
@@ -52,9 +54,10 @@ def wall_grid(layers: Sequence[Layer], *, cell: float = CELL) -> WallGrid:
         half = 0.5 * dx * layer.density * layer.heat_capacity
         for _ in range(cells):
             conductance.append(layer.conductivity / dx)
+            width.append(dx)
             capacity[-1] += half
             capacity.append(half)
-    return WallGrid(np.array(conductance), np.array(capacity))
+    return WallGrid(np.array(conductance), np.array(capacity), np.array(width))
 
 
 def half_of_symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:

@@ -190,25 +190,3 @@ def en410_g_value(
     outside = 1.0 / outer_film + np.concatenate([[0.0], np.cumsum(between)])
     inward = outside / (outside[-1] + 1.0 / inner_film)
     return np.asarray(transmittance, dtype=float) + alpha @ inward
-
-
-def roos_angular_factor(
-    incidence: ArrayLike, *, panes: int = 2, category: float = 4.0
-) -> NDArray[np.float64]:
-    """Factor f(theta) [...] by which tau and g of a glazing fall from normal incidence.
-
-    f = 1 - a z^alpha - b z^beta - c z^gamma, z = theta/90 degrees; category q from 1 to 10 says how
-    strongly coated the glazing is (4: uncoated).
-
-    Args: incidence: [...] angle of incidence [rad]; panes p: 1 to 3.
-
-    Source: Roos, Polato, van Nijnatten, Hutchins, Olive, Anderson 2001, Solar Energy 69:15-26.
-    """
-    require(1 <= panes <= 3, "Roos model", f"expected 1 to 3 panes, got {panes}")
-    require_range(category, 1.0, 10.0, "Roos model: category")
-    z = np.clip(np.abs(np.asarray(incidence, dtype=float)) / (np.pi / 2), 0.0, 1.0)
-    p, q = float(panes), float(category)
-    a, b = 8.0, 0.25 / q
-    c = 1.0 - a - b
-    alpha, beta, gamma = 5.2 + 0.7 * q, 2.0, (5.26 + 0.06 * p) + (0.73 + 0.04 * p) * q
-    return 1.0 - a * z**alpha - b * z**beta - c * z**gamma

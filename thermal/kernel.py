@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.compiled import compiled
-from thermal.network import GROUND, OUTDOOR, PARTITION, PARTNER, TWIN, WINDOW, Network
+from thermal import records as on
+from thermal.network import KNOWN, OUTDOOR, PARTITION, PARTNER, TWIN, WINDOW, Network
 from thermal.records import (
     AIR_HEAT,
     ENTRY,
@@ -33,37 +34,43 @@ def _account(
     method: Method,
     terms: NDArray[np.float64],
 ) -> None:
-    """Add the step's heat flows to terms [Z, 10] [W] (order of TERMS); move the walls' nodes."""
+    """Add the step's heat flows to terms [Z, 14] [W] (order of TERMS); move the walls' nodes."""
     faces = net.faces
     hour, sun = t // method.steps, t // method.solar_every
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.old_air.size):
-        terms[z, 3] += drive.convective[hour, z] + drive.radiant[hour, z]
-        terms[z, 4] += heat * drive.airflow[hour, z] * (weather.outdoor[t] - state.air[z])
-        terms[z, 5] += state.load[z]
+        warmer = weather.outdoor[t] - state.air[z]
+        terms[z, on.GAINS] += drive.convective[hour, z] + drive.radiant[hour, z]
+        terms[z, on.AIR] += heat * work.flow[z] * warmer + work.carried[z]
+        terms[z, on.LOADS] += state.load[z]
+        terms[z, on.SUPPLY] += work.supply[z, 1] - work.supply[z, 0] * state.air[z]
+        terms[z, on.BRIDGES] += net.paths.bridges[z] * warmer
         store = heat * net.air_capacity[z] / method.step_s
-        terms[z, 9] += store * (state.air[z] - work.old_air[z])
+        terms[z, on.STORAGE] += store * (state.air[z] - work.old_air[z])
     for q in range(net.couplings.link.size):
         z, y = net.couplings.zones[q]
         flow = heat * net.couplings.link[q] * (state.air[y] - state.air[z])
-        terms[z, 4] += flow
-        terms[y, 4] -= flow
+        terms[z, on.AIR] += flow
+        terms[y, on.AIR] -= flow
+    for q in range(net.paths.transfer.shape[0]):
+        z = net.paths.transfer[q, 1]
+        terms[z, on.AIR] -= heat * drive.transfer[hour, q] * state.air[z]
     for i in range(faces.area.size):
         z, kind, area = faces.zone[i], faces.kind[i], faces.area[i]
         t_o = state.outer[i]
-        terms[z, 0] += drive.inner[sun, i]
+        terms[z, on.SUN] += drive.inner[sun, i]
         if kind == WINDOW:
-            terms[z, 1] += area * drive.outer[sun, i]
-            terms[z, 7] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
+            terms[z, on.GLASS_SUN] += area * drive.outer[sun, i]
+            terms[z, on.WINDOWS] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
             continue
         stored = _move_nodes(net, i, state, work)
         if kind == OUTDOOR:
-            terms[z, 2] += area * drive.outer[sun, i]
-            terms[z, 6] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
-        elif kind == GROUND:
+            terms[z, on.FACADE_SUN] += area * drive.outer[sun, i]
+            terms[z, on.FACADE] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
+        elif kind == KNOWN:
             first = state.node[faces.first_node[i]]
-            terms[z, 6] += area * faces.port[i, 2] * (t_o - first)
-        terms[z, 9] += area * stored
+            terms[z, on.KNOWN_FACES] += area * faces.port[i, 2] * (t_o - first)
+        terms[z, on.STORAGE] += area * stored
     for i in range(faces.area.size):
         kind = faces.kind[i]
         if kind == TWIN or kind == PARTITION or kind == PARTNER:
@@ -72,8 +79,12 @@ def _account(
             m = faces.first_node[own] + (0 if kind == PARTNER else faces.node_count[own] - 1)
             inward = faces.port[own, 2 + side] * (state.node[m] - state.inner[i])
             stored = faces.port[own, side] * (state.inner[i] - work.old_inner[i])
-            terms[faces.zone[i], 8] += faces.area[i] * inward
-            terms[faces.zone[i], 9] += faces.area[i] * stored
+            terms[faces.zone[i], on.PARTITIONS] += faces.area[i] * inward
+            terms[faces.zone[i], on.STORAGE] += faces.area[i] * stored
+    for z in range(work.old_air.size):
+        face = net.emitters.slab[z]  # in a wall between rooms its heat comes with the wall's
+        if face >= 0 and faces.kind[face] != TWIN and faces.kind[face] != PARTITION:
+            terms[z, on.SLAB] += work.slab[z]
 
 
 @inlined
@@ -91,7 +102,7 @@ def _move_nodes(net: Network, i: int, state: State, work: Workspace) -> float:
     if kind == TWIN or kind == PARTITION or kind == PARTNER:
         return 0.0
     stored += faces.port[i, 1] * (state.inner[i] - work.old_inner[i])
-    if kind != GROUND:
+    if kind != KNOWN:
         stored += faces.port[i, 0] * (state.outer[i] - work.old_outer[i])
     return stored
 
@@ -118,6 +129,11 @@ def advance(
             means.outer[hour, i] += share * state.outer[i]
         for z in range(state.air.size):
             means.air[hour, z] += share * state.air[z]
+            fan = drive.supply[hour, z]
+            means.air_flow[hour, z, 0] += share * (work.flow[z] + fan)
+            means.air_flow[hour, z, 1] += share * fan
+            means.power[hour, z, 0] += share * work.supply[z, 2]
+            means.power[hour, z, 1] += share * work.slab[z]
 
 
 def warm_up(
@@ -127,12 +143,14 @@ def warm_up(
     weather: OutdoorConditions,
     drive: Drive,
     method: Method,
+    *,
+    rows: int = 24,
 ) -> int:
-    """Repeat the first day until it ends as it began; returns the number of days."""
+    """Repeat the first day, of so many rows, until it ends as it began; how many days that took."""
     for day in range(method.warm_days):
         before = np.concatenate([state.node, state.inner])
-        unused = hourly_means(24, state)
-        advance(net, state, work, weather, drive, method, 24, unused)
+        unused = hourly_means(rows, state)
+        advance(net, state, work, weather, drive, method, rows, unused)
         change = np.abs(np.concatenate([state.node, state.inner]) - before).max()
         if change < method.warm_tolerance:
             return day + 1
@@ -143,4 +161,11 @@ def hourly_means(hours: int, state: State) -> Means:
     """Zeros to add to."""
     n, zones = state.inner.size, state.air.size
     faces, terms = (hours, n), (hours, zones, len(TERMS))
-    return Means(np.zeros(faces), np.zeros(faces), np.zeros((hours, zones)), np.zeros(terms))
+    return Means(
+        inner=np.zeros(faces),
+        outer=np.zeros(faces),
+        air=np.zeros((hours, zones)),
+        terms=np.zeros(terms),
+        air_flow=np.zeros((hours, zones, 2)),
+        power=np.zeros((hours, zones, 2)),
+    )

@@ -12,15 +12,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal.air_paths import AirPaths, Emitters, air_paths, emitters
 from thermal.conduction import WallGrid, wall_grid
 from thermal.convection import DOE2_LEEWARD, DOE2_WINDWARD, local_wind_factor
 from thermal.elimination import Elimination, elimination
 from thermal.errors import require
 from thermal.longwave import exchange_from_view_factors, exchange_star, outside_factors
+from thermal.ventilation import AirTransfer
 from thermal.zone import ROUGHNESS, Layer, OpaqueSurface, WindowElement, Zone
 
-OUTDOOR, GROUND, ADIABATIC, TWIN, PARTITION, PARTNER, WINDOW = range(7)
-_CODES = {"outdoor": OUTDOOR, "ground": GROUND, "adiabatic": ADIABATIC, "twin": TWIN}
+OUTDOOR, KNOWN, ADIABATIC, TWIN, PARTITION, PARTNER, WINDOW = range(7)
+_CODES = {"outdoor": OUTDOOR, "ground": KNOWN, "known": KNOWN, "adiabatic": ADIABATIC}
+_CODES |= {"twin": TWIN}
 _RESISTANCE_KINDS = {"constant": 0, "linear U": 1, "surface": 2}
 
 
@@ -32,6 +35,7 @@ class Faces(NamedTuple):
     kind: NDArray[np.int64]  # [N] OUTDOOR ... WINDOW
     partner: NDArray[np.int64]  # [N] face at the other side, or -1
     window: NDArray[np.int64]  # [N] index of the window, or -1
+    beyond: NDArray[np.int64]  # [N] column of `Drive.beyond`; 0: the ground
     normal: NDArray[np.float64]  # [N, 3] out of the room
     height: NDArray[np.float64]  # [N] glazing height for the inside film [m]
     emissivity_out: NDArray[np.float64]  # [N]
@@ -84,6 +88,8 @@ class Network(NamedTuple):
     couplings: Couplings
     system: Elimination
     air_capacity: NDArray[np.float64]  # [Z] volume times capacity factor [m3]
+    paths: AirPaths
+    emitters: Emitters
 
 
 def frame_surface(window: WindowElement) -> OpaqueSurface:
@@ -106,7 +112,13 @@ def framed(zone: Zone) -> list[WindowElement]:
 
 
 def network(
-    zones: Sequence[Zone], *, step_s: float, terrain: str, cell: float, link: NDArray[np.float64]
+    zones: Sequence[Zone],
+    *,
+    step_s: float,
+    terrain: str,
+    cell: float,
+    link: NDArray[np.float64],
+    transfers: Sequence[AirTransfer] = (),
 ) -> Network:
     """The network of coupled zones; link: [Z, Z] air exchange [m3/s], symmetric."""
     elements = [(z, e) for z, zone in enumerate(zones) for e in _elements(zone)]
@@ -121,7 +133,9 @@ def network(
         found.append(np.stack([mine[i], mine[j], exchange[i, j]]))
     couplings, system = _couplings(faces, np.concatenate(found, axis=1), link)
     capacity = np.array([zone.volume * zone.air_capacity_factor for zone in zones])
-    return Network(faces, nodes, _glass(elements), couplings, system, capacity)
+    paths = air_paths(zones, transfers, terrain)
+    heated = emitters(zones, faces.first_node, faces.node_count, cell=cell)
+    return Network(faces, nodes, _glass(elements), couplings, system, capacity, paths, heated)
 
 
 def _couplings(
@@ -268,6 +282,7 @@ def _faces(
         kind=np.array(kinds),
         partner=np.array(partners),
         window=np.array(windows),
+        beyond=_beyond([e for _, e in elements]),
         normal=np.array([e.normal for e in solid]),
         height=np.array([getattr(e, "glazing_height", 1.5) for e in solid]),
         emissivity_out=np.array([_emissivity_out(e) for e in solid]),
@@ -279,6 +294,22 @@ def _faces(
         node_count=np.array([p[1] for p in ports]),
         port=np.array([p[2] for p in ports]),
     )
+
+
+def known_surfaces(
+    elements: Sequence[OpaqueSurface | WindowElement],
+) -> list[OpaqueSurface]:
+    """The surfaces whose outer face has a known temperature of its own, in order."""
+    return [e for e in elements if isinstance(e, OpaqueSurface) and e.outside == "known"]
+
+
+def _beyond(elements: Sequence[OpaqueSurface | WindowElement]) -> NDArray[np.int64]:
+    column, found = 0, []
+    for e in elements:
+        known = isinstance(e, OpaqueSurface) and e.outside == "known"
+        column += known
+        found.append(column if known else 0)
+    return np.array(found, dtype=np.int64)
 
 
 def _emissivity_out(element: OpaqueSurface | WindowElement) -> float:

@@ -12,6 +12,8 @@ from thermal.records import AIR_HEAT, Drive, OutdoorConditions, State, Workspace
 
 FREE, HEATS, HEATS_FULLY, COOLS, COOLS_FULLY = range(5)  # what the plant of a zone does
 ROUNDING = 1e-10  # of temperatures [K]
+RADIANT_PART = 1e-4  # that the shares of a load may be off, of it
+LEAST_REPLY = 0.01  # of the load's other part, less by each watt that is radiant
 
 
 @inlined
@@ -24,6 +26,17 @@ def is_held(plant: int) -> bool:
 def set_point(plant: int, drive: Drive, t: int, z: int) -> float:
     """The set point that a plant holds [degC]."""
     return drive.heating_c[t, z] if plant == HEATS else drive.cooling_c[t, z]
+
+
+@inlined
+def radiant_load(net: Network, work: Workspace, drive: Drive, z: int) -> float:
+    """What a plant radiates [W], as guessed where it holds a set point."""
+    plant, share = work.plant[z], net.emitters.radiant[z]
+    if plant == HEATS_FULLY:
+        return share[0] * drive.limit[z, 0]
+    if plant == COOLS_FULLY:
+        return -share[1] * drive.limit[z, 1]
+    return work.radiant[z] if is_held(plant) else 0.0
 
 
 @inlined
@@ -40,9 +53,9 @@ def close_air(
             continue
         d[k], b[k] = work.air[z, 0], work.air[z, 1]
         if plant == HEATS_FULLY:
-            b[k] += drive.limit[z, 0]
+            b[k] += (1.0 - net.emitters.radiant[z, 0]) * drive.limit[z, 0]
         elif plant == COOLS_FULLY:
-            b[k] -= drive.limit[z, 1]
+            b[k] -= (1.0 - net.emitters.radiant[z, 1]) * drive.limit[z, 1]
     heat = weather.density[t] * AIR_HEAT
     for q in range(pairs.link.size):
         z, y = pairs.zones[q]
@@ -68,16 +81,40 @@ def plants_agree(
     agree = True
     for z in range(work.plant.size):
         air, stiffness, plant = x[n + z], work.air[z, 0], work.plant[z]
-        state.load[z] = 0.0
+        state.load[z] = asked = 0.0
         if is_held(plant):
-            state.load[z] = stiffness * air - work.air[z, 1]
+            convective = stiffness * air - work.air[z, 1]
+            state.load[z] = convective + work.radiant[z]
+            asked = _whole_load(net, work, z, convective)
+            agree &= abs(state.load[z] - asked) <= RADIANT_PART * (1.0 + abs(asked))
         elif plant == HEATS_FULLY:
             state.load[z] = drive.limit[z, 0]
         elif plant == COOLS_FULLY:
             state.load[z] = -drive.limit[z, 1]
-        work.plant[z] = _plant(plant, air, state.load[z], stiffness * ROUNDING, drive, t, z)
+        work.plant[z] = _plant(plant, air, asked, stiffness * ROUNDING, drive, t, z)
         agree &= work.plant[z] == plant
+        if not is_held(work.plant[z]):
+            work.radiant[z] = 0.0
     return agree
+
+
+@inlined
+def _whole_load(net: Network, work: Workspace, z: int, convective: float) -> float:
+    """The load [W] whose parts have the plant's shares; its radiant part is the next guess.
+
+    The convective part falls linearly with the radiant one: by the slope between the last two.
+    """
+    plant, radiant, seen = work.plant[z], work.radiant[z], work.radiant_seen[z]
+    share = net.emitters.radiant[z, 0 if plant == HEATS else 1]
+    if share == 0.0:
+        work.radiant[z] = 0.0
+        return convective + radiant
+    if abs(radiant - seen[1]) > 1e-3:
+        seen[2] = min(max((seen[0] - convective) / (radiant - seen[1]), LEAST_REPLY), 1.0)
+    seen[0], seen[1] = convective, radiant
+    whole = (convective + seen[2] * radiant) / (1.0 - share + share * seen[2])
+    work.radiant[z] = share * whole
+    return whole
 
 
 @inlined

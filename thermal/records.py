@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 
 AIR_HEAT = 1006.0  # [J/(kg K)]
 TERMS = ("inside sun", "glass sun", "facade sun", "gains", "air exchange", "ideal loads")
-TERMS += ("facade", "windows", "partitions", "storage")  # [W] into the zone; storage: increase
+TERMS += ("facade", "windows", "partitions", "ground and neighbours", "supply air")
+TERMS += ("thermal bridges", "heated slab", "storage")  # [W] into the zone; storage: increase
+SUN, GLASS_SUN, FACADE_SUN, GAINS, AIR, LOADS, FACADE, WINDOWS, PARTITIONS = range(9)
+KNOWN_FACES, SUPPLY, BRIDGES, SLAB, STORAGE = range(9, 14)
 
 
 # The records below only lend their arrays: without `_nrt=False` every access would count
@@ -32,7 +35,6 @@ class OutdoorConditions(NamedTuple):
 
     outdoor: NDArray[np.float64]  # [T] [degC]
     sky: NDArray[np.float64]  # [T] [degC]
-    ground: NDArray[np.float64]  # [T] [degC]
     speed: NDArray[np.float64]  # [T] [m/s]
     windward: NDArray[np.float64]  # [T] V^0.89
     leeward: NDArray[np.float64]  # [T] V^0.617
@@ -48,10 +50,17 @@ class Drive(NamedTuple):
     state: NDArray[np.int64]  # [H, W] shading state
     convective: NDArray[np.float64]  # [H, Z] gains [W]
     radiant: NDArray[np.float64]  # [H, Z] gains [W]
-    airflow: NDArray[np.float64]  # [H, Z] outdoor air [m3/s]
+    beyond: NDArray[np.float64]  # [T, B] of outer faces: the ground, then the known ones [degC]
+    leaks: NDArray[np.float64]  # [H, Z] infiltration that wind and temperatures change [m3/s]
+    airflow: NDArray[np.float64]  # [H, Z] other outdoor air [m3/s]
+    supply: NDArray[np.float64]  # [H, Z] air of a fan [m3/s]
+    supply_c: NDArray[np.float64]  # [T, Z] its temperature; NaN: outdoor air
+    airing: NDArray[np.float64]  # [H, Z] share of the windows that may be opened
+    transfer: NDArray[np.float64]  # [H, Q] air from zone to zone [m3/s]
     heating_c: NDArray[np.float64]  # [T, Z] set point
     cooling_c: NDArray[np.float64]  # [T, Z]
     limit: NDArray[np.float64]  # [Z, 2] heating and cooling power [W]
+    slab_c: NDArray[np.float64]  # [T, Z, 2] heating and cooling set point of the slab
 
 
 class State(NamedTuple):
@@ -62,6 +71,7 @@ class State(NamedTuple):
     node: NDArray[np.float64]  # [M] inner nodes of the walls
     air: NDArray[np.float64]  # [Z]
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
+    opened: NDArray[np.bool_]  # [Z] whether the windows are open
 
 
 class Workspace(NamedTuple):
@@ -74,6 +84,14 @@ class Workspace(NamedTuple):
     unknown: NDArray[np.float64]  # [U] inside faces, then air
     air: NDArray[np.float64]  # [Z, 2] conductance to all around [W/K], what flows in from it [W]
     plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... COOLS_FULLY
+    radiant: NDArray[np.float64]  # [Z] radiant part of its load [W]
+    # [Z, 3] of that part: its load's other part, itself, both when last solved; less by its watt
+    radiant_seen: NDArray[np.float64]
+    flow: NDArray[np.float64]  # [Z] outdoor air but that of fans [m3/s]
+    supply: NDArray[np.float64]  # [Z, 3] fans: conductance [W/K], it times temperature, coil [W]
+    carried: NDArray[np.float64]  # [Z] heat of the air that comes from other zones [W]
+    slab: NDArray[np.float64]  # [Z] power of the slab [W]
+    source: NDArray[np.float64]  # [M] heat set free at the nodes [W/m2]
     still: NDArray[np.float64]  # [M] node temperatures that the step before alone would give
     film: NDArray[np.float64]  # [N] inside film plus extra conductance [W/(m2 K)]
     # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
@@ -89,7 +107,9 @@ class Means(NamedTuple):
     inner: NDArray[np.float64]  # [H, N] inside faces [degC]
     outer: NDArray[np.float64]  # [H, N] outside faces [degC]
     air: NDArray[np.float64]  # [H, Z] [degC]
-    terms: NDArray[np.float64]  # [H, Z, 10] sums over the steps of the heat flows [W]
+    terms: NDArray[np.float64]  # [H, Z, 14] sums over the steps of the heat flows [W]
+    air_flow: NDArray[np.float64]  # [H, Z, 2] outdoor air, of it by fans [m3/s]
+    power: NDArray[np.float64]  # [H, Z, 2] of the supply air's coil, of the slab [W]
 
 
 class Method(NamedTuple):

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal.air_flow import set_air_flows
 from thermal.climate import SIGMA
 from thermal.convection import (
     constant_inside,
@@ -23,7 +24,7 @@ from thermal.convection import (
 from thermal.elimination import eliminate
 from thermal.network import (
     ADIABATIC,
-    GROUND,
+    KNOWN,
     OUTDOOR,
     PARTITION,
     PARTNER,
@@ -33,7 +34,7 @@ from thermal.network import (
     Network,
     Nodes,
 )
-from thermal.plant import close_air, is_held, plants_agree, set_point
+from thermal.plant import close_air, is_held, plants_agree, radiant_load, set_point
 from thermal.records import AIR_HEAT, Drive, Method, OutdoorConditions, State, Workspace, inlined
 
 MOST_CHANGES = 50  # of the plants in an iterate; each changes a few times at the most
@@ -104,7 +105,7 @@ def _still_nodes(faces: Faces, nodes: Nodes, state: State, work: Workspace) -> N
     for i in range(faces.area.size):
         first, count = faces.first_node[i], faces.node_count[i]
         for m in range(first, first + count):
-            carried = nodes.capacity[m] * state.node[m]
+            carried = nodes.capacity[m] * state.node[m] + work.source[m]
             if m > first:
                 carried += nodes.below[m] * work.still[m - 1]
             work.still[m] = carried * nodes.pivot[m]
@@ -121,6 +122,7 @@ def _wall_row(
     weather: OutdoorConditions,
     t: int,
     outer_sun: float,
+    beyond: float,
     method: Method,
 ) -> tuple[float, float]:
     """Diagonal and right side [per m2] of an opaque face, its outer face eliminated."""
@@ -130,8 +132,8 @@ def _wall_row(
     y_o, y_i = work.still[first], work.still[first + count - 1]
     diagonal = c_i + g_i * (1.0 - v_i)
     right = c_i * work.old_inner[i] + g_i * y_i
-    if kind == GROUND:
-        return diagonal, right + g_i * u_i * weather.ground[t]
+    if kind == KNOWN:
+        return diagonal, right + g_i * u_i * beyond
     if kind == TWIN:
         return diagonal - g_i * u_i, right
     if kind == PARTITION:
@@ -195,7 +197,7 @@ def _assemble(
     n = faces.area.size
     hour, sun = t // method.steps, t // method.solar_every
     e[:] = 0.0
-    _assemble_air(net, work, weather, drive, t, method)
+    _assemble_air(net, state, work, weather, drive, t, method)
     for i in range(n):
         z, kind, area, k = faces.zone[i], faces.kind[i], faces.area[i], place[i]
         film = _inside_film(faces, i, state.inner[i], state.air[z], method.inside)
@@ -212,10 +214,13 @@ def _assemble(
             r = c_o * work.old_inner[i] + g_o * work.still[faces.first_node[p]]
             e[pairs.at_partner[i]] -= area * g_o * v_o
         else:
-            own, r = _wall_row(net, i, state, work, weather, t, drive.outer[sun, i], method)
+            beyond = drive.beyond[t, faces.beyond[i]]
+            outer = drive.outer[sun, i]
+            own, r = _wall_row(net, i, state, work, weather, t, outer, beyond, method)
         work.film[i] = film
         d[k] = area * (own + film)
-        b[k] = area * r + drive.inner[sun, i] + drive.radiant[hour, z] * faces.radiant_share[i]
+        radiant = drive.radiant[hour, z] + radiant_load(net, work, drive, z)
+        b[k] = area * r + drive.inner[sun, i] + radiant * faces.radiant_share[i]
         work.air[z, 0] += area * film
         if is_held(work.plant[z]):
             b[k] += area * film * set_point(work.plant[z], drive, t, z)
@@ -232,18 +237,30 @@ def _assemble(
 
 @inlined
 def _assemble_air(
-    net: Network, work: Workspace, weather: OutdoorConditions, drive: Drive, t: int, method: Method
+    net: Network,
+    state: State,
+    work: Workspace,
+    weather: OutdoorConditions,
+    drive: Drive,
+    t: int,
+    method: Method,
 ) -> None:
     """Conductance of each zone's air and what flows into it, but for its faces; its neighbours."""
     hour, pairs = t // method.steps, net.couplings
     heat = weather.density[t] * AIR_HEAT
     for z in range(work.plant.size):
-        flow = heat * drive.airflow[hour, z]
+        outdoor = heat * work.flow[z] + net.paths.bridges[z]
         store = heat * net.air_capacity[z] / method.step_s
-        work.air[z, 0] = store + flow
-        work.air[z, 1] = (
-            store * work.old_air[z] + flow * weather.outdoor[t] + drive.convective[hour, z]
-        )
+        work.air[z, 0] = store + outdoor + work.supply[z, 0]
+        work.air[z, 1] = store * work.old_air[z] + outdoor * weather.outdoor[t]
+        work.air[z, 1] += work.supply[z, 1] + drive.convective[hour, z]
+        work.carried[z] = 0.0
+    for q in range(net.paths.transfer.shape[0]):
+        y, z = net.paths.transfer[q]
+        carried = heat * drive.transfer[hour, q]
+        work.air[z, 0] += carried
+        work.air[z, 1] += carried * state.air[y]
+        work.carried[z] += carried * state.air[y]
     for q in range(pairs.link.size):
         z, y = pairs.zones[q]
         exchanged = heat * pairs.link[q]
@@ -254,17 +271,15 @@ def _assemble_air(
 
 
 @inlined
-def _outer_from_inner(
-    net: Network, state: State, work: Workspace, weather: OutdoorConditions, t: int
-) -> None:
+def _outer_from_inner(net: Network, state: State, work: Workspace, drive: Drive, t: int) -> None:
     faces = net.faces
     for i in range(faces.area.size):
         kind = faces.kind[i]
         if kind == OUTDOOR or kind == WINDOW or kind == ADIABATIC:
             row = work.outdoor[i]
             state.outer[i] = (row[1] + row[2] * state.inner[i]) / row[0]
-        elif kind == GROUND:
-            state.outer[i] = weather.ground[t]
+        elif kind == KNOWN:
+            state.outer[i] = drive.beyond[t, faces.beyond[i]]
         elif kind == TWIN:
             state.outer[i] = state.inner[i]
         else:
@@ -287,6 +302,7 @@ def step(
     copy_into(state.inner, work.old_inner, 0)
     copy_into(state.outer, work.old_outer, 0)
     copy_into(state.air, work.old_air, 0)
+    set_air_flows(net, state, work, weather, drive, t, t // method.steps)
     _still_nodes(faces, nodes, state, work)
     for _ in range(method.iterations):
         for _ in range(MOST_CHANGES):
@@ -303,6 +319,6 @@ def step(
         for z in range(work.old_air.size):
             change = max(change, abs(work.unknown[n + z] - state.air[z]))
             state.air[z] = work.unknown[n + z]
-        _outer_from_inner(net, state, work, weather, t)
+        _outer_from_inner(net, state, work, drive, t)
         if change < method.tolerance:
             break

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal.blackbox import Fenestration
+from thermal.emitters import HeatedSlab, IdealLoads
 from thermal.errors import require, require_range
+from thermal.ventilation import Leakage, SupplyAir, WindowAiring
 
 ROUGHNESS = {  # DOE-2 roughness multiplier R_f; EnergyPlus Engineering Reference
     "very rough": 2.17,
@@ -22,7 +24,7 @@ ROUGHNESS = {  # DOE-2 roughness multiplier R_f; EnergyPlus Engineering Referenc
     "smooth": 1.11,
     "very smooth": 1.0,
 }
-OUTSIDE = ("outdoor", "ground", "adiabatic", "twin")
+OUTSIDE = ("outdoor", "ground", "known", "adiabatic", "twin")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +52,10 @@ class Layer:
 class OpaqueSurface:
     """An opaque surface of a zone.
 
-    `outside` is "outdoor", "ground", "adiabatic" (no heat flow at the outer face), "twin" (the
-    same room behind it: the outer face copies the inner one, EnergyPlus "Adiabatic"), or the name
-    of another zone; then `partner` names the surface of that zone which is the other face.
+    `outside` is "outdoor", "ground" (the outer face has the climate's ground temperature), "known"
+    (it has `beyond_c`), "adiabatic" (no heat flow at the outer face), "twin" (the same room behind
+    it: the outer face copies the inner one, EnergyPlus "Adiabatic"), or the name of another zone;
+    then `partner` names the surface of that zone which is the other face.
     """
 
     name: str
@@ -67,9 +70,12 @@ class OpaqueSurface:
     absorptance_out: float = 0.6  # solar
     roughness: str = "medium rough"
     height: float = 1.5  # [m] of the centroid above the ground outside, for the wind profile
+    beyond_c: NDArray[np.float64] | float | None = None  # [H] or [T] of the outer face, "known"
 
     def __post_init__(self) -> None:
         item = f"surface {self.name}"
+        told = (self.beyond_c is not None) == (self.outside == "known")
+        require(told, item, "a temperature beyond goes with outside = 'known', and that with it")
         require(self.area > 0, item, f"area must be positive, got {self.area} m2")
         require(len(self.layers) > 0, item, "has no layers (thickness, conductivity, density, cp)")
         _set_unit_normal(self, item)
@@ -121,28 +127,6 @@ class Gains:
 
 
 @dataclass(frozen=True, slots=True)
-class IdealLoads:
-    """Ideal convective heating and cooling; scalars hold for every hour, infinity switches off.
-
-    Arrays have a value for every hour H, or for every time step T.
-    """
-
-    heating_c: NDArray[np.float64] | float = -np.inf  # [H] or [T] [degC] air set point
-    cooling_c: NDArray[np.float64] | float = np.inf  # [H] or [T] [degC]
-    heating_limit: float = np.inf  # [W]
-    cooling_limit: float = np.inf  # [W], positive
-
-    def __post_init__(self) -> None:
-        crossed = np.max(self.heating_c) > np.min(self.cooling_c) and np.any(
-            _same_length(self.heating_c, self.cooling_c)
-            > _same_length(self.cooling_c, self.heating_c)
-        )
-        require(not crossed, "set points", "the heating set point lies above the cooling one")
-        limits = min(self.heating_limit, self.cooling_limit)
-        require(limits >= 0, "set points", f"a heating or cooling limit is negative: {limits} W")
-
-
-@dataclass(frozen=True, slots=True)
 class Zone:
     """A room (or several with one air node): its faces, its air, what heats it."""
 
@@ -150,18 +134,30 @@ class Zone:
     volume: float  # [m3] of air
     surfaces: tuple[OpaqueSurface, ...]
     windows: tuple[WindowElement, ...] = ()
-    infiltration_ach: NDArray[np.float64] | float = 0.5  # [H] [1/h] outdoor air, all sources
+    infiltration_ach: NDArray[np.float64] | float = 0.5  # [H] [1/h] outdoor air through leaks
     gains: Gains = field(default_factory=Gains)
     loads: IdealLoads = field(default_factory=IdealLoads)
     air_capacity_factor: float = 1.0  # multiplies the heat capacity of the air (furniture)
     # [N, N] view factors between inside faces (surfaces, then windows, then frames); None: star
     view_factors: NDArray[np.float64] | None = None
+    leakage: Leakage = field(
+        default_factory=Leakage
+    )  # how wind and temperatures change the infiltration
+    other_air_ach: NDArray[np.float64] | float = 0.0  # [H] [1/h] outdoor air that nothing changes
+    supply: SupplyAir | None = None
+    airing: WindowAiring | None = None
+    bridges: float = 0.0  # thermal bridges, air to outdoors: sum of psi l and chi [W/K]
+    slab: HeatedSlab | None = None
 
     def __post_init__(self) -> None:
         item = f"zone {self.name}"
+        require(self.bridges >= 0, item, f"negative thermal bridges: {self.bridges} W/K")
+        require(bool(np.all(np.asarray(self.other_air_ach) >= 0)), item, "negative outdoor air")
         require(self.volume > 0, item, f"volume must be positive, got {self.volume} m3")
         require(len(self.surfaces) > 0, item, "has no surfaces")
         names = [s.name for s in self.surfaces] + [w.name for w in self.windows]
+        known = self.slab is None or self.slab.surface in names[: len(self.surfaces)]
+        require(known, item, f"has no surface {getattr(self.slab, 'surface', '')!r} to be heated")
         twice = sorted({n for n in names if names.count(n) > 1})
         require(not twice, item, f"names used twice: {', '.join(twice)}")
         require(bool(np.all(np.asarray(self.infiltration_ach) >= 0)), item, "negative infiltration")
@@ -201,12 +197,6 @@ def work_hours(start: int, end: int, hours: int = 8760) -> NDArray[np.float64]:
     hour = np.arange(24)
     after, before = hour >= start, hour < end
     return scheduled(after & before if start < end else after | before, hours)
-
-
-def _same_length(values: ArrayLike, other: ArrayLike) -> NDArray[np.float64]:
-    """Values repeated to the length of the finer of two arrays of set points."""
-    array, length = np.atleast_1d(np.asarray(values, dtype=float)), np.size(other)
-    return np.repeat(array, max(length // array.size, 1))
 
 
 def _set_unit_normal(element: OpaqueSurface | WindowElement, item: str) -> None:

@@ -13,6 +13,7 @@ import shapely
 
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
 from bim.coarser import coarser
+from bim.defaults import CLEAR_GLAZING
 from bim.guarded import RoomBoundary, room_boundaries
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
@@ -22,6 +23,7 @@ from bim.ifc.found_rooms import found_rooms
 from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms
 from bim.ifc.joining import joined_rooms
+from bim.ifc.map_conversion import map_georeference
 from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
@@ -29,18 +31,15 @@ from bim.ifc.source import Progress, Source, read_source
 from bim.ifc.space_boundaries import boundary_problems
 from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
 from bim.model import Building, Element, Problem, Space
-from bim.outdoors import lifted_sites, unblinded
-from bim.planes import SMALLEST_AREA
+from bim.outdoors import lifted_sites, mirrors_in_view, unblinded
 from bim.rays import RayMesh, ray_mesh
-from bim.shell import enclosed_volume, open_edges
 from bim.solids import triangles_of
+from bim.soundness import agree, soundness_problems
 from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.wall_middles import area_to_wall_middles
 from mitsuba_cfs.errors import RoomError
 
-STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
 SEARCH = 0.3  # share of the stage "rooms" in which they are found, where the file has no spaces
-AGREES = 0.02  # drawn and stated quantities may differ by this share before it is reported
 
 
 def read_ifc(
@@ -112,6 +111,7 @@ def read_ifc(
         account_of(
             source, rooms.read, spaces, glass, problems, repeated=[r.guid for r in rooms.repeated]
         ),
+        map_georeference(source.model, source.placed),
     )  # fmt: skip
 
 
@@ -152,11 +152,13 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
         source.elements,
         reflectance=source.corrections.surroundings,
         kept=source.corrections.kept(source.model),
+        panes=CLEAR_GLAZING,
     )
+    elements, problems_of_panes = mirrors_in_view(elements, windows)
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
     traced, fine = coarser(list(outdoors.elements))
-    return tuple(traced), [*problems, *more, *outdoors.problems, *fine]
+    return tuple(traced), [*problems, *problems_of_panes, *more, *outdoors.problems, *fine]
 
 
 def _surroundings(
@@ -197,21 +199,17 @@ def _space(
     faces, windows, assumed = faces_and_windows(pieces, beyond, elements, finishes)
     area = floor_area(faces)
     middles = None
-    if record.stated_area is not None and not _agree(area, record.stated_area):
+    if record.stated_area is not None and not agree(area, record.stated_area):
         body = triangles_of(record.solid.manifold)[0]
         middles = area_to_wall_middles(body, pieces, beyond, elements)
-        middles = middles if _agree(middles, record.stated_area) else None
+        middles = middles if agree(middles, record.stated_area) else None
     space = Space(
         record.guid, record.name, record.storey, boundary.volume, area, tuple(faces),
         tuple(windows),
         record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
         record.type_name, record.raised,
     )  # fmt: skip
-    return space, boundary.problems + _assumptions(record, assumed) + _soundness(space)
-
-
-def _agree(drawn: float, stated: float) -> bool:
-    return abs(drawn - stated) <= AGREES * stated
+    return space, boundary.problems + _assumptions(record, assumed) + soundness_problems(space)
 
 
 def _assumptions(record: SpaceRecord, assumed: Counter) -> list[Problem]:
@@ -227,33 +225,3 @@ def _assumptions(record: SpaceRecord, assumed: Counter) -> list[Problem]:
         for key, count in sorted(assumed.items())
         if count
     ]  # fmt: skip
-
-
-def _soundness(space: Space) -> list[Problem]:
-    """Problems of the finished shell: open edges, a volume that its faces do not enclose."""
-    problems = []
-    leaks = open_edges(space.shell)
-    if leaks:
-        what = f"room {space.label}: {leaks} open edges are left"
-        problems.append(Problem(space.guid, what, "light may leak there"))
-    enclosed = enclosed_volume(space.shell)
-    if space.area_to_middles is not None:
-        what = (
-            f"room {space.label}: states {space.stated_area:.2f} m2 floor area, which is that to"
-            f" the middle of its walls ({space.area_to_middles:.2f} m2 drawn)"
-        )
-        done = f"the {space.floor_area:.2f} m2 between the walls are used"
-        problems.append(Problem(space.guid, what, done))
-    for what, stated, drawn, unit in (
-        ("floor area", space.stated_area, space.area_as_stated, "m2"),
-        ("volume", space.stated_volume, space.drawn_volume, "m3"),
-    ):
-        if stated is not None and not _agree(drawn, stated):
-            text = (
-                f"room {space.label}: states {stated:.2f} {unit} {what}, drawn {drawn:.2f} {unit}"
-            )
-            problems.append(Problem(space.guid, text, "the drawn one is used"))
-    if abs(enclosed - space.volume) > 1e-3 * space.volume + SMALLEST_AREA:
-        what = f"room {space.label}: faces enclose {enclosed:.3f} m3 of {space.volume:.3f} m3"
-        problems.append(Problem(space.guid, what, "its boundary is not sound"))
-    return problems

@@ -16,6 +16,7 @@ from bim.ifc.materials import MaterialReader
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
 from bim.model import Element, Problem
+from mitsuba_cfs.gloss import Gloss
 
 SITE = ("IfcSite", "IfcGeographicElement")
 
@@ -77,12 +78,14 @@ def outdoor_elements(
     *,
     reflectance: float | None = None,
     kept: Collection[int] = (),
+    panes: Gloss | None = None,
 ) -> list[Element]:
     """Every building element and terrain, one `Element` for each of its surface styles.
 
     Args:
         reflectance: of everything, in place of what the file says.
         kept: STEP ids of shading devices that are traced before any BSDF.
+        panes: how glass mirrors whose style does not say it; None: it reflects diffusely.
     """
     result = []
     for shape in shapes:
@@ -99,7 +102,9 @@ def outdoor_elements(
             if index >= 0:
                 look = shape.looks[index]
                 (visible, solar), gloss = look.reflectances, look.gloss
-                if look.is_glass:  # what a pane mirrors is no diffuse light
+                if look.is_glass:
+                    gloss = panes if gloss is None else gloss
+                    # what a pane mirrors is no diffuse light
                     visible = solar = GLASS_REFLECTANCE if gloss is None else 0.0
             if reflectance is not None:
                 visible, solar, gloss = reflectance, reflectance, None

@@ -49,6 +49,7 @@ class GlassAccount:
     used: float  # of it: before a room [m2]
     assumed: bool  # its outline is not drawn in the file
     low: SpaceRecord | None = None  # the room that ends below it
+    heights: tuple[float, float] = (0.0, 0.0)  # of its lowest and highest point [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +137,9 @@ def _account(
             out += rest
             low = _room_below(inside, records, building)
     assumed = not filling.transparent.any()
-    return GlassAccount(filling.guid, storey, out, used, assumed, low)
+    z = aperture.plane.to_world(shapely.get_coordinates(aperture.glass))[:, 2]
+    heights = float(z.min()), float(z.max())
+    return GlassAccount(filling.guid, storey, out, used, assumed, low, heights)
 
 
 def _inner_point(

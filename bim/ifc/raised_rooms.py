@@ -6,6 +6,11 @@ states a suspended ceiling: a covering that covers the space, or a finished ceil
 height; and where one is likely though nobody drew it: less than `PLENUM` would be won and less
 than `MOSTLY` of the room's glass.  Both limits are our own judgement: voids above ceilings are 0.3
 to 1 m high.
+
+Nor does it rise into a storey whose rooms are not drawn.  What covers it lies no further above its
+top than the space is high: the storey that is missing would be higher.  Glass of the room's
+own storey, or that begins below its top, shows a higher room: up to twice as far as it reaches, as
+a hall under a ridge is up to twice as high as its eaves, and such a void.
 """
 
 from __future__ import annotations
@@ -48,20 +53,35 @@ def raised_rooms(
     for index, record in enumerate(records):
         if record.guid not in low:
             continue
-        above = sum(
-            g.out - g.used for g in glass.glass if g.low is not None and g.low.guid == record.guid
-        )
-        if above < LEAST_GLASS:
+        area, reach = _glass_above(record, glass)
+        if area < LEAST_GLASS:
             continue
-        raised, why = _raised(source, index, result, lids, _share_above(record, above, glass))
+        most = max(float(np.ptp([record.solid.low[2], record.solid.high[2]])), 2 * reach + PLENUM)
+        share = _share_above(record, area, glass)
+        raised, why = _raised(source, index, result, lids, share, most)
         gain = f"{raised.solid.high[2] - record.solid.high[2]:.2f} m"
-        what = f"room {record.label}: ends at {record.solid.high[2]:.2f} m, below {above:.2f} m2 of"
+        top = record.solid.high[2]
+        what = f"room {record.label}: ends at {top:.2f} m, below {area:.2f} m2 of"
         done = f"raised by {gain}, {raised.raised:.1f} m3 more" if not why else f"kept: {why}"
         problems.append(
             Problem(record.guid, f"{what} glass with no slab between", done, kind=f"low {why}")
         )
         result[index] = raised
     return result, problems
+
+
+def _glass_above(record: SpaceRecord, glass: GlassOfRooms) -> tuple[float, float]:
+    """Glass above a room's top [m2], and how far what is surely its own reaches above that [m]."""
+    top = float(record.solid.high[2])
+    area, reach = 0.0, 0.0
+    for one in glass.glass:
+        if one.low is None or one.low.guid != record.guid:
+            continue
+        area += one.out - one.used
+        low, high = one.heights
+        if one.storey == record.storey or low < top - SAME_HEIGHT:
+            reach = max(reach, high - top)
+    return area, reach
 
 
 def _share_above(record: SpaceRecord, above: float, glass: GlassOfRooms) -> float:
@@ -76,8 +96,9 @@ def _raised(
     records: Sequence[SpaceRecord],
     lids: Sequence[Body],
     share_above: float,
+    most: float,
 ) -> tuple[SpaceRecord, str]:
-    """The room with the air above it; or as it is, and why."""
+    """The room with the air above it, up to so much higher [m]; or as it is, and why."""
     record = records[index]
     stated = _stated_ceiling(source, record)
     if stated:
@@ -94,6 +115,8 @@ def _raised(
     gain = float(body[..., 2].max() - record.solid.high[2])
     if solid is None or gain < LOWEST_GAIN:
         return record, "its ceiling is drawn"
+    if gain > most:
+        return record, f"what covers it lies {gain:.2f} m above its top, a storey or more"
     if gain < PLENUM and share_above < MOSTLY:
         return record, f"the {gain:.2f} m above it may be the void of a ceiling that is not drawn"
     whole = room_solid(record.guid, record.solid.name, solid.manifold)

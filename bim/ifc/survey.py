@@ -11,10 +11,11 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from bim.ifc.building import AGREES, read_ifc
+from bim.ifc.building import read_ifc
 from bim.ifc.project import open_ifc
 from bim.model import Building, Space
 from bim.shell import open_edges
+from bim.soundness import AGREES, agree
 from bim.to_energyplus import write_epjson
 from bim.to_gltf import write_gltf
 from bim.to_radiance import write_radiance
@@ -90,10 +91,10 @@ def _surveyed(path: Path) -> Surveyed:
         sum(w.area for w in building.windows),
         sum(open_edges(s.shell) > 0 for s in spaces),
         len(areas),
-        sum(_agrees(s.floor_area, s.stated_area) for s in areas),
+        sum(agree(s.floor_area, s.stated_area) for s in areas),
         sum(s.area_to_middles is not None for s in areas),
         len(volumes),
-        sum(_agrees(s.drawn_volume, s.stated_volume) for s in volumes),
+        sum(agree(s.drawn_volume, s.stated_volume) for s in volumes),
         len(building.problems),
         check_s,
         export_s,
@@ -104,10 +105,6 @@ def _surveyed(path: Path) -> Surveyed:
         building.account.glass_out,
         building.account.verdict,
     )
-
-
-def _agrees(drawn: float, stated: float) -> bool:
-    return abs(drawn - stated) <= AGREES * stated
 
 
 def _export(building: Building, folder: Path) -> None:

@@ -7,9 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.radiance.materials import RadianceMaterial
+from bim.fenestration import ShadingState
+from bim.radiance.materials import SYSTEMS, RadianceMaterial
 from bim.radiance.scene import RadianceObject, RadianceScene
 from bim.rays import RayMesh, hemisphere, ray_mesh
+from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import pane_shares
 from mitsuba_cfs.surfaces import Surfaces, WindowSurface
@@ -27,8 +30,7 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
     Args: facades: materials or modifiers of panes that stand before something dark: they mirror
         what is before them, and nothing passes.
     """
-    dark = {id(thing) for thing in scene.of_modifiers(facades)}
-    parts = [o for o in scene.objects if o.material.is_opaque or id(o) in dark]
+    parts = opaque_objects(scene, facades)
     if not parts:
         return Surfaces.none()
     counts = [len(part.triangles) for part in parts]
@@ -40,6 +42,12 @@ def opaque_surfaces(scene: RadianceScene, facades: Iterable[str] = ()) -> Surfac
         tuple(part.name for part in parts),
         glosses if any(glosses) else (),
     )
+
+
+def opaque_objects(scene: RadianceScene, facades: Iterable[str] = ()) -> list[RadianceObject]:
+    """The objects of `opaque_surfaces`, in its order."""
+    dark = {id(thing) for thing in scene.of_modifiers(facades)}
+    return [o for o in scene.objects if o.material.is_opaque or id(o) in dark]
 
 
 def scene_windows(scene: RadianceScene, modifiers: Iterable[str]) -> list[WindowSurface]:
@@ -80,6 +88,23 @@ def _sky_seen(
     is_free = solid.first_hits(starts, rays)[1] < 0
     is_free &= panes.first_hits(starts + LAYERS * rays, rays)[1] < 0
     return float(np.mean(is_free & (rays[:, 2] > 0)))
+
+
+def held_states(thing: RadianceObject) -> tuple[ShadingState, ...]:
+    """What the material of a window says of its optics: glass at every angle, or a BSDF file.
+
+    The file's front is outdoors; none for other materials.
+    """
+    material = thing.material
+    if material.kind in SYSTEMS:
+        path = thing.primitive.file.parent / material.bsdf
+        return (ShadingState(bands=dict(read_bsdf_xml(path).bands), file=path),)
+    if material.kind != "glass":
+        return ()
+    passed, mirrored = (shares[::-1].copy() for shares in glass_shares(material))
+    theta = np.arccos(np.linspace(0.0, 1.0, ANGLES))[::-1].copy()
+    table = AngularTable(theta, passed, mirrored, mirrored)
+    return (ShadingState(bands={"Visible": specular_matrices(table)}, angular=table),)
 
 
 def glass_shares(

@@ -9,14 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
-from mitsuba_cfs.bsdf.glazing import (
-    Glazing,
-    Pane,
-    coated_values,
-    glazing_values,
-    polarised_values,
-)
-from mitsuba_cfs.bsdf.klems import KlemsBasis
+from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.pane_stack import PaneOptics, pane_optics, stack
 
 FloatArray = NDArray[np.float64]
 ANGLES = np.radians(np.arange(0.0, 90.25, 0.5))  # that formulas are tabulated at
@@ -83,6 +78,16 @@ class AngularTable:
         return np.clip(PchipInterpolator(angles, values)(np.minimum(theta, angles[-1])), 0, 1)
 
 
+def specular_matrices(table: AngularTable, basis: KlemsBasis = KLEMS_FULL) -> KlemsBsdf:
+    """The Klems matrices of a table with reflectances on either side: means over its patches."""
+    known = (table.transmittance, table.reflectance_front, table.reflectance_back)
+    tau, front, back = (
+        np.diag(table.patch_means(basis, values, end) / basis.projected_solid_angles())
+        for values, end in zip(known, (0.0, 1.0, 1.0), strict=True)
+    )
+    return KlemsBsdf(basis, basis, tau, tau, front, back)
+
+
 def roos_table(glazing: Glazing) -> AngularTable:
     """A glazing unit after Roos et al. 2001, see `glazing_values`."""
     tau, front, back = (np.clip(v, 0, 1) for v in glazing_values(glazing, ANGLES))
@@ -95,32 +100,17 @@ def stack_table(panes: Sequence[Pane]) -> AngularTable:
     All reflections between them are added up by intensity, each polarisation by itself.  Uncoated
     panes follow Fresnel's equations, coated ones LBNL's shape, alike for either polarisation.
     """
-    if not panes:
-        raise ValueError("expected at least one pane")
-    whole = _pane(panes[0])
-    for pane in panes[1:]:
-        whole = _behind(whole, _pane(pane))
-    tau, front, back = (np.clip(values.mean(axis=0), 0, 1) for values in whole)
+    whole = stack([_by_polarisation(pane) for pane in panes])
+    values = (whole.tau, whole.rho_front, whole.rho_back)
+    tau, front, back = (np.clip(one.mean(axis=0), 0, 1) for one in values)
     return AngularTable(ANGLES, tau, front, back)
 
 
-def _pane(pane: Pane) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Transmittance, front and back reflectance of either polarisation [2, N]."""
+def _by_polarisation(pane: Pane) -> PaneOptics:
+    """A pane at `ANGLES` for either polarisation [2, N]."""
     if pane.coated:
-        values = coated_values(
-            pane.transmittance, pane.reflectance_front, pane.reflectance_back, ANGLES
-        )
-        tau, front, back = (np.tile(one, (2, 1)) for one in values)
-        return tau, front, back
+        optics = pane_optics(pane, ANGLES)
+        both = (np.tile(v, (2, 1)) for v in (optics.tau, optics.rho_front, optics.rho_back))
+        return PaneOptics(*both)
     tau, rho = polarised_values(pane.transmittance, pane.reflectance_front, ANGLES)
-    return tau, rho, rho
-
-
-def _behind(
-    outer: tuple[FloatArray, FloatArray, FloatArray],
-    inner: tuple[FloatArray, FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    (t1, f1, b1), (t2, f2, b2) = outer, inner
-    # two mirrors at 90 degrees send nothing on: what passed the outer one is 0 there
-    between = np.maximum(1 - b1 * f2, 1e-12)
-    return t1 * t2 / between, f1 + t1**2 * f2 / between, b2 + t2**2 * b1 / between
+    return PaneOptics(tau, rho, rho)

@@ -67,7 +67,7 @@ def outgoing_disk(directions: NDArray[np.float64]) -> NDArray[np.float64]:
 def tree_position(
     tree: TensorTree, incident: NDArray[np.float64], outgoing: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Position [N, rank] in the tree's hypercube of pairs of directions [N, 3]."""
+    """Position [.., rank] in the tree's hypercube of pairs of directions [.., 3]."""
     if tree.rank == 4:
         squares = disk_to_square(incident_disk(incident)), disk_to_square(outgoing_disk(outgoing))
         return np.concatenate(squares, axis=-1)
@@ -77,11 +77,11 @@ def tree_position(
     s = np.divide(y, sine, out=np.zeros_like(y), where=sine > 0)
     u, v = np.moveaxis(outgoing_disk(outgoing), -1, 0)
     turned = disk_to_square(np.stack([u * c + v * s, v * c - u * s], -1))
-    return np.concatenate([_isotropic_position(incident)[:, None], turned], axis=-1)
+    return np.concatenate([_isotropic_position(incident)[..., None], turned], axis=-1)
 
 
 def _isotropic_position(incident: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.minimum(0.5 - 0.5 * np.hypot(incident[:, 0], incident[:, 1]), ISOTROPIC_EDGE)
+    return np.minimum(0.5 - 0.5 * np.hypot(incident[..., 0], incident[..., 1]), ISOTROPIC_EDGE)
 
 
 def _block_values(

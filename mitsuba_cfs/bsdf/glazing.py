@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from mitsuba_cfs.bsdf.klems import KlemsBasis, KlemsBsdf
 from mitsuba_cfs.gloss import polarised_shares
@@ -33,7 +32,7 @@ class Pane:
     def __post_init__(self) -> None:
         values = (self.transmittance, self.reflectance_front, self.reflectance_back)
         worst = self.transmittance + max(self.reflectance_front, self.reflectance_back)
-        if min(values) < 0 or worst > 1:
+        if min(values) < 0 or worst > 1 + 1e-9:
             raise ValueError(f"pane {self.name}: expected shares of 1, got {values}")
         if not self.coated and self.reflectance_front != self.reflectance_back:
             raise ValueError(f"pane {self.name}: uncoated glass is alike on both sides")
@@ -48,7 +47,7 @@ def pane_values(pane: Pane, theta: ArrayLike) -> tuple[NDArray[np.float64], ...]
 
 
 def uncoated_values(
-    transmittance: float, reflectance: float, theta: ArrayLike
+    transmittance: ArrayLike, reflectance: ArrayLike, theta: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Transmittance and reflectance [..] of a plain pane of glass at `theta` [rad].
 
@@ -59,49 +58,51 @@ def uncoated_values(
 
 
 def polarised_values(
-    transmittance: float, reflectance: float, theta: ArrayLike
+    transmittance: ArrayLike, reflectance: ArrayLike, theta: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Transmittance and reflectance [2, ..] of a plain pane of glass for either polarisation.
 
     Refractive index and absorption are those that give the two values at normal incidence; then
     `mitsuba_cfs.gloss.polarised_shares`.
+
+    Source: EnergyPlus Engineering Reference, "Angular properties for uncoated glass"; Furler 1991.
     """
-    surface = _normal_surface_reflectance(transmittance, reflectance)
-    root = np.sqrt(surface)
+    tau, rho = np.asarray(transmittance, dtype=float), np.asarray(reflectance, dtype=float)
+    beta = tau**2 - rho**2 + 2 * rho + 1
+    surface = (beta - np.sqrt(beta**2 - 4 * (2 - rho) * rho)) / (2 * (2 - rho))  # of one face
+    root = np.sqrt(np.clip(surface, 1e-9, 0.9))
     index = (1 + root) / (1 - root)
-    passed = (reflectance / surface - 1) / transmittance if surface > 0 else transmittance
-    return polarised_shares(np.cos(np.asarray(theta, dtype=float)), index, passed)
-
-
-def _normal_surface_reflectance(transmittance: float, reflectance: float) -> float:
-    """Reflectance of one surface from that and the transmittance of the pane."""
-
-    def excess(r: float) -> float:
-        passed = (reflectance / r - 1) / transmittance
-        return (1 - r) ** 2 * passed / (1 - (r * passed) ** 2) - transmittance
-
-    if reflectance <= 0:
-        return 0.0
-    # at the lower end nothing is absorbed, at the upper end all: a root lies between
-    low, high = reflectance / (1 + transmittance), reflectance * (1 - 1e-12)
-    return float(brentq(excess, low, high, xtol=1e-14))
+    inner = np.where(rho > 1e-6, (rho - surface) / np.maximum(surface * tau, 1e-12), tau)
+    cosine = np.cos(np.asarray(theta, dtype=float))
+    return polarised_shares(cosine, index, np.clip(inner, 1e-9, 1.0))
 
 
 def coated_values(
-    transmittance: float, reflectance_front: float, reflectance_back: float, theta: ArrayLike
+    transmittance: ArrayLike,
+    reflectance_front: ArrayLike,
+    reflectance_back: ArrayLike,
+    theta: ArrayLike,
+    *,
+    clear: bool | None = None,
 ) -> tuple[NDArray[np.float64], ...]:
     """Transmittance, front and back reflectance [..] of a coated pane at `theta` [rad].
 
     tau = tau_n t(theta), rho = rho_n (1 - r(theta)) + r(theta), with the shape of clear or bronze
-    glass for t and r.
+    glass for t and r; what the pane was measured at is kept at the normal.
+
+    Args: clear: whether the shape is that of clear glass; by default where tau_n is above
+        `CLEAR_ABOVE`.
     """
-    shape = CLEAR_SHAPE if transmittance > CLEAR_ABOVE else BRONZE_SHAPE
-    cosine = np.cos(np.asarray(theta, dtype=float))
+    clear = bool(np.all(np.greater(transmittance, CLEAR_ABOVE))) if clear is None else clear
+    shape = CLEAR_SHAPE if clear else BRONZE_SHAPE
+    angles = np.asarray(theta, dtype=float)
+    cosine = np.cos(angles)
     t = np.clip(np.polynomial.polynomial.polyval(cosine, shape[0]), 0, 1)
     r = np.clip(np.polynomial.polynomial.polyval(cosine, shape[1]) - t, 0, 1)
-    rho_front, rho_back = (rho * (1 - r) + r for rho in (reflectance_front, reflectance_back))
-    tau = np.minimum(transmittance * t, 1 - np.maximum(rho_front, rho_back))
-    return tau, rho_front, rho_back
+    t, r = np.where(angles == 0.0, 1.0, t), np.where(angles == 0.0, 0.0, r)
+    tau = np.asarray(transmittance) * t
+    rho = [np.asarray(n) * (1 - r) + r for n in (reflectance_front, reflectance_back)]
+    return tau, *(np.minimum(value, 1 - tau) for value in rho)
 
 
 def roos_factor(theta: ArrayLike, *, panes: int, category: float) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ class PluginTrees:
 
     valued: SamplingTree  # rank 4: the drawn ones; rank 3: the four forward ones
     drawn: SamplingTree  # four forward, then four backward trees
-    beams: NDArray[np.float64] | None  # with `peak`; rank 4: by leaf, rank 3: [4, incident cells]
+    beams: NDArray[np.float64] | None  # with `peak`, by incident cell [4, N, N], rank 3: [4, N]
     colours: NDArray[np.float64] | None  # [L, 3] of the leaves of `valued`, see `relative_rgb`
 
 
@@ -32,49 +32,46 @@ def plugin_trees(
     colour: tuple[TensorTreeBsdf, TensorTreeBsdf] | None = None,
 ) -> PluginTrees:
     """The trees of a system; rank 4 draws from those that it finds values in."""
-    whole = forward_trees(bsdf)
-    make = _rank_4_trees if whole[0].rank == 4 else _rank_3_trees
-    valued, drawn, beams = make(bsdf, peak)
+    whole, rank = forward_trees(bsdf), next(iter(bsdf.blocks().values())).rank
+    forward, beams = _without_peaks(bsdf, whole) if peak else (whole, None)
+    backward = backward_trees(forward)
+    if rank == 3:
+        backward = [_density_tree(tree) for tree in backward]
+    sampled = [sampling_tree(tree) for tree in forward + backward]
+    drawn = joined(sampled)
+    valued = drawn if rank == 4 else joined(sampled[:4])
     if colour is None:
         return PluginTrees(valued, drawn, beams, None)
     bands = [whole, *(forward_trees(band) for band in colour)]
-    if whole[0].rank == 4:
+    if rank == 4:
         bands = [trees + backward_trees(trees) for trees in bands]
     colours = [leaf_colours(y, x, z) for y, x, z in zip(*bands, strict=True)]
     return PluginTrees(valued, drawn, beams, np.concatenate(colours))
 
 
-def _rank_4_trees(bsdf: TensorTreeBsdf, peak: bool):
-    forward = forward_trees(bsdf)
-    trees, beams = forward + backward_trees(forward), None
-    if peak:
-        parts = [
-            through_peak(tree) if number % 4 >= 2 else (tree, np.zeros(len(tree.values)))
-            for number, tree in enumerate(trees)
-        ]
-        trees = [tree for tree, _ in parts]
-        # a tree of a single value gets a node with 16 leaves
-        beams = np.concatenate([beam if t.depth else np.zeros(16) for t, beam in parts])
-    both = joined([sampling_tree(tree) for tree in trees])
-    return both, both, beams
+def _without_peaks(
+    bsdf: TensorTreeBsdf, whole: list[TensorTree]
+) -> tuple[list[TensorTree], NDArray[np.float64]]:
+    """The forward trees without their through peaks, and the beams of `PluginTrees`.
 
-
-def _rank_3_trees(bsdf: TensorTreeBsdf, peak: bool):
-    """Peaks are taken out first: the way back is known by means only, which would blur them."""
-    forward = forward_trees(bsdf, without_peak=peak)
-    drawn = [
-        sampling_tree(t) for t in forward + [_density_tree(t) for t in backward_trees(forward)]
-    ]
-    beams = None
-    if peak:
-        shares = []
-        for name in BLOCKS:
-            tree, _ = bsdf.lookup(name)  # of the other side's, too: the way back is alike
-            some = tree is not None and name.startswith("transmission")
-            shares.append(through_peak(tree)[1] if some else np.zeros(1))
-        cells = max(len(share) for share in shares)
-        beams = np.stack([np.repeat(share, cells // len(share)) for share in shares])
-    return joined(drawn[:4]), joined(drawn), beams
+    The way back of rank 3 is known by means only, which would blur a peak: it is taken out first.
+    """
+    rest, shares = [], []
+    for name, tree in zip(BLOCKS, whole, strict=True):
+        own, turned = bsdf.lookup(name)
+        share = np.zeros((1,) * (tree.rank - 2))
+        if own is not None and name.startswith("transmission"):
+            if tree.rank == 4:
+                tree, share = through_peak(tree)
+            else:  # the beam of the other side is alike
+                tree, share = through_peak(own)
+                tree = tree.reversed() if turned else tree
+        rest.append(tree)
+        shares.append(share)
+    cells = max(len(share) for share in shares)
+    for axis in range(shares[0].ndim):
+        shares = [np.repeat(share, cells // share.shape[axis], axis=axis) for share in shares]
+    return rest, np.stack(shares)
 
 
 def leaf_colours(y: TensorTree, x: TensorTree, z: TensorTree) -> NDArray[np.float64]:
@@ -84,7 +81,7 @@ def leaf_colours(y: TensorTree, x: TensorTree, z: TensorTree) -> NDArray[np.floa
     return colours if y.depth else np.repeat(colours, 1 << y.rank, axis=0)
 
 
-def forward_trees(bsdf: TensorTreeBsdf, *, without_peak: bool = False) -> list[TensorTree]:
+def forward_trees(bsdf: TensorTreeBsdf) -> list[TensorTree]:
     """The trees of `BLOCKS`, light to where it goes, what is absent filled in."""
     rank = next(iter(bsdf.blocks().values())).rank
     trees = []
@@ -92,8 +89,6 @@ def forward_trees(bsdf: TensorTreeBsdf, *, without_peak: bool = False) -> list[T
         tree, turned = bsdf.lookup(name)
         if tree is None:
             tree = TensorTree(rank, np.zeros(1, dtype=np.int64), np.zeros(1))
-        if without_peak and name.startswith("transmission"):
-            tree, _ = through_peak(tree)
         trees.append(tree.reversed() if turned else tree)
     return trees
 

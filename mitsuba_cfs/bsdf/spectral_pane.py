@@ -1,22 +1,20 @@
-"""Panes by wavelength: files of Optics and of the IGSDB, stacks of panes, band averages."""
+"""Panes by wavelength: stacks of panes, band averages."""
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.en410 import solar_value, visible_value
-from mitsuba_cfs.bsdf.glazing import BRONZE_SHAPE, CLEAR_ABOVE, CLEAR_SHAPE
+from mitsuba_cfs.bsdf.glazing import CLEAR_ABOVE, coated_values, uncoated_values
+from mitsuba_cfs.bsdf.pane_file import read_pane_file
+from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.gloss import pane_shares
 
 FloatArray = NDArray[np.float64]
 EMISSIVITY = 0.84  # of glass, where a file states none
@@ -48,100 +46,19 @@ class SpectralPane:
 
 
 def read_spectral_pane(path: str | PathLike[str]) -> SpectralPane:
-    """The pane of an Optics (IGDB) text file or of an IGSDB product's JSON file.
+    """The pane of a file, see `pane_file.read_pane_file`.
 
     Raises: `DataError` that names the file and what is missing.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", file=path) from None
-    if text.lstrip().startswith("{") and '"' in text.lstrip()[:40]:
-        return _igsdb_pane(text, path)
-    return _optics_pane(text, path)
-
-
-def _igsdb_pane(text: str, path: Path) -> SpectralPane:
-    """The pane of an IGSDB product."""
-    try:
-        product = json.loads(text)
-        if product["measured_data"]["thickness"] is None and product.get("composition"):
-            raise DataError("is a shade or a product of parts, not a pane", file=path)
-        measured, rows = product["measured_data"], product["spectral_data"]["spectral_data"]
-        table = np.array([[row["wavelength"], row["T"], row["Rf"], row["Rb"]] for row in rows])
-        sides = [measured[f"emissivity_{side}"] for side in ("front", "back")]
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
-        raise DataError(f"is no IGSDB product with spectral data ({error})", file=path) from None
-    return _pane(
-        table, path, name=product.get("name") or path.stem, millimetres=measured["thickness"],
-        conductivity=measured.get("conductivity"), emissivity=sides,
-        infrared=measured.get("tir_front"),
-        coated=str(product.get("coated_side") or "Neither").lower() not in ("neither", "n/a", "na"),
-    )  # fmt: skip
-
-
-_HEADER = re.compile(r"^\{(?P<content>.*)\}(?P<value>.*)$")
-
-
-def _optics_pane(text: str, path: Path) -> SpectralPane:
-    """The pane of an Optics text file: headers in braces, then wavelength, T, Rf, Rb."""
-    headers, rows = {}, []
-    for line in text.splitlines():
-        header = _HEADER.match(line.strip())
-        if header:
-            key, _, value = header["content"].partition(":")
-            headers[key.strip().lower()] = (value.strip() or header["value"]).strip()
-        elif line.strip():
-            try:
-                rows.append([float(word) for word in line.split()[:4]])
-            except ValueError:
-                raise DataError(f"is no spectral row: {line.strip()[:40]!r}", file=path) from None
-    if not rows or {len(row) for row in rows} != {4}:
-        raise DataError("expected rows of wavelength, T, Rf, Rb", file=path)
-    if "nano" in headers.get("units, wavelength units", "").lower():
-        rows = [[row[0] / 1000.0, *row[1:]] for row in rows]
-    numbers = re.findall(r"[\d.]+", headers.get("emissivity, front back", ""))
-    coated = headers.get("coated side", "neither").lower() not in ("neither", "n/a", "")
-    return _pane(
-        np.array(rows), path, name=headers.get("product name") or path.stem,
-        millimetres=_number(headers.get("thickness")), emissivity=[float(n) for n in numbers[:2]],
-        conductivity=_number(headers.get("conductivity")), coated=coated,
-        infrared=_number(headers.get("ir transmittance", "").partition("=")[2]),
-    )  # fmt: skip
-
-
-def _number(text: str | None) -> float | None:
-    try:
-        return float(text or "")
-    except ValueError:
-        return None
-
-
-def _pane(
-    table: FloatArray,
-    path: Path,
-    *,
-    name: str,
-    millimetres: float | None,
-    conductivity: float | None,
-    emissivity: Sequence[float | None],
-    infrared: float | None,
-    coated: bool,
-) -> SpectralPane:
-    """The pane of a table [N, 4] of wavelengths [um] and shares."""
-    if not millimetres:
-        raise DataError("states no thickness", file=path)
-    table = table[np.argsort(table[:, 0], kind="stable")]
-    if np.any(np.diff(table[:, 0]) <= 0):
-        raise DataError("names a wavelength twice", file=path)
-    worst = float(np.max(table[:, 1] + table[:, 2:].max(axis=1)))
-    if table[:, 1:].min() < -1e-3 or worst > 1.02:
-        raise DataError(f"T + R reaches {worst:.3f}: expected shares of 1", file=path)
-    front, back = [*(e or EMISSIVITY for e in emissivity), EMISSIVITY, EMISSIVITY][:2]
+    file = read_pane_file(path)
+    if not len(file.spectrum):
+        raise DataError("holds no spectrum", file=file.path, field="spectral_data")
+    if not file.thickness:
+        raise DataError("states no thickness", file=file.path)
+    front, back = (EMISSIVITY if e is None else e for e in file.emissivity)
     return SpectralPane(
-        name, np.round(1000.0 * table[:, 0], 3), *np.clip(table[:, 1:], 0.0, 1.0).T,
-        millimetres / 1000.0, conductivity or 1.0, (front, back), infrared or 0.0, coated,
+        file.name, *file.spectrum.T, file.thickness, file.conductivity or 1.0, (front, back),
+        file.infrared_transmittance or 0.0, file.coated,
     )  # fmt: skip
 
 
@@ -174,7 +91,8 @@ def spectral_glazing(
     angles = np.atleast_1d(np.asarray(theta, dtype=float))
     nm = np.unique(np.concatenate([pane.wavelength_nm for pane in panes]))
     nm = nm[(nm >= 280.0) & (nm <= 4100.0)]
-    stacked = _stack([_at_angles(pane, nm, angles) for pane in panes])
+    whole = stack([_at_angles(pane, nm, angles) for pane in panes])
+    stacked = (whole.tau, whole.rho_front, whole.rho_back, whole.absorptance)
     found = {}
     for band in ("Solar", "Visible"):
         average = visible_average if band == "Visible" else solar_average(spectrum)
@@ -220,55 +138,14 @@ def _averaged(nm: FloatArray, values: FloatArray, average: Average) -> FloatArra
     return np.array([average(nm, column) for column in flat.T]).reshape(values.shape[1:])
 
 
-def _at_angles(pane: SpectralPane, nm: FloatArray, theta: FloatArray) -> tuple[FloatArray, ...]:
-    """Transmittance, front and back reflectance [N, A] of a pane."""
+def _at_angles(pane: SpectralPane, nm: FloatArray, theta: FloatArray) -> PaneOptics:
+    """A pane by wavelength and angle [N, A]."""
     tau, front, back = (
         np.interp(nm, pane.wavelength_nm, values)[:, None]
         for values in (pane.transmittance, pane.reflectance_front, pane.reflectance_back)
     )
     if pane.coated:
         sunlit = solar_value(pane.wavelength_nm, pane.transmittance)
-        shape = CLEAR_SHAPE if sunlit > CLEAR_ABOVE else BRONZE_SHAPE
-        return _coated((tau, front, back), theta, shape)
-    return _uncoated(tau, 0.5 * (front + back), theta)
-
-
-def _coated(
-    values: tuple[FloatArray, ...], theta: FloatArray, shape: tuple[tuple[float, ...], ...]
-) -> tuple[FloatArray, ...]:
-    """Values of clear or bronze glass by angle, scaled; the normal's are kept as measured."""
-    tau, front, back = values
-    cosine = np.cos(theta)[None, :]
-    t = np.clip(np.polynomial.polynomial.polyval(cosine, shape[0]), 0.0, 1.0)
-    r = np.clip(np.polynomial.polynomial.polyval(cosine, shape[1]) - t, 0.0, 1.0)
-    t, r = np.where(theta == 0.0, 1.0, t), np.where(theta == 0.0, 0.0, r)
-    passed = tau * t
-    return passed, *(np.minimum(rho * (1 - r) + r, 1 - passed) for rho in (front, back))
-
-
-def _uncoated(tau: FloatArray, rho: FloatArray, theta: FloatArray) -> tuple[FloatArray, ...]:
-    """Fresnel for both polarisations, index and absorption from tau and rho at the normal."""
-    beta = tau**2 - rho**2 + 2 * rho + 1
-    surface = (beta - np.sqrt(beta**2 - 4 * (2 - rho) * rho)) / (2 * (2 - rho))
-    root = np.sqrt(np.clip(surface, 1e-9, 0.9))
-    index = (1 + root) / (1 - root)
-    inner = np.where(rho > 1e-6, (rho - surface) / np.maximum(surface * tau, 1e-12), tau)
-    cosine = np.cos(np.minimum(theta, np.radians(89.999)))[None, :]
-    tau, rho = pane_shares(cosine, index, np.clip(inner, 1e-9, 1.0))
-    return tau, rho, rho
-
-
-def _stack(panes: Sequence[tuple[FloatArray, ...]]) -> tuple[FloatArray, ...]:
-    """tau, rho_front, rho_back [N, A] and absorptances [N, A, n] of panes one behind the other."""
-    tau, front, back = panes[0]
-    absorbed, from_inside = [1 - tau - front], [1 - tau - back]
-    for t, f, b in panes[1:]:
-        bounce = 1 / (1 - back * f)
-        absorbed = [a + tau * bounce * f * i for a, i in zip(absorbed, from_inside, strict=True)]
-        absorbed.append(tau * bounce * (1 - t - f))
-        returned = t * bounce
-        from_inside = [i * returned for i in from_inside]
-        from_inside.append(1 - t - b + returned * back * (1 - t - f))
-        front = front + tau * tau * bounce * f
-        tau, back = tau * bounce * t, b + returned * back * t
-    return tau, front, back, np.stack(absorbed, axis=-1)
+        return PaneOptics(*coated_values(tau, front, back, theta, clear=sunlit > CLEAR_ABOVE))
+    passed, returned = uncoated_values(tau, 0.5 * (front + back), theta)
+    return PaneOptics(passed, returned, returned)

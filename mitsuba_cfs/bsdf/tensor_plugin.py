@@ -159,13 +159,13 @@ def _register(variant: str) -> None:
             )
 
         def through(self, ctx, known, active):
-            if self.rank == 4:
-                return gather(self.beams, self.through_entry(ctx, known, active), active)
-            place = self.place(known)[0][0] * (2 * self.beam_cells)
-            cell = dr.minimum(mi.UInt32(place), mi.UInt32(self.beam_cells - 1))
-            return gather(
-                self.beams, self.straight_tree(ctx, known) * self.beam_cells + cell, active
-            )
+            incident = known if ctx.mode == mi.TransportMode.Importance else -known
+            cell = self.forward(incident, mi.Mask(True))
+            for coordinate in self.place(incident)[0]:
+                step = coordinate * (self.beam_cells if self.rank == 4 else 2 * self.beam_cells)
+                step = dr.minimum(mi.UInt32(step), mi.UInt32(self.beam_cells - 1))
+                cell = cell * self.beam_cells + step
+            return gather(self.beams, cell, active)
 
         def through_entry(self, ctx, known, active):
             """Leaf that holds the beam: of the drawn trees for rank 4, of the forward ones else."""

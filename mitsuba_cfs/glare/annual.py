@@ -69,18 +69,23 @@ class PictureMatrix:
 
         Args: more: [m, h] luminance of the rows besides.
         """
+        of_rows = self.of_rows(luminance)
+        if more is not None:
+            of_rows += more.T
+        for hour, found in zip(values, of_rows, strict=True):
+            hour += found[self.row] * self.share
+
+    def of_rows(self, luminance: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Luminance [h, m] of the rows under patch luminances [N, h]."""
         across = np.ascontiguousarray(luminance.T, dtype=np.float32)
-        of_rows = np.empty((len(values), len(self.rows)), dtype=np.float32)
+        found = np.empty((len(across), len(self.rows)), dtype=np.float32)
         step = len(self.rows)
         if isinstance(self.rows, np.memmap):
             step = max(1, ROW_BYTES // (4 * self.rows.shape[1]))
         for start in range(0, len(self.rows), step):
             rows = np.asarray(self.rows[start : start + step])
-            np.matmul(across, rows.T, out=of_rows[:, start : start + step])
-        if more is not None:
-            of_rows += more.T
-        for hour, found in zip(values, of_rows, strict=True):
-            hour += found[self.row] * self.share
+            np.matmul(across, rows.T, out=found[:, start : start + step])
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +126,19 @@ class Pictures(Protocol):
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """The same without the sun's disc, and the disc [h] as far as it is seen."""
 
+    @property
+    def shared(self) -> PictureMatrix:
+        """Which pixels share a row of what surfaces reflect."""
+
+    def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """The two parts of `without_disc`: of the shared rows [h, m], and of each pixel [h, n].
+
+        A pixel is its row's luminance times its share, and its own.
+        """
+
+    def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
+        """The sun's disc [h] as far as it is seen."""
+
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Half of what pictures [h, n] of two halves of the paths differ by [cd/m2]."""
 
@@ -155,6 +173,17 @@ class ThreePhasePictures:
         values = np.ascontiguousarray((self.seen @ luminance).T, dtype=np.float32)
         self.reflected.add_to(values, luminance)
         return values
+
+    @property
+    def shared(self) -> PictureMatrix:
+        """See `Pictures`."""
+        return self.reflected
+
+    def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """See `Pictures`."""
+        luminance = flat(self.luminance, self.seen.shape[1])[:, batch]
+        own = np.ascontiguousarray((self.seen @ luminance).T, dtype=np.float32)
+        return self.reflected.of_rows(luminance), own
 
     def without_disc(
         self, batch: NDArray[np.int64]

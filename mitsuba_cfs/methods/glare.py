@@ -24,7 +24,7 @@ from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
-from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.progress import Progress, part, silent
 
 DIRECT_DEPTH = 2  # segments of a direct-only path behind what the eye sees: to window, to sky
@@ -72,6 +72,14 @@ def hourly_glare(
         )
         table[:, columns] = [getattr(rated, name) for name in FIGURES]
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
+
+
+def light_seen_from(light: PhaseLight, view: View, progress: Progress = silent) -> PhaseLight:
+    """The same light seen from another eye: that of the windows is not computed again."""
+    traced = light.filled.traced.seen_from(view, progress)
+    found = PhaseSystems(traced, light.filled.systems).light(light.sky)
+    found.__dict__["windows"] = light.windows
+    return found
 
 
 def pictures(

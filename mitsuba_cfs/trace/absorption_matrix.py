@@ -16,7 +16,8 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sampling import opaque
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 
@@ -29,8 +30,8 @@ def _absorption_kernel(
     """Random walk of a unit of flux: each surface and window takes what it does not reflect."""
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
-    F = mi.UInt32(tracer.surface_count)
-    width = mi.UInt32(tracer.surface_count + len(tracer.groups))
+    F = opaque(tracer.surface_count, mi.UInt32)
+    width = opaque(tracer.surface_count + len(tracer.groups), mi.UInt32)
     beta = mi.Float(1.0)
     depth = mi.UInt32(0)
     while active:
@@ -83,13 +84,13 @@ def absorption_matrix(
     """
     reflectance = np.zeros(len(groups)) if window_reflectance is None else window_reflectance
     reflectance = np.asarray(reflectance, dtype=float)
-    tracer = TracedScene(surfaces, groups, window_reflectance=reflectance)
+    tracer = traced_scene(surfaces, groups, window_reflectance=reflectance)
     bins = DirectionBins(basis)
     n = int(samples)
     width = tracer.surface_count + len(groups)
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
-        normal = mi.Vector3f(*map(float, groups[paths.group].frame[2]))
+        normal = tracer.exterior_normal(paths.group)
         position = mi.Point3f(paths.position - normal * tracer.epsilon)
         depth = dr.opaque(mi.UInt32, max_depth)
         starts = PathStarts(

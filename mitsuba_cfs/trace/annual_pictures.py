@@ -33,7 +33,8 @@ from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sampling import tables, vectors
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
 NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
@@ -95,7 +96,7 @@ def view_matrices(
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
         options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
-    tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
+    tracer = traced_scene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
     pixels, row, group, keys = _tiles(tracer, view, tile)
     m, half = len(keys), 2 * row + _second_half(pixels, view)
@@ -184,15 +185,15 @@ def _tiles(tracer: TracedScene, view: View, tile: int) -> tuple[NDArray[np.int64
     """
     directions, counts = pixel_directions(view)
     pixels = np.flatnonzero(counts.reshape(-1))
-    way = mi.Vector3f(directions.reshape(-1, 3)[pixels].T.astype(np.float32))
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+    way = vectors(directions.reshape(-1, 3)[pixels])
+    eye = tracer.place(view.position)
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(eye, way), coherent=True)
     valid = hit.is_valid()
     group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
     group = group.numpy().astype(np.int64)
     if tile == 1:
         return pixels, np.arange(len(pixels)), group, np.arange(len(pixels))
-    faces = 1 + face_numbers(tracer.surface.numpy(), tracer.normal.numpy().T)
+    faces = 1 + face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
     windows = faces.max() + 1 + group  # apart from surfaces in their plane
     face = faces[np.where(valid.numpy(), hit.prim_index.numpy().astype(np.int64), 0)]
     face = np.where(valid.numpy(), np.where(group == OPAQUE, face, windows), 0)
@@ -297,8 +298,16 @@ class FivePhasePictures:
         self, batch: NDArray[np.int64]
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
-        discs = self._sun.discs(self._directions[batch], self._illuminance[batch])
-        return self._values(batch), discs
+        return self._values(batch), self.discs(batch)
+
+    def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        return self._sun.discs(self._directions[batch], self._illuminance[batch])
+
+    @property
+    def shared(self) -> PictureMatrix:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        return self._matrices.lit
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
@@ -315,6 +324,14 @@ class FivePhasePictures:
 
     def _values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Luminance [h, n] without the sun's disc."""
+        rows, values = self.by_rows(batch)
+        m = self._matrices.lit
+        for hour, found in zip(values, rows, strict=True):
+            hour += found[m.row] * m.share
+        return values
+
+    def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
         m, rest = self._matrices, self._rest[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength)
@@ -328,13 +345,12 @@ class FivePhasePictures:
             seen.sun.add_to(values, suns, strength, seen.reflected @ sky)
             if seen.rough is not None:
                 seen.rough.add_to(values, suns, strength)
-        more = None
+        rows = m.indirect.of_rows(self._reflected[:, batch])
+        rows += m.lit.of_rows(rest + scattered.reshape(rest.shape))
         if self._elements is not None:
-            more = self._sun.on_elements(self._elements, suns, strength)
-        m.indirect.add_to(values, self._reflected[:, batch], more)
-        m.lit.add_to(values, rest + scattered.reshape(rest.shape))
+            rows += self._sun.on_elements(self._elements, suns, strength).T
         self._sun.add_to(values, suns, strength)
-        return values
+        return rows, values
 
 
 def _storage(shape: tuple[int, int], on_disk: bool, folder: Path | None) -> NDArray[np.float32]:

@@ -17,8 +17,8 @@ from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.estimate import Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of, vectors
+from mitsuba_cfs.trace.scene import traced_scene
 from mitsuba_cfs.window_parts import Cells
 
 BATCHES = 2
@@ -43,7 +43,7 @@ def cell_daylight(
 
     Args: samples: paths of each cell and patch in each of 2 batches.
     """
-    tracer = TracedScene(surfaces, groups)
+    tracer = traced_scene(surfaces, groups)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     frames = np.concatenate(
         [np.tile(g.frame, (len(c.area), 1, 1)) for g, c in zip(groups, cells, strict=True)]
@@ -57,11 +57,11 @@ def cell_daylight(
         )
     )
     C, K, P, n = len(corner), bins.size, sky.size, int(samples)
-    tables = [mi.Vector3f(v.T.astype(np.float32)) for v in (corner, across, up)]
-    axes = [mi.Vector3f(frames[:, i].T.astype(np.float32)) for i in range(3)]
+    tables = [vectors(v) for v in (corner, across, up)]
+    axes = [vectors(frames[:, i]) for i in range(3)]
 
     def batch(number: int) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, C * K * P)
+        matrix = empty_sums(C * K * P)
         count = dr.opaque(mi.UInt32, n)
         lane = dr.arange(mi.UInt32, C * K * n)
         row = lane // count  # cell and patch
@@ -82,7 +82,7 @@ def cell_daylight(
             mi.Bool(True),
         )
         add_daylight_paths(tracer, sky, matrix, starts)
-        return matrix.numpy().reshape(C, K, P) / n
+        return sums_of(matrix, (C, K, P)) / n
 
     stopping = Stopping(batches=BATCHES)
     found = accumulate(

@@ -20,8 +20,15 @@ from mitsuba_cfs.trace.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sampling import (
+    empty_sums,
+    lattice_2d,
+    opaque,
+    path_generator,
+    sums_of,
+    vectors,
+)
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 
@@ -104,13 +111,13 @@ def daylight_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
     something = len(surfaces.triangles) > 0  # light comes back to the windows
-    tracer = TracedScene(surfaces, groups, windows_block=something)
+    tracer = traced_scene(surfaces, groups, windows_block=something)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     n = int(samples)
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         depth = dr.opaque(mi.UInt32, max_depth)
-        clear = tracer.outward(mi.Int32(paths.group), mi.Bool(True)) if something else 0.0
+        clear = tracer.outward(opaque(paths.group, mi.Int32), mi.Bool(True)) if something else 0.0
         place = mi.Point3f(paths.position + clear)
         starts = PathStarts(
             paths.patch, place, paths.outward, paths.generator, depth, mi.Bool(True)
@@ -164,11 +171,11 @@ def sky_irradiance_matrix(
     sky = SkyBins(ReinhartSky(subdivision))
     accepted = AcceptedDirections(acceptance)
     S, P, n = len(points), sky.size, int(samples)
-    place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - tracer.centre, mi.Point3f)
+    normal = vectors(directions)
 
     def batch(number: int) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, S * P)
+        matrix = empty_sums(S * P)
         count = dr.opaque(mi.UInt32, n)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
@@ -184,7 +191,7 @@ def sky_irradiance_matrix(
             mi.Bool(True),
         )
         add_daylight_paths(tracer, sky, matrix, starts)
-        return matrix.numpy().reshape(S, P) * (accepted.total / n)
+        return sums_of(matrix, (S, P)) * (accepted.total / n)
 
     return accumulate(
         batch,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,8 +17,8 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of, vectors
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 
 SIDES = ("west", "east", "south", "north", "floor", "ceiling")  # of the box round a room
 FIGURES = 4  # share, and share times x, y, z
@@ -59,18 +60,18 @@ def escaped_view(
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
-    tracer = TracedScene(surfaces, groups)
+    tracer = traced_scene(surfaces, groups)
     corners = np.concatenate(
         [surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]
     ).reshape(-1, 3)
-    box = [mi.Point3f(*map(float, f(axis=0) - tracer.centre)) for f in (corners.min, corners.max)]
+    box = [tracer.place(f(axis=0)) for f in (corners.min, corners.max)]
     S, n = len(points), int(samples)
-    place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - tracer.centre, mi.Point3f)
+    normal = vectors(directions)
     shape = (S, len(SIDES), FIGURES)
 
     def batch(number: int) -> NDArray[np.float64]:
-        sums = dr.zeros(mi.Float64, int(np.prod(shape)))
+        sums = empty_sums(math.prod(shape))
         count = dr.opaque(mi.UInt32, n)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
@@ -86,7 +87,7 @@ def escaped_view(
             mi.Bool(True),
         )
         _add_escapes(tracer, *box, sums, starts)
-        return sums.numpy().reshape(shape) / n
+        return sums_of(sums, shape) / n
 
     found = accumulate(
         batch,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -15,8 +16,16 @@ from mitsuba_cfs.images.view import View, pixel_directions, rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.sampling import path_generator, pixel_places
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sampling import (
+    column,
+    empty_sums,
+    opaque,
+    path_generator,
+    pixel_places,
+    sums_of,
+    vectors,
+)
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
@@ -86,7 +95,7 @@ def picture_part_blocks(
         samples: paths for each pixel, at as many places within it.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
     """
-    tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
+    tracer = traced_scene(surfaces, groups, window_reflectance=window_reflectance)
     bins = DirectionBins(basis)
     shape = (len(groups), bins.size)
     size = max(256, BLOCK_BYTES // (8 * PARTS * int(np.prod(shape))))
@@ -111,9 +120,10 @@ def _block(
     seed: int,
 ) -> NDArray[np.float32]:
     """Rows [PARTS * n, G * K] of some pixels."""
-    matrix = dr.zeros(mi.Float64, PARTS * len(pixels) * bins.size * len(tracer.groups))
-    eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
-    number = mi.UInt32(pixels.astype(np.uint32))
+    shape = PARTS * len(pixels), bins.size * len(tracer.groups)
+    matrix = empty_sums(math.prod(shape))
+    eye = tracer.place(view.position)
+    number = column(pixels, mi.UInt32)
     for j, (dx, dy) in enumerate(pixel_places(samples)):
         x = (pixels % view.width + dx) / view.width
         y = 1.0 - (pixels // view.width + dy) / view.height
@@ -123,8 +133,8 @@ def _block(
             bins,
             matrix,
             eye,
-            mi.Vector3f(directions.T.astype(np.float32)),
-            mi.Bool(exists),
+            vectors(directions),
+            column(exists, mi.Bool),
             row=dr.arange(mi.UInt32, dr.width(number)),
             apart=dr.opaque(mi.UInt32, len(pixels)),
             stream=number,
@@ -135,7 +145,7 @@ def _block(
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
         dr.eval(matrix)
-    return (matrix.numpy() / samples).astype(np.float32)
+    return (sums_of(matrix, shape) / samples).astype(np.float32)
 
 
 def add_picture_paths(
@@ -155,7 +165,7 @@ def add_picture_paths(
 ) -> None:
     """One path for each lane: L = 1 of the patch seen directly, else rho / pi E of the surface."""
     K = mi.UInt32(bins.size)
-    width = mi.UInt32(bins.size * len(tracer.groups))
+    width = opaque(bins.size * len(tracer.groups), mi.UInt32)
     ray = mi.Ray3f(eye, direction)
     hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active = active & hit.is_valid()

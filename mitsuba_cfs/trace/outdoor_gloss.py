@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.trace.picture_sun import LANES
-from mitsuba_cfs.trace.sampling import path_generator
+from mitsuba_cfs.trace.sampling import path_generator, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, place_and_hour
 
@@ -56,8 +56,8 @@ def mirrored(
     none = np.empty(0, dtype=np.int64)
     if tracer.gloss is None or bounce >= MOST_MIRRORS or not len(lanes.row):
         return lanes.some(none)
-    way, found = mi.Vector3f(lanes.way), hit.is_valid()
-    position, face, _ = tracer.surface_at(hit, mi.Point3f(lanes.origin), way, found)
+    way, found = vectors(lanes.way.T), hit.is_valid()
+    position, face, _ = tracer.surface_at(hit, vectors(lanes.origin.T, mi.Point3f), way, found)
     lane = dr.arange(mi.UInt32, len(lanes.row))
     glossy, towards, weight = tracer.gloss.leave(
         hit.prim_index, face, way, mi.Float(0), path_generator(lane, mi.UInt32(bounce)), found
@@ -105,7 +105,7 @@ class RoughSun:
         self._weight = np.bincount(place, faces.weight, minlength=len(first)).astype(np.float32)
         self._pixel, self._places = faces.pixel[first], faces.places.some(first)
         self._triangle = mi.UInt32(faces.triangle[first].astype(np.uint32))
-        self._way = mi.Vector3f(faces.way[:, first])
+        self._way = vectors(faces.way[:, first].T)
 
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
         """Add the luminance [cd/m2] to the pixels' values [h, n]."""

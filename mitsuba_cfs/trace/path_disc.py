@@ -20,6 +20,7 @@ from mitsuba_cfs.trace.picture_disc import (
     disc_rays,
     disc_reach,
 )
+from mitsuba_cfs.trace.sampling import vectors
 from mitsuba_cfs.trace.scene import TracedScene
 
 DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
@@ -69,7 +70,7 @@ def _by_plane(
 
     def shown(ways: NDArray[np.float64]) -> NDArray[np.float32]:
         onwards = ways - 2 * (ways @ normal)[:, None] * normal
-        towards, beyond = (mi.Vector3f(v.T.astype(np.float32)) for v in (ways, onwards))
+        towards, beyond = (vectors(v) for v in (ways, onwards))
         return by_plane(
             room, tracer, mi.Int32(plane), eye_of(room, view), towards, onwards=beyond,
             outdoors=mi.Bool(False), active=dr.full(mi.Bool, True, len(ways)),
@@ -99,7 +100,7 @@ def _add(
 
 def _straight(room: LitRoom, view: View, ways: NDArray[np.float64]) -> NDArray[np.float32]:
     """Transmittance [n] of the straight way from the eye to the sky in directions [n, 3]."""
-    towards = mi.Vector3f(ways.T.astype(np.float32))
+    towards = vectors(ways)
     active = dr.full(mi.Bool, True, len(ways))
     return straight_to_sky(room, eye_of(room, view), towards, mi.Bool(False), active).numpy()
 
@@ -111,4 +112,4 @@ def pixel_size(view: View) -> float:
 
 def eye_of(room: LitRoom, view: View) -> mi.Point3f:
     """The eye in the tracer's coordinates."""
-    return mi.Point3f(*map(float, np.asarray(view.position) - room.inside.centre))
+    return room.inside.place(view.position)

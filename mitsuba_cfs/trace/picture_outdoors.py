@@ -21,13 +21,22 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, RoughSun, mirrored
 from mitsuba_cfs.trace.outdoor_sun import OutdoorSun, ShownFaces
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator, pixel_places
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sampling import (
+    column,
+    empty_sums,
+    lattice_2d,
+    path_generator,
+    pixel_places,
+    sums_of,
+    tables,
+    vectors,
+)
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import Places, face_places
 
 BLOCK_BYTES = 128 * 2**20
@@ -72,11 +81,11 @@ def outdoors(
         tile: pixels across of the squares that share what varies slowly over a face, by default
             as of `tile_size`.
     """
-    inside = TracedScene(interior, groups)
-    outside = TracedScene(exterior, groups)
+    inside = traced_scene(interior, groups)
+    outside = traced_scene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
-    faces = face_numbers(outside.surface.numpy(), outside.normal.numpy().T)
+    faces = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])
     rays_at_once = max(256, RAYS // samples)
     free, shown, rough = [], [], []
     for start in range(0, len(pixels), rays_at_once):
@@ -139,7 +148,7 @@ def _passed(
     inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes, bounce: int
 ) -> tuple[Lanes, Lanes]:
     """Rays that go straight on through windows, and those that go on by glossy surfaces."""
-    origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
+    origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=not bounce)
     active = hit.is_valid()
     group = dr.gather(mi.Int32, inside.group, hit.prim_index, active)
@@ -149,9 +158,10 @@ def _passed(
     for g, system in enumerate(scattering):
         seen = active & (group == g) & (local.z > 0)
         weight = dr.select(seen, system.through(local), weight)
-    tau = np.broadcast_to(weight.numpy(), len(lanes.row)).astype(float)
+    tau, place = tables(weight, mi.Point3f(origin + way * hit.t))
+    tau = np.broadcast_to(tau, len(lanes.row)).astype(float)
     lit = np.flatnonzero(tau > 0)
-    place = mi.Point3f(origin + way * hit.t).numpy()[:, lit].astype(np.float32)
+    place = np.broadcast_to(place, (len(lanes.row), 3)).T[:, lit]
     passed = Lanes(lanes.row[lit], place, lanes.way[:, lit], (lanes.weight * tau)[lit])
     return passed, mirrored(inside, lanes, hit, bounce)
 
@@ -160,16 +170,18 @@ def _looked_at(
     outside: TracedScene, sky: SkyBins, lanes: Lanes, count: int, bounce: int
 ) -> tuple[sparse.csr_array, _Met, Lanes]:
     """Rows [count, P] of what is sky; what the other lanes met; lanes that go on by its gloss."""
-    origin, way = mi.Point3f(lanes.origin), mi.Vector3f(lanes.way)
+    origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
     found = hit.is_valid()
     face = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, found)
-    rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found).numpy()
-    places = face_places(outside, origin, way, hit, found)
-    met, patch = found.numpy(), sky.index(way).numpy().astype(np.int64)
+    rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found)
+    places, met, rho, patch, prim = face_places(
+        outside, origin, way, hit, found, found, rho, sky.index(way), hit.prim_index
+    )
+    patch = patch.astype(np.int64)
     entries = lanes.weight[~met].astype(np.float32), (lanes.row[~met], patch[~met])
     rows = sparse.csr_array(sparse.coo_array(entries, shape=(count, sky.size)))
-    prim = hit.prim_index.numpy().astype(np.int64)[met]
+    prim = prim.astype(np.int64)[met]
     onwards = mirrored(outside, lanes, hit, bounce)
     return rows, (lanes.some(met), prim, rho[met], places.some(met)), onwards
 
@@ -215,14 +227,12 @@ def _reflected(
         end = min(start + size, count)
         mine = order[ends[start] : ends[end]]
         tile, places = shown.tile[mine] - start, shown.places.some(mine)
-        matrix = dr.zeros(mi.Float64, (end - start) * sky.size)
-        generator = path_generator(
-            mi.UInt32(mine.astype(np.uint32)), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-        )
+        matrix = empty_sums((end - start) * sky.size)
+        generator = path_generator(column(mine, mi.UInt32), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
         u = mi.Point2f(generator.next_float32(), generator.next_float32())
         away = mi.warp.square_to_cosine_hemisphere(u)
         starts = PathStarts(
-            mi.UInt32(tile.astype(np.uint32)),
+            column(tile, mi.UInt32),
             places.points(),
             mi.Frame3f(places.normals()).to_world(away),
             generator,
@@ -230,7 +240,7 @@ def _reflected(
             mi.Bool(True),
         )
         add_daylight_paths(outside, sky, matrix, starts)
-        values = matrix.numpy().reshape(end - start, sky.size)
+        values = sums_of(matrix, (end - start, sky.size))
         values *= np.pi / np.bincount(tile, minlength=end - start)[:, None]
         blocks.append(sparse.csr_array(values.astype(np.float32)))
     return sparse.csr_array(sparse.vstack(blocks))

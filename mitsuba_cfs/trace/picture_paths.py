@@ -36,7 +36,14 @@ from mitsuba_cfs.trace.picture_sharing import (
 )
 from mitsuba_cfs.trace.point_in_time import add_paths, leave, window_parts, window_sun
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice, lattice_2d, path_generator, pixel_places
+from mitsuba_cfs.trace.sampling import (
+    lattice,
+    lattice_2d,
+    path_generator,
+    pixel_places,
+    tables,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 BLOCK = 2**19  # paths traced at a time
@@ -134,7 +141,7 @@ class _Faces:
 
     @staticmethod
     def _table(scene: TracedScene) -> tuple[mi.UInt32, int]:
-        face = face_numbers(scene.surface.numpy(), scene.normal.numpy().T)
+        face = face_numbers(scene.surface.numpy(), tables(scene.normal)[0])
         return mi.UInt32(face.astype(np.uint32)), int(face.max()) + 1
 
     def inside(self, prim: mi.UInt32, behind: mi.Bool, active: mi.Bool) -> mi.UInt32:
@@ -207,7 +214,7 @@ class _Kernel:
         x = (number % self._view.width + places[:, 0]) / self._view.width
         y = 1.0 - (number // self._view.width + places[:, 1]) / self._view.height
         directions, exists = rays(self._view, x, y)
-        way = mi.Vector3f(directions.T.astype(np.float32))
+        way = vectors(directions)
         path = mi.UInt32(number.astype(np.uint32)) * n + dr.arange(mi.UInt32, len(number)) % n
         generator = path_generator(path, self._key)
         stream, sample = self._strata(number)

@@ -16,7 +16,6 @@ from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.picture_disc import (
     before_eye,
     disc_parts,
@@ -25,8 +24,9 @@ from mitsuba_cfs.trace.picture_disc import (
 )
 from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.room_sun import SunElements
-from mitsuba_cfs.trace.sampling import lattice_2d
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, opaque_vector, vectors
+from mitsuba_cfs.trace.scene import OPAQUE, traced_scene
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import on_disc_of, place_and_hour
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
@@ -60,8 +60,8 @@ class PictureSun:
         """
         if len(scattering) != len(groups):
             raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
-        self._inside = TracedScene(interior, groups)
-        self._outside = TracedScene(exterior, groups, windows_block=False)
+        self._inside = traced_scene(interior, groups)
+        self._outside = traced_scene(exterior, groups, windows_block=False)
         self._way = SunWay(self._outside) if way is None else way
         self._free = self._way.free
         around = interior, exterior, groups, scattering, view
@@ -75,13 +75,13 @@ class PictureSun:
         self._directions = directions.reshape(-1, 3)[shown]
         self._tree = cKDTree(self._directions)
         self._size = float(np.sqrt(pixel_solid_angles(view).max()))  # of a pixel [rad]
-        self._eye = mi.Point3f(*map(float, np.asarray(view.position) - self._inside.centre))
+        self._eye = self._inside.place(view.position)
         self._look()
 
     def _look(self) -> None:
         """Trace every pixel's middle: its window group, place, normal and reflectance."""
         tracer = self._inside
-        direction = mi.Vector3f(self._directions.T.astype(np.float32))
+        direction = vectors(self._directions)
         hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(self._eye, direction), coherent=True)
         valid = hit.is_valid()
         group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
@@ -91,7 +91,7 @@ class PictureSun:
         reflectance = tracer.diffuse(hit.prim_index, -dr.dot(face, direction), valid)
         dull = valid & (group == OPAQUE) & (reflectance > 0)
         self._surface = np.flatnonzero(dull.numpy())
-        chosen = mi.UInt32(self._surface.astype(np.uint32))
+        chosen = column(self._surface, mi.UInt32)
         self._place = dr.gather(mi.Point3f, mi.Point3f(place), chosen)
         self._normal = dr.gather(mi.Vector3f, face, chosen)
         self._reflectance = dr.gather(mi.Float, reflectance, chosen)
@@ -101,10 +101,10 @@ class PictureSun:
             if not len(pane):  # the view shows nothing of this group
                 self._panes.append((pane, None, None))
                 continue
-            chosen = mi.UInt32(pane.astype(np.uint32))
+            chosen = column(pane, mi.UInt32)
             towards = tracer.to_group(g, dr.gather(mi.Vector3f, direction, chosen))
             point = dr.gather(mi.Point3f, mi.Point3f(self._eye + direction * hit.t), chosen)
-            step = mi.Vector3f(*map(float, tracer.groups[g].frame[2])) * tracer.epsilon
+            step = tracer.exterior_normal(g) * tracer.epsilon
             self._panes.append((pane, mi.Point3f(point + step), towards))
 
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
@@ -169,7 +169,7 @@ class PictureSun:
         if not len(lit):
             return found
         ways = np.stack([disc_parts(suns[hour]) for hour in lit])
-        towards = mi.Vector3f(ways.reshape(-1, 3).T.astype(np.float32))
+        towards = vectors(ways.reshape(-1, 3))
         tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
         tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
         for hour, way, part in zip(lit, ways, tau * before_eye(self._view, ways), strict=True):
@@ -186,7 +186,7 @@ class PictureSun:
         step = max(1, LANES // len(columns))
         for start in range(0, len(lit), step):
             part = slice(start, start + step)
-            towards = mi.Vector3f(suns[part].T.astype(np.float32))
+            towards = vectors(suns[part])
             light = mi.Float(strength[part].astype(np.float32))
             lane = dr.arange(mi.UInt32, len(columns) * dr.width(light))
             width = dr.opaque(mi.UInt32, len(columns))
@@ -230,14 +230,14 @@ class PictureSun:
 
         Args: number: [r] of the place, that its point on the disc goes by.
         """
-        tracer, direction = self._inside, mi.Vector3f(way.T.astype(np.float32))
+        tracer, direction = self._inside, vectors(way)
         ray = mi.Ray3f(self._eye, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False)
         shown = hit.is_valid()
         place, normal, rho = tracer.surface_at(hit, self._eye, direction, shown)
         shown &= dr.gather(mi.Int32, tracer.group, hit.prim_index, shown) == OPAQUE
-        places = mi.UInt32(number.astype(np.uint32))
-        to_sun = on_disc_of(mi.Vector3f(suns.T.astype(np.float32)), places)
+        places = column(number, mi.UInt32)
+        to_sun = on_disc_of(vectors(suns), places)
         cosine = dr.dot(normal, to_sun)
         tau = self._straight(place, to_sun, shown & (cosine > 0))
         return dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0).numpy()
@@ -285,7 +285,7 @@ class PictureSun:
         strength = np.maximum(illuminance, 0.0)
         if not strength.any():
             return result
-        towards = mi.Vector3f(suns.T.astype(np.float32))
+        towards = vectors(suns)
         lane = dr.arange(mi.UInt32, K * PATCH_POINTS * h)
         hours = dr.opaque(mi.UInt32, h)
         sample = lane // hours
@@ -307,9 +307,9 @@ class PictureSun:
         lane = dr.arange(mi.UInt32, WINDOW_POINTS * dr.width(suns))
         hour = lane // WINDOW_POINTS
         place = self._inside.sample_group(
-            g, lattice_2d(lane - hour * WINDOW_POINTS, mi.UInt32(g), 0)
+            g, lattice_2d(lane - hour * WINDOW_POINTS, opaque(g, mi.UInt32), 0)
         )
-        step = mi.Vector3f(*map(float, self._inside.groups[g].frame[2])) * self._inside.epsilon
+        step = self._inside.exterior_normal(g) * self._inside.epsilon
         ray = mi.Ray3f(place + step, dr.gather(mi.Vector3f, suns, hour))
         seen = self._way.reaching(ray, dr.full(mi.Bool, True, dr.width(lane)))
         return seen.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
@@ -333,7 +333,7 @@ class PictureSun:
         pair, way, share = disc_rays(self._view, self.pixels[pixel], suns[hour], self._size)
         if not len(pair):
             return
-        towards = mi.Vector3f(way.T.astype(np.float32))
+        towards = vectors(way)
         if mirror is None:
             tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
         else:
@@ -344,7 +344,7 @@ class PictureSun:
     def _by_mirror(self, towards: mi.Vector3f, plane: int) -> mi.Float:
         """Share of the sun that comes to the eye by a mirror plane of the room."""
         gloss = self._inside.gloss
-        normal = mi.Vector3f(*map(float, gloss.normals[plane]))
+        normal = opaque_vector(gloss.normals[plane])
         ray = mi.Ray3f(mi.Point3f(self._eye), towards)
         hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True)
         met = hit.is_valid()

@@ -23,7 +23,7 @@ from mitsuba_cfs.trace.path_sun import (
     surface_sun,
 )
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import path_generator
+from mitsuba_cfs.trace.sampling import path_generator, vectors
 from mitsuba_cfs.trace.scene import OPAQUE
 
 CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
@@ -356,8 +356,8 @@ def sensor_batches(
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
     S, n = len(points), int(samples)
-    place = mi.Point3f((points - room.inside.centre).T.astype(np.float32))
-    normals = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - room.inside.centre, mi.Point3f)
+    normals = vectors(directions)
 
     def batch(number: int) -> NDArray[np.float64]:
         result = dr.zeros(mi.Float64, S * sky.columns)

@@ -26,7 +26,7 @@ from scipy import sparse
 
 from mitsuba_cfs.images.view import View, pixel_solid_angles, rays
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS
-from mitsuba_cfs.trace.sampling import lattice_2d, pixel_places
+from mitsuba_cfs.trace.sampling import column, lattice_2d, pixel_places, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 
@@ -135,16 +135,17 @@ class _Look:
         """What rays of pixels find near, stratified over the pixels of a row by their number."""
         shown = self._shown(pixels, samples)
         of_row, sample = row[shown.ray], number[shown.ray] * samples + shown.sample
-        stream = mi.UInt32((of_row + self._seed * 1_000_003 & 0xFFFFFFFF).astype(np.uint32))
-        u = lattice_2d(mi.UInt32(sample.astype(np.uint32)), stream, 0)
+        stream = column(of_row + self._seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
+        u = lattice_2d(column(sample, mi.UInt32), stream, 0)
         point, normal = shown.places.points(), shown.places.normals()
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         hit = self._tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
         found = hit.is_valid()
-        rho = dr.gather(mi.Float, self._tracer.reflectance, hit.prim_index, found).numpy()
-        met, path = face_places(self._tracer, point, way, hit, found), np.arange(len(rho))
+        rho = dr.gather(mi.Float, self._tracer.reflectance, hit.prim_index, found)
+        met, found, rho = face_places(self._tracer, point, way, hit, found, found, rho)
+        path = np.arange(len(rho))
         distance = shown.distance(path, met)
-        weight = np.where(found.numpy(), rho * shown.value * (1 - shown.far_share(path, met)), 0.0)
+        weight = np.where(found, rho * shown.value * (1 - shown.far_share(path, met)), 0.0)
         some = np.flatnonzero(weight > 0)
         finer = np.log2(self._edge / (FINENESS * np.maximum(distance[some], 1e-6)))
         halvings = np.clip(np.ceil(finer), 0, HALVINGS).astype(np.int64)
@@ -152,19 +153,20 @@ class _Look:
 
     def _shown(self, pixels: NDArray[np.int64], samples: int) -> _Shown:
         tracer, view = self._tracer, self._view
-        eye = mi.Point3f(*map(float, np.asarray(view.position) - tracer.centre))
+        eye = tracer.place(view.position)
         dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
         number = np.repeat(pixels, samples)
         x, y = (number % view.width + dx) / view.width, number // view.width + dy
         directions, exists = rays(view, x, 1.0 - y / view.height)
-        way = mi.Vector3f(directions.T.astype(np.float32))
+        way = vectors(directions)
         ray = mi.Ray3f(eye, way)
-        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=mi.Bool(exists))
-        found = mi.Bool(exists) & hit.is_valid()
-        rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found).numpy()
-        places = face_places(tracer, eye, way, hit, found)
-        kept = np.flatnonzero(found.numpy() & (rho > 0))
-        reach = np.maximum(self._near * hit.t.numpy()[kept], 1e-6)
+        exist = column(exists, mi.Bool)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=exist)
+        found = exist & hit.is_valid()
+        rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
+        places, found, rho, far = face_places(tracer, eye, way, hit, found, found, rho, hit.t)
+        kept = np.flatnonzero(found & (rho > 0))
+        reach = np.maximum(self._near * far[kept], 1e-6)
         value = rho[kept] / (np.pi * samples)
         return _Shown(kept // samples, kept % samples, value, places.some(kept), reach)
 

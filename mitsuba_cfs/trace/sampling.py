@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 SHIFT_ROUNDS = 8
+PADDED = 1 << 21  # sums from which on their number is what is asked for
+ALIGNMENT = 64  # of memory that kernels load whole vectors from [bytes]
 _DIMENSIONS = 6  # dimensions of the lattice; later decisions of a path are random
 
 
@@ -50,9 +56,98 @@ def path_generator(path: mi.UInt32, seed: mi.UInt32) -> mi.PCG32:
     return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
 
 
-def opaque(value: int | float, kind: type) -> object:
-    """A number that may change between calls without a new compilation of the kernel."""
-    return dr.opaque(kind, value)
+def opaque(value: int | float, kind: type | None = None) -> Any:
+    """A number that may change between calls without a new compilation of the kernel.
+
+    Args: kind: `mi.Float` by default.
+    """
+    kind = mi.Float if kind is None else kind
+    return dr.opaque(kind, float(value) if kind is mi.Float else int(value))
+
+
+def opaque_vector(values: ArrayLike) -> mi.Vector3f:
+    """A direction that may change between calls without a new compilation of the kernel."""
+    return mi.Vector3f(*map(opaque, np.asarray(values, dtype=float)))
+
+
+def column(values: ArrayLike, kind: type | None = None) -> Any:
+    """Values [n] as a kernel takes them, one for each lane.
+
+    Dr.Jit compiles one kernel for memory that begins at the width of its vectors and another for
+    any other; NumPy's begins now here, now there.
+
+    Args: kind: `mi.Float` by default.
+    """
+    kind = mi.Float if kind is None else kind
+    names = {mi.Float: np.float32, mi.UInt32: np.uint32, mi.Bool: np.bool_}
+    given = np.asarray(values, dtype=names[kind])
+    memory = np.empty(given.nbytes + ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    aligned = memory[start : start + given.nbytes].view(given.dtype)
+    aligned[:] = given
+    return kind(aligned)
+
+
+def vectors(table: ArrayLike, kind: type | None = None) -> Any:
+    """A table [n, 3] as a kernel takes it, axis by axis: as a whole its n would be a literal.
+
+    Args: kind: `mi.Vector3f` by default.
+    """
+    return (mi.Vector3f if kind is None else kind)(*map(column, np.asarray(table).T))
+
+
+def tables(*found: Any) -> list[NDArray[Any]]:
+    """What a kernel gives, all from one launch: vectors as tables [n, 3], the others as [n]."""
+    dr.eval(*found)
+    return [
+        np.stack(np.broadcast_arrays(*(axis.numpy() for axis in one)), axis=1)
+        if dr.depth_v(one) > 1
+        else one.numpy()
+        for one in found
+    ]
+
+
+def empty_sums(count: int) -> mi.Float64:
+    """Zeros to add up to in a kernel, at least so many, for `sums_of`.
+
+    Dr.Jit gives each thread a copy of what is not large and writes its size into the kernel: it is
+    a power of two, so that few kernels differ in it.
+    """
+    return dr.zeros(mi.Float64, count if count > PADDED else 1 << (count - 1).bit_length())
+
+
+def sums_of(sums: mi.Float64, shape: Sequence[int]) -> NDArray[np.float64]:
+    """What a kernel has added up, as an array of a shape."""
+    return sums.numpy()[: math.prod(shape)].reshape(shape)
+
+
+class DiscreteDistribution:
+    """Numbers drawn by weights, as `mi.DiscreteDistribution`, whose kernels hang on their count."""
+
+    STEPS = 4  # of the search: kernels differ by so many halvings of the table
+
+    def __init__(self, weights: NDArray[np.float64]) -> None:
+        """From weights [n], not all zero."""
+        weights = np.asarray(weights, dtype=np.float32)
+        climbed = np.cumsum(weights, dtype=float)
+        some = np.flatnonzero(weights > 0)
+        self._first, self._last = (opaque(end, mi.UInt32) for end in (some[0], some[-1]))
+        self._weight, self._climbed = mi.Float(weights), mi.Float(climbed.astype(np.float32))
+        self._sum = opaque(climbed[-1])
+        self._norm = opaque(np.float32(1) / np.float32(climbed[-1]))
+        self._steps = -(-int(some[-1] - some[0] + 1).bit_length() // self.STEPS) * self.STEPS
+
+    def sample_reuse(self, u: mi.Float, active: mi.Bool = True) -> tuple[mi.UInt32, mi.Float]:
+        """The number that u in [0, 1) stands for, and u within its share, in [0, 1) again."""
+        mark, low, high = u * self._sum, mi.UInt32(self._first), mi.UInt32(self._last)
+        for _ in range(self._steps):
+            middle = (low + high) >> 1
+            above = dr.gather(mi.Float, self._climbed, middle, active) < mark
+            low = dr.select(above, dr.minimum(middle + 1, high), low)
+            high = dr.select(above, high, middle)
+        share = dr.gather(mi.Float, self._weight, low, active) * self._norm
+        before = dr.gather(mi.Float, self._climbed, low - 1, active & (low > 0)) * self._norm
+        return low, (u - before) / share
 
 
 def pixel_places(samples: int) -> NDArray[np.float64]:

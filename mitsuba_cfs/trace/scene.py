@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -13,9 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
 from mitsuba_cfs.trace.random_walk import diffuse_direction
-from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.sampling import (
+    DiscreteDistribution,
+    lattice_2d,
+    opaque,
+    opaque_vector,
+    vectors,
+)
 from mitsuba_cfs.trace.traced_gloss import TracedGloss
 
+KEPT = 6  # scenes that are found again: what one room is traced by, indoors and outdoors
 OPAQUE = -1  # window index of a triangle that is not glazed
 SERIES_GAP = 1.0  # widest between a screen and its panes [m]
 SERIES_PLACES = 256  # on each window group, from which they are looked for
@@ -26,6 +35,9 @@ class TracedScene:
 
     To a view path windows are black: what arrives there is counted and the path ends.  One mesh
     holds all: the triangle number of a hit gathers the normal, the reflectance and the window.
+
+    No number of a scene may stand in a kernel as a literal (`opaque`): each room would compile
+    all kernels for itself.
     """
 
     def __init__(
@@ -75,47 +87,45 @@ class TracedScene:
         glazed_reflectance: NDArray[np.float64],
     ) -> None:
         """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
-        opaque = surfaces.some(keep)
-        if not len(opaque.triangles) + len(glazed):
-            opaque = _speck(self.centre)
-        triangles = np.concatenate([opaque.triangles, glazed]) - self.centre
+        solid = surfaces.some(keep)
+        if not len(solid.triangles) + len(glazed):
+            solid = _speck(self.centre)
+        triangles = np.concatenate([solid.triangles, glazed]) - self.centre
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        reflectance = np.concatenate([opaque.reflectance, glazed_reflectance])
-        surface = np.concatenate([opaque.surface, np.zeros(len(glazed))])
-        no_group = np.full(len(opaque.triangles), OPAQUE)
+        reflectance = np.concatenate([solid.reflectance, glazed_reflectance])
+        surface = np.concatenate([solid.surface, np.zeros(len(glazed))])
+        no_group = np.full(len(solid.triangles), OPAQUE)
         group = np.concatenate([no_group, glazed_group])
 
-        self.normal = mi.Vector3f(normals.T.astype(np.float32))
+        self.normal = vectors(normals)
         self.reflectance = mi.Float(reflectance.astype(np.float32))
         self.surface = mi.UInt32(surface.astype(np.uint32))
         self.group = mi.Int32(group.astype(np.int32))
         self.gloss = (
-            TracedGloss(opaque, normals[: len(opaque.triangles)], len(glazed))
-            if (opaque.glossy)
+            TracedGloss(solid, normals[: len(solid.triangles)], len(glazed))
+            if (solid.glossy)
             else None
         )
         self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(triangles)})
         # Offset along the normal that keeps a ray clear of the face it starts on [m]
-        self.epsilon = 2e-5 * max(1.0, 0.05 * float(np.abs(triangles).max()))
+        self.epsilon = opaque(2e-5 * max(1.0, 0.05 * float(np.abs(triangles).max())))
 
     def _load_windows(self, glazed: NDArray[np.float64], glazed_group: NDArray[np.int64]) -> None:
         """Tables by glazed triangle and by group, to sample points on the windows."""
         groups, window_group = self.groups, glazed_group
         areas = triangle_areas(glazed)
-        self.window_area = float(areas.sum())
+        self.window_area = opaque(float(areas.sum()))
         self.window_triangles = len(glazed)
-        self._glazed_vertices = [
-            mi.Point3f((glazed[:, i] - self.centre).T.astype(np.float32)) for i in range(3)
-        ]
+        self._glazed_vertices = [vectors(glazed[:, i] - self.centre, mi.Point3f) for i in range(3)]
         self._glazed_group = mi.Int32(window_group.astype(np.int32))
-        self._glazed = mi.DiscreteDistribution(mi.Float(areas.astype(np.float32)))
+        self._glazed = DiscreteDistribution(areas)
         frames = np.stack([g.frame for g in groups])  # [G, 3, 3]
-        self._frame_rows = [mi.Vector3f(frames[:, i].T.astype(np.float32)) for i in range(3)]
+        self._frame_rows = [vectors(frames[:, i]) for i in range(3)]
+        self._axes = [tuple(map(opaque_vector, g.frame)) for g in groups]
         self._group_first = np.searchsorted(window_group, np.arange(len(groups)))
         self._group_choice = [
-            mi.DiscreteDistribution(mi.Float(areas[window_group == g].astype(np.float32)))
-            for g in range(len(groups))
+            DiscreteDistribution(areas[window_group == g]) for g in range(len(groups))
         ]
 
     def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
@@ -210,9 +220,8 @@ class TracedScene:
         if not self._panes:
             return False
         number = dr.arange(mi.UInt32, SERIES_PLACES)
-        for g, group in enumerate(self.groups):
-            u = lattice_2d(number, mi.UInt32(g), 0)
-            out = mi.Vector3f(*map(float, group.frame[2]))
+        for g in range(len(self.groups)):
+            u, out = lattice_2d(number, opaque(g, mi.UInt32), 0), self.exterior_normal(g)
             start = self.sample_group(g, u) + out * self.epsilon
             hit = self._met(start, out, number >= 0)
             if dr.any(self.leaves(hit, out, hit.t < SERIES_GAP)):
@@ -256,8 +265,16 @@ class TracedScene:
 
     def to_group(self, group: int, v: mi.Vector3f) -> mi.Vector3f:
         """World vector in the frame of one window group."""
-        x, y, z = (mi.Vector3f(*map(float, row)) for row in self.groups[group].frame)
+        x, y, z = self._axes[group]
         return mi.Vector3f(dr.dot(x, v), dr.dot(y, v), dr.dot(z, v))
+
+    def exterior_normal(self, group: int) -> mi.Vector3f:
+        """World direction outdoors of one window group."""
+        return self._axes[group][2]
+
+    def place(self, point: ArrayLike) -> mi.Point3f:
+        """A point of the world [m] in the scene's coordinates."""
+        return mi.Point3f(opaque_vector(np.asarray(point, dtype=float) - self.centre))
 
     def outward(self, group: mi.Int32, active: mi.Bool) -> mi.Vector3f:
         """A step off a window towards outdoors that keeps a ray clear of its pane."""
@@ -270,8 +287,45 @@ class TracedScene:
 
     def to_world(self, group: int, v: mi.Vector3f) -> mi.Vector3f:
         """Vector in the frame of one window group to world axes."""
-        x, y, z = (mi.Vector3f(*map(float, row)) for row in self.groups[group].frame)
+        x, y, z = self._axes[group]
         return x * v.x + y * v.y + z * v.z
+
+
+def traced_scene(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup] = (),
+    *,
+    windows_block: bool = True,
+    window_reflectance: ArrayLike | None = None,
+    centre: ArrayLike | None = None,
+) -> TracedScene:
+    """A `TracedScene` of its arguments; that of the same objects is found again among the last.
+
+    A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
+    of thousands of triangles.
+    """
+    values = (window_reflectance, centre)
+    arrays = [None if value is None else np.asarray(value, float) for value in values]
+    inputs = (surfaces, *groups)
+    key = (
+        variants.activate(), windows_block, *(None if a is None else a.tobytes() for a in arrays),
+        *map(id, inputs),
+    )  # fmt: skip
+    if key not in _last_scenes:
+        reflectance, middle = arrays
+        options = {
+            "windows_block": windows_block, "window_reflectance": reflectance, "centre": middle,
+        }  # fmt: skip
+        _last_scenes[key] = inputs, TracedScene(surfaces, groups, **options)
+    _last_scenes.move_to_end(key)
+    while len(_last_scenes) > KEPT:
+        _last_scenes.popitem(last=False)
+    return _last_scenes[key][1]
+
+
+# with the objects whose ids are in the key, which so stay theirs; empty before Dr.Jit ends
+_last_scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
+atexit.register(_last_scenes.clear)
 
 
 def _mesh(triangles: NDArray[np.float64]) -> mi.Mesh:

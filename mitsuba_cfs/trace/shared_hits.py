@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
@@ -64,7 +64,8 @@ def indirect_rows(
         left = tracer.gloss.diffuse_share(dr.gather(mi.UInt32, triangle, point), slant, True)
         exchange = exchange * left.numpy().reshape(C, M)
 
-    rows = dr.zeros(mi.Float64, M * len(tracer.groups) * bins.size)
+    columns = len(tracer.groups) * bins.size
+    rows = empty_sums(M * columns)
     count = dr.opaque(mi.UInt32, paths)
     path = dr.arange(mi.UInt32, M * paths)
     hit = path // count
@@ -85,7 +86,7 @@ def indirect_rows(
         carried=dr.gather(mi.Float, weight, hit),
         mirrored=None,
     )
-    return (exchange * share) @ rows.numpy().reshape(M, -1)
+    return (exchange * share) @ sums_of(rows, (M, columns))
 
 
 def _hits(
@@ -154,7 +155,8 @@ def mirrored_rows(
 ) -> NDArray[np.float64]:
     """What sensors see by the gloss of what their rays meet first [C, G * K], each for itself."""
     C = dr.width(place)
-    rows = dr.zeros(mi.Float64, C * len(tracer.groups) * bins.size)
+    columns = len(tracer.groups) * bins.size
+    rows = empty_sums(C * columns)
     count = dr.opaque(mi.UInt32, samples)
     path = dr.arange(mi.UInt32, C * samples)
     sensor = path // count
@@ -172,4 +174,4 @@ def mirrored_rows(
         sample=sample, stream=stream, generator=generator,
         max_depth=dr.opaque(mi.UInt32, max_depth - 1), active=hit.is_valid(),
     )  # fmt: skip
-    return rows.numpy().reshape(C, -1)
+    return sums_of(rows, (C, columns))

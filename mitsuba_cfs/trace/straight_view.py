@@ -19,11 +19,18 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sampling import (
+    empty_sums,
+    lattice_2d,
+    opaque,
+    path_generator,
+    sums_of,
+    vectors,
+)
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
+from mitsuba_cfs.trace.sun_discs import Scattering
 
 
 def straight_view_matrix(
@@ -55,12 +62,12 @@ def straight_view_matrix(
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
-    inside, outside = TracedScene(interior, groups), TracedScene(exterior, groups)
+    inside, outside = traced_scene(interior, groups), traced_scene(exterior, groups)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, S * sky.size)
-        stream = key ^ mi.UInt32(0x510E527F + g)
+        matrix = empty_sums(S * sky.size)
+        stream = key ^ opaque(0x510E527F + g, mi.UInt32)
         sensor, start, omega, weight = straight_rays(
             inside, g, way, (points, directions), n, stream
         )
@@ -73,7 +80,7 @@ def straight_view_matrix(
             weight > 0,
         )
         add_daylight_paths(outside, sky, matrix, starts, weight)
-        return matrix.numpy().reshape(S, sky.size) / n
+        return sums_of(matrix, (S, sky.size)) / n
 
     def batch(number: int) -> NDArray[np.float64]:
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
@@ -115,16 +122,16 @@ def straight_rays(
     sensor = lane // count
     stream = mi.sample_tea_32(sensor, key)[0]
     target = inside.sample_group(group, lattice_2d(lane - sensor * count, stream, 0))
-    start = dr.gather(mi.Point3f, mi.Point3f((place - inside.centre).T.astype(np.float32)), sensor)
+    start = dr.gather(mi.Point3f, vectors(place - inside.centre, mi.Point3f), sensor)
     to_target = target - start
     distance = dr.norm(to_target)
     omega = mi.Vector3f(to_target / distance)
     local = inside.to_group(group, omega)
-    cosine = dr.dot(dr.gather(mi.Vector3f, mi.Vector3f(normal.T.astype(np.float32)), sensor), omega)
+    cosine = dr.dot(dr.gather(mi.Vector3f, vectors(normal), sensor), omega)
     seen = (cosine > 0) & (local.z > 1e-4)
     shadow = mi.Ray3f(start, omega, distance * (1 - 1e-4), 0.0, [])
     seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
     weight = cosine * local.z / dr.square(distance) * way.through(local)
-    weight *= float(inside.groups[group].area)
-    beyond = mi.Point3f(target + inside.outward(mi.Int32(group), mi.Bool(True)))
+    weight *= opaque(inside.groups[group].area)
+    beyond = mi.Point3f(target + inside.outward(opaque(group, mi.Int32), mi.Bool(True)))
     return sensor, beyond, omega, dr.select(seen, weight, 0.0)

@@ -12,6 +12,7 @@ Source: Kajiya 1986, "The rendering equation", with next-event estimation of the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.sun import SUN_RADIUS
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.sampling import column, lattice_2d, path_generator, tables, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_ways import sun_ways
 
@@ -45,11 +46,11 @@ class Places:
 
     def points(self) -> mi.Point3f:
         """The points as a kernel takes them."""
-        return mi.Point3f(self.point.T)
+        return vectors(self.point, mi.Point3f)
 
     def normals(self) -> mi.Vector3f:
         """The normals as a kernel takes them."""
-        return mi.Vector3f(self.normal.T)
+        return vectors(self.normal)
 
     @staticmethod
     def joined(parts: list[Places]) -> Places:
@@ -81,7 +82,7 @@ def reflecting_places(
     for bounce in range(bounces):
         if not len(path):
             break
-        number = mi.UInt32((path * bounces + bounce).astype(np.uint32))
+        number = column(path * bounces + bounce, mi.UInt32)
         kept, places, rho, luck = _next(tracer, places, path_generator(number, key))
         path, weight = path[kept], weight[kept] * rho
         paths.append(path)
@@ -104,10 +105,10 @@ def _next(
     way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
     found, luck = hit.is_valid(), generator.next_float32()
-    after = face_places(tracer, point, way, hit, found)
-    rho = tracer.whole(hit.prim_index, way, found).numpy()
-    kept = found.numpy() & (rho > 0)
-    return kept, after.some(kept), rho[kept], luck.numpy()[kept]
+    rho = tracer.whole(hit.prim_index, way, found)
+    after, found, rho, luck = face_places(tracer, point, way, hit, found, found, rho, luck)
+    kept = found & (rho > 0)
+    return kept, after.some(kept), rho[kept], luck[kept]
 
 
 def face_places(
@@ -116,12 +117,17 @@ def face_places(
     way: mi.Vector3f,
     hit: mi.PreliminaryIntersection3f,
     found: mi.Bool,
-) -> Places:
-    """Where rays meet surfaces, on the side that they come from."""
+    *others: Any,
+) -> tuple[Any, ...]:
+    """Where rays meet surfaces, on the side that they come from, and other things from one launch.
+
+    Returns: the `Places`, then the others as arrays.
+    """
     face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, found)
     face = dr.mulsign(face, -dr.dot(face, way))
     point = mi.Point3f(origin + way * hit.t + face * tracer.epsilon)
-    return Places(point.numpy().T, face.numpy().T)
+    point, face, *others = tables(point, face, *others)
+    return Places(point, face), *others
 
 
 def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
@@ -138,7 +144,7 @@ def place_and_hour(
     lane = dr.arange(mi.UInt32, places.size * len(suns))
     count = dr.opaque(mi.UInt32, len(suns))
     place = lane // count
-    towards = dr.gather(mi.Vector3f, mi.Vector3f(suns.T.astype(np.float32)), lane - place * count)
+    towards = dr.gather(mi.Vector3f, vectors(suns), lane - place * count)
     point = dr.gather(mi.Point3f, places.points(), place)
     return point, dr.gather(mi.Vector3f, places.normals(), place), on_disc_of(towards, place)
 
@@ -149,8 +155,12 @@ def sunlight(
     """Cosine of the sun at places outdoors where it shines, also out of mirrors, else 0 [m, h]."""
     light = mi.Float(0)
     for way in sun_ways(outside):
-        point, normal, to_sun = place_and_hour(places, way.turned(suns))
-        cosine = dr.dot(normal, to_sun)
-        share = way.reaching(mi.Ray3f(point, to_sun), cosine > 0)
+        turned = way.turned(suns)
+        point, normal, to_sun = place_and_hour(places, turned)
+        # the disc's own mean where all of it is above the place's horizon: one direction has noise
+        middle = column((places.normal @ turned.T).ravel())
+        slant = dr.dot(normal, to_sun)
+        cosine = dr.select(middle > SUN_RADIUS, middle, slant)
+        share = way.reaching(mi.Ray3f(point, to_sun), slant > 0)
         light += dr.select(cosine > 0, cosine * share, 0.0)
     return light.numpy().reshape(places.size, len(suns))

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.direct_sun import on_disc
-from mitsuba_cfs.trace.sampling import lattice
+from mitsuba_cfs.trace.sampling import lattice, vectors
 from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sun_discs import on_disc
 
 RAYS = 2**24  # at once
 
@@ -44,15 +44,17 @@ def sunlit_shares(
     edges = np.zeros((len(points), 2, 3)) if edges is None else np.asarray(edges, dtype=float)
     tracer = TracedScene(surfaces, centre=points.mean(axis=0))
     S, H = len(points), len(suns)
-    place = mi.Point3f((points - tracer.centre + tracer.epsilon * directions).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
-    sides = [mi.Vector3f(edges[:, i].T.astype(np.float32)) for i in range(2)]
+    place = mi.Point3f(
+        (points - tracer.centre + tracer.epsilon[0] * directions).T.astype(np.float32)
+    )
+    normal = vectors(directions)
+    sides = [vectors(edges[:, i]) for i in range(2)]
     shares = np.empty((S, H), dtype=np.float32)
     size = max(1, RAYS // (S * samples))
     key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
     for start in range(0, H, size):
         some = suns[start : start + size]
-        towards = mi.Vector3f(some.T.astype(np.float32))
+        towards = vectors(some)
         count, several = dr.opaque(mi.UInt32, len(some)), dr.opaque(mi.UInt32, samples)
         ray_number = dr.arange(mi.UInt32, S * len(some) * samples)
         pair = ray_number // several

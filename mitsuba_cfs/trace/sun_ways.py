@@ -7,6 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.trace.sampling import opaque_vector
 from mitsuba_cfs.trace.scene import TracedScene
 
 BEFORE = 1e-3  # [m] of a window's plane, that a mirror must reach to send it light
@@ -36,7 +37,7 @@ class SunWay:
         hit = self._outside.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
         met = active & hit.is_valid()
         met &= gloss.plane_of(hit.prim_index, met) == self._plane
-        normal = mi.Vector3f(*map(float, gloss.normals[self._plane]))
+        normal = opaque_vector(gloss.normals[self._plane])
         normal = dr.mulsign(normal, -dr.dot(normal, ray.d))
         cosine = -dr.dot(normal, ray.d)
         place = mi.Point3f(ray.o + ray.d * hit.t + normal * self._outside.epsilon)

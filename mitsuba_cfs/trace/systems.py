@@ -17,8 +17,9 @@ from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
-from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering, Scattering
+from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering
 from mitsuba_cfs.trace.lit_room import AngularBeam, PatchBeam, PathOptics
+from mitsuba_cfs.trace.sun_discs import Scattering
 
 WINDOW_UP = (0, 1, 0)  # of a plugin that is asked in the window's own frame
 
@@ -48,8 +49,7 @@ def lit_system(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
     if angular is not None:
         return _specular_system(bsdf, angular)
     if isinstance(bsdf, TensorTreeBsdf):
-        scattering, beam = _without_beam(bsdf), TreeBeam(bsdf) if _has_beams(bsdf) else None
-        return PathOptics(_loaded(tensor_tree_plugin(scattering)), beam)
+        return PathOptics(_loaded(tensor_tree_plugin(_without_beam(bsdf))), TreeBeam(bsdf))
     front = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
     beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
     return PathOptics(_loaded(klems_plugin(without_peaks(bsdf, "transmission"))), beam)
@@ -125,39 +125,31 @@ class AngularScattering:
 
 
 class TreeBeam:
-    """The share of light that keeps its beam in a tensor tree of rank 4."""
+    """The share of light that keeps its beam in a tensor tree."""
 
     def __init__(self, tree: TensorTreeBsdf) -> None:
-        self._bsdf = _loaded(tensor_tree_plugin(tree, up=WINDOW_UP, peak=True))
+        self.bsdf = _loaded(tensor_tree_plugin(tree, up=WINDOW_UP, peak=True))
 
     def at(self, local: mi.Vector3f) -> mi.Float:
         """Share at local directions of light that passes along the line of `local`."""
         into_room = -dr.mulsign(local, local.z)
-        return self._bsdf.through(mi.BSDFContext(), into_room, mi.Bool(True))
+        return self.bsdf.through(mi.BSDFContext(), into_room, mi.Bool(True))
 
 
 class TreeScattering(PluginScattering):
-    """A tensor tree in window axes, with the through beam of rank 4 kept apart."""
+    """A tensor tree in window axes, its through beam kept apart."""
 
     def __init__(self, tree: TensorTreeBsdf) -> None:
-        self._beam = TreeBeam(tree) if _has_beams(tree) else None
-        plugin = tensor_tree_plugin(tree, up=WINDOW_UP, peak=self._beam is not None)
-        super().__init__(_loaded(plugin), key=tree)
+        self._beam = TreeBeam(tree)
+        super().__init__(self._beam.bsdf, key=tree)
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
-        return mi.Float(0) if self._beam is None else self._beam.at(sun)
-
-
-def _has_beams(tree: TensorTreeBsdf) -> bool:
-    """Only trees of rank 4 tell a beam from scattering."""
-    return next(iter(tree.blocks().values())).rank == 4
+        return self._beam.at(sun)
 
 
 def _without_beam(bsdf: TensorTreeBsdf) -> TensorTreeBsdf:
     """The trees without what goes straight on."""
-    if not _has_beams(bsdf):
-        return bsdf
     trees = {
         name: tree_peak(tree)[0] if name.startswith("transmission") else tree
         for name, tree in bsdf.blocks().items()

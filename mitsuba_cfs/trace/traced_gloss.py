@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.gloss import STEPS, Gloss
 from mitsuba_cfs.surfaces import Surfaces, triangle_areas
+from mitsuba_cfs.trace.sampling import vectors
 
 SAME_PLANE = 1e-4  # of normals within a mirror plane's orientation
 SMOOTHEST = 1e-3  # alpha; below it a surface is a mirror
@@ -45,7 +46,7 @@ class TracedGloss:
             surfaces.triangles[plane[: len(surfaces.surface)] == j].reshape(-1, 3)
             for j in range(len(planes))
         ]
-        self._plane_normal = mi.Vector3f(planes[:, :3].T.astype(np.float32))
+        self._plane_normal = vectors(planes[:, :3])
         self._plane_roughness = mi.Float(roughness[planes[:, 3].astype(int)].astype(np.float32))
 
     def specular(self, triangle: mi.UInt32, cosine: mi.Float, active: mi.Bool) -> mi.Float:

@@ -10,6 +10,7 @@ from scipy.stats import qmc
 
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.sampling import vectors
 from mitsuba_cfs.trace.scene import TracedScene
 
 FloatArray = NDArray[np.float64]
@@ -106,8 +107,8 @@ def _hits(surfaces: Surfaces, origins: FloatArray, directions: FloatArray) -> ND
     """The part that each ray meets first, -1 where it meets none."""
     centre = surfaces.triangles.mean(axis=(0, 1))
     tracer = TracedScene(surfaces, centre=centre)
-    towards = mi.Vector3f(directions.T.astype(np.float32))
-    start = mi.Point3f((origins - centre).T.astype(np.float32)) + towards * tracer.epsilon
+    towards = vectors(directions)
+    start = vectors(origins - centre, mi.Point3f) + towards * tracer.epsilon
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(start, towards), coherent=False)
     found = hit.is_valid()
     part = dr.gather(mi.UInt32, tracer.surface, hit.prim_index, found)

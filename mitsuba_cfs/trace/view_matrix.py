@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import drjit as dr
@@ -16,8 +17,8 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.sampling import path_generator
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sampling import column, empty_sums, path_generator, sums_of, vectors
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 from mitsuba_cfs.trace.shared_hits import MOST_SENSORS, indirect_rows, mirrored_rows, shares
 from mitsuba_cfs.trace.window_integral import add_window_light
 
@@ -65,23 +66,23 @@ def view_matrix(
         raise ValueError(
             f"points {points.shape} and directions {directions.shape}: need [S, 3] each"
         )
-    tracer = TracedScene(surfaces, groups)
+    tracer = traced_scene(surfaces, groups)
     bins = DirectionBins(basis)
     S, n = len(points), int(samples)
     if S * n >= 2**32:
         raise ValueError(f"{S} sensors x {n} samples: a batch must stay below 2**32 paths")
-    place = mi.Point3f((points - tracer.centre).T.astype(np.float32))
-    normal = mi.Vector3f(directions.T.astype(np.float32))
+    place = vectors(points - tracer.centre, mi.Point3f)
+    normal = vectors(directions)
     shape = (S, len(groups), bins.size)
     blocks = np.array_split(np.arange(S, dtype=np.uint32), -(-S // MOST_SENSORS))
 
     def batch(number: int) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, int(np.prod(shape)))
+        matrix = empty_sums(math.prod(shape))
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
         _add_direct(tracer, bins, matrix, place, normal, samples=n, key=key)
-        values = matrix.numpy().reshape(S, -1)
+        values = sums_of(matrix, (S, len(groups) * bins.size))
         for block, sensors in enumerate(blocks if max_depth > 1 else []):
-            chosen = mi.UInt32(sensors)
+            chosen = column(sensors, mi.UInt32)
             here = [dr.gather(type(of), of, chosen) for of in (place, normal)]
             block_key = mi.sample_tea_32(key, mi.UInt32(block))[0]
             hits, paths = shares(len(sensors), n)

@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.sampling import lattice_2d
+from mitsuba_cfs.trace.sampling import lattice_2d, opaque
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 ROULETTE = 1.0  # a path survives a bounce with so many times the share of light it carries
@@ -42,7 +42,7 @@ def add_view_paths(
         carried: share of light that Russian roulette starts with; None: roulette starts late.
     """
     K = mi.UInt32(bins.size)
-    width = mi.UInt32(bins.size * len(tracer.groups))
+    width = opaque(bins.size * len(tracer.groups), mi.UInt32)
     depth = mi.UInt32(0)  # bounces so far
     early = carried is not None
     carried = mi.Float(1.0 if carried is None else carried)  # product of reflectances so far

@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.sampling import opaque
 from mitsuba_cfs.trace.scene import TracedScene
 
 STEEPEST = 1e4  # tangent of the last polar angle that is looked at
@@ -87,7 +88,7 @@ def add_window_light(
     active &= whole > 0
     ray = mi.Ray3f(position, tracer.to_world_any(group, local), distance * (1 - 1e-4), 0.0, [])
     active &= ~tracer.scene.ray_test(ray, coherent=False, active=active)
-    slot = (row * len(tracer.groups) + mi.UInt32(group)) * bins.size + patch
+    slot = (row * opaque(len(tracer.groups), mi.UInt32) + mi.UInt32(group)) * bins.size + patch
     dr.scatter_add(matrix, mi.Float64(whole * step), slot, active)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.sampling import lattice_2d, path_generator
+from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of
 from mitsuba_cfs.trace.scene import TracedScene
 
 
@@ -41,7 +41,7 @@ def window_batches(
     K, G = bins.size, len(tracer.groups)
 
     def one_group(group: int, key: int) -> NDArray[np.float64]:
-        matrix = dr.zeros(mi.Float64, K * columns)
+        matrix = empty_sums(K * columns)
         count = dr.opaque(mi.UInt32, samples)
         path = dr.arange(mi.UInt32, K * samples)
         patch = path // count
@@ -52,7 +52,7 @@ def window_batches(
         position = tracer.sample_group(group, lattice_2d(sample, stream, 2))
         outward, generator = tracer.to_world(group, local), path_generator(path, opaque_key)
         follow(matrix, WindowPaths(group, patch, position, outward, generator))
-        return matrix.numpy().reshape(K, columns) / samples
+        return sums_of(matrix, (K, columns)) / samples
 
     def batch(number: int) -> NDArray[np.float64]:
         first = (seed * 1_000_003 + number) * G

@@ -59,6 +59,7 @@ def command(
     spaces: tuple[str, ...],
     join: tuple[str, ...],
     furniture: bool,
+    apertures: tuple[str, ...],
     day: str,
     write_ifc: Path | None,
     quick: bool,
@@ -70,7 +71,7 @@ def command(
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = ComplyOptions(
-        building, weather, system, spaces, join, furniture, not no_cache, quick,
+        building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), day=day_of(day), **own,
     )  # fmt: skip
     from mitsuba_cfs.files import check_file

@@ -7,9 +7,10 @@ from pathlib import Path
 import click
 
 from scenes import quick
-from scenes.commands.parameters import IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
+    aperture_option,
     directions_option,
     eye_height_option,
     furniture_option,
@@ -37,13 +38,14 @@ _DEFAULT = YearOptions(Path(), Path())
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=BUILDING_FILE, required=False, metavar="[BUILDING]")
 @weather_option
 @system_option
 @out_folder_option
 @space_option("space", "default: the first with a window", several=False)
 @join_option
 @furniture_option
+@aperture_option
 @view_option("views", "or a file of them", several=True)
 @grid_option
 @directions_option
@@ -102,7 +104,7 @@ def command(
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.year_of_glare import outputs
+    from scenes.year_of_glare import outputs, page
     from scenes.year_of_glare.year import rate_views, read_year
 
     if options.quick:
@@ -113,6 +115,7 @@ def command(
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)
+            page.write_page(year, table, place / "report.html")
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
         f"{year.room}: {len(table)} view(s), {len(year.sky.lit)} hours with the sun up.  Highest "
@@ -124,6 +127,7 @@ def command(
     for note in year.notes:
         click.echo(f"note: {note}")
     click.echo(f"{out / 'views.csv'}")
+    click.echo(f"report: {out / 'report.html'}")
 
 
 def _error(row) -> str:

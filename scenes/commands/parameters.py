@@ -12,14 +12,25 @@ class IfcFile(click.Path):
 
     def convert(self, value, param, ctx) -> Path:
         """The path; `DataError` where the file is none of ours."""
-        from bim.ifc.corrections import corrections_beside
-        from bim.ifc.head import check_head
+        from bim.building_file import check_ifc
 
         path = super().convert(value, param, ctx)
-        check_head(path)
-        corrections_beside(path)
+        check_ifc(path)
+        return path
+
+
+class BuildingFile(click.Path):
+    """A file of any format that a building is read from, sound as far as it can be seen at once."""
+
+    def convert(self, value, param, ctx) -> Path:
+        """The path; `DataError` where the file is none of ours."""
+        from bim.building_file import check_building_file
+
+        path = super().convert(value, param, ctx)
+        check_building_file(path)
         return path
 
 
 FILE = click.Path(exists=True, dir_okay=False, readable=True, path_type=Path)
+BUILDING_FILE = BuildingFile(exists=True, dir_okay=False, readable=True, path_type=Path)
 IFC_FILE = IfcFile(exists=True, dir_okay=False, readable=True, path_type=Path)

@@ -8,8 +8,9 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import check_file
-from scenes.commands.parameters import IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.room_options import (
+    aperture_option,
     eye_height_option,
     furniture_option,
     glare_sources_option,
@@ -30,7 +31,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 
 
 @click.command()
-@click.argument("building", type=IFC_FILE, required=False, metavar="[BUILDING.ifc]")
+@click.argument("building", type=BUILDING_FILE, required=False, metavar="[BUILDING]")
 @weather_option
 @system_option
 @click.option(
@@ -39,6 +40,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @space_option("space", "default: the first with a window", several=False)
 @join_option
 @furniture_option
+@aperture_option
 @view_option("view", "not parallel", several=False)
 @eye_height_option
 @size_option("size", 800, "as evalglare wants them")

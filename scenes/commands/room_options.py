@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
-from scenes.commands.parameters import FILE, IFC_FILE
+from scenes.commands.parameters import BUILDING_FILE, FILE
 from scenes.commands.quick_option import quick_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.room.options import GLARE_SOURCES, GLARE_SUN
@@ -29,6 +29,18 @@ join_option = click.option(
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."
 )
+aperture_option = click.option(
+    "--aperture", "apertures", multiple=True, metavar="MATERIAL",
+    help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
+)  # fmt: skip
+surroundings_option = click.option(
+    "--surroundings", multiple=True, type=FILE,
+    help="What stands around: OBJ, STL, PLY, glTF, CityJSON, GeoJSON; PVGIS's horizon.",
+)  # fmt: skip
+surroundings_offset_option = click.option(
+    "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
+    help="Added to their coordinates [m] in place of any georeference.",
+)  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="EPW file, hourly."
 )
@@ -112,13 +124,14 @@ def size_option(name: str, default: int, why: str) -> Option:
 def building_options(spaces: str) -> Option:
     """The argument and the options that `cfs run` and `cfs comply` share; `spaces` by default."""
     shared: Sequence[Option] = (
-        click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc"),
+        click.argument("building", type=BUILDING_FILE, metavar="BUILDING"),
         needed_weather_option,
         system_option,
         out_folder_option,
         space_option("spaces", f"default: {spaces}"),
         join_option,
         furniture_option,
+        aperture_option,
         annual_glare_option,
         subdivide_option,
         glare_sources_option,

@@ -10,7 +10,14 @@ from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
-from scenes.commands.room_options import building_options, method_option, size_option, u_option
+from scenes.commands.room_options import (
+    building_options,
+    method_option,
+    size_option,
+    surroundings_offset_option,
+    surroundings_option,
+    u_option,
+)
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
@@ -20,6 +27,8 @@ _DEFAULT = RoomOptions()
 
 @click.command()
 @building_options("all with a window")
+@surroundings_option
+@surroundings_offset_option
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
@@ -44,6 +53,10 @@ _DEFAULT = RoomOptions()
     "--operation", type=FILE,
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
+@click.option(
+    "--explore", is_flag=True,
+    help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
+)  # fmt: skip
 def command(
     building: Path,
     *,
@@ -55,19 +68,27 @@ def command(
     g_value: float | None,
     join: tuple[str, ...],
     furniture: bool,
+    apertures: tuple[str, ...],
+    surroundings: tuple[Path, ...],
+    surroundings_offset: tuple[float, float, float] | None,
     operation: Path | None,
     no_cache: bool,
+    explore: bool,
     quick: bool,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of the rooms of an IFC building."""
+    """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
+    if explore and chosen["method"] == "point-in-time":
+        raise click.UsageError("--explore needs --method three-phase or five-phase")
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
-        building, weather, system, spaces, join, furniture, not no_cache, quick,
-        RoomOptions.of(**chosen), operation=operation, u_value=u_value, g_value=g_value,
+        building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
+        RoomOptions.of(**chosen), operation=operation, explore=explore,
+        u_value=u_value, g_value=g_value, surroundings=surroundings,
+        surroundings_offset=surroundings_offset,
     )  # fmt: skip
     run_to_folder(options, out)
 
@@ -79,14 +100,16 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     from scenes.run.files import read_files
 
     inputs = (options.building, options.weather, options.system, options.operation)
+    inputs += options.surroundings
     folder = ResultFolder(out, command, inputs=inputs)
     if options.cache:
         default_folder()  # or one line that it cannot be one
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.explore.folder import write_explorer
     from scenes.report import write_report
-    from scenes.run.outputs import write_results
+    from scenes.run.outputs import EXPLORER, write_results
     from scenes.run.run import run_job
 
     if options.quick:
@@ -96,7 +119,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
             options, progress, files, on_room=_print_summary, on_building=_print_account
         )
         progress("results", 0.0)
-        write_results(result, folder, write_report)
+        write_results(result, folder, write_report, write_explorer if options.explore else None)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:
@@ -104,6 +127,8 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     if result.problems:
         click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
+    if options.explore:
+        click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
 
 
 def _print_account(building) -> None:

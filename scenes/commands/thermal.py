@@ -20,8 +20,9 @@ from scenes.commands.room_options import out_folder_option
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
+@click.option("--figures", is_flag=True, help="A figure of each room's year as SVG.")
 @quick_option
-def command(study: Path, out: Path, quick: bool) -> None:
+def command(study: Path, out: Path, figures: bool, quick: bool) -> None:
     """Gains, temperatures, loads and comfort of rooms, hour by hour.
 
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
@@ -45,13 +46,13 @@ def command(study: Path, out: Path, quick: bool) -> None:
         rooms, notes = run_study(parsed, progress, files)
     notes = (*[quick_run.NOTE] * quick, *notes)
     record = {"quick": quick, "study": parsed.model_dump(mode="json"), "notes": list(notes)}
-    _write(rooms, record, folder)
+    _write(rooms, record, folder, figures=figures)
     for room in rooms:
         summary = room.summary
         click.echo(
             f"{room.name}: operative {summary['operative_min_c']:.1f} to "
-            f"{summary['operative_max_c']:.1f} C, heating {summary['heating_kwh']:.0f} kWh, "
-            f"cooling {summary['cooling_kwh']:.0f} kWh, comfortable "
+            f"{summary['operative_max_c']:.1f} C, heating {summary['heat_kwh']:.0f} kWh, "
+            f"cooling {summary['cold_kwh']:.0f} kWh, comfortable "
             f"{summary['comfortable_h ASHRAE 55 80 %']:.0f} of the occupied hours"
         )
     for note in notes[quick:]:
@@ -59,7 +60,7 @@ def command(study: Path, out: Path, quick: bool) -> None:
     click.echo(f"results: {out}")
 
 
-def _write(rooms, record: dict, results: ResultFolder) -> None:
+def _write(rooms, record: dict, results: ResultFolder, *, figures: bool) -> None:
     """All files of a study."""
     import pandas as pd
 
@@ -69,10 +70,20 @@ def _write(rooms, record: dict, results: ResultFolder) -> None:
         for number, room in enumerate(rooms, 1):
             name = "hours.csv" if len(rooms) == 1 else f"hours_{number}.csv"
             write_table(room.hours.round(4), folder / name)
+            write_table(room.powers.round(3), folder / name.replace("hours", "energy"))
+            if figures:
+                from scenes.heat.plots import year_figure
+
+                year_figure(room, folder / name.replace("hours", "year").replace("csv", "svg"))
+        if rooms[0].design is not None:
+            days = pd.concat([room.design for room in rooms])
+            write_table(days.round(3), folder / "design_days.csv", index=False)
         table = pd.DataFrame(
             [{"room": r.name, "floor_m2": r.floor_area} | r.summary for r in rooms]
         )
         write_table(table.round(4), folder / "summary.csv", index=False)
         months = pd.concat({r.name: r.months for r in rooms}, names=["room"])
         write_table(months, folder / "discomfort_by_month.csv")
+        energy = pd.concat({r.name: r.energy for r in rooms}, names=["room"])
+        write_table(energy.round(4), folder / "energy_by_month.csv")
         write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")

@@ -54,7 +54,11 @@ def check_building(
         raise ValueError("a check of a file needs its building")
     steps = part(progress, 0.1, 1.0)
     building = read_building(
-        options.building, join=options.join, furniture=options.furniture, progress=steps
+        options.building,
+        join=options.join,
+        furniture=options.furniture,
+        apertures=options.apertures,
+        progress=steps,
     )
     return check_rooms(building, options, files, progress)
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.head import check_head
+from bim.building_file import check_building_file
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.options import OTHER_ALTITUDE_DEG, ComplyOptions
@@ -37,8 +36,7 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     """
     if options.building is None or options.weather is None:
         raise ValueError("a check of files needs a building and a weather")
-    check_head(options.building)
-    corrections_beside(options.building)
+    check_building_file(options.building)
     check_names(options.spaces)
     rules = {Path(name).stem if name[-5:] == ".toml" else name: read_rule(name)
              for name in options.standards}  # fmt: skip

@@ -17,7 +17,7 @@ def room_heat(room: RoomSimulation, closed: NDArray[np.bool_] | None) -> RoomHea
             all windows, closed when those of any group are.  None: open all year.
     """
     if closed is not None:
-        room.state = closed.any(axis=1).astype(np.int64)
+        room.state = np.where(closed.any(axis=1), 1, 0)
     temperatures = room.thermal()[0].temperatures
     return RoomHeat(
         temperatures["operative_c"].to_numpy(), np.asarray(room.weather.dry_bulb_c), room.occupied

@@ -23,24 +23,23 @@ Files are looked for beside the TOML file.  All of it is for the visible band.
 from __future__ import annotations
 
 import csv
-import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from mitsuba_cfs.bsdf.angular import AngularTable, roos_table, stack_table
-from mitsuba_cfs.bsdf.en410 import visible_value
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.bsdf.pane_file import read_glazing_layers, read_pane_file
 from mitsuba_cfs.errors import DataError
 from scenes.toml_file import Share, TomlTable
 
 COLUMNS = ("theta_deg", "transmittance")
 OPTIONAL = ("reflectance_front", "reflectance_back")
-NO_PANE = ("shading", "material")  # types of the IGSDB
 SCATTERED = 0.05  # share of what a specular system passes that may be scattered
 APART = 0.05  # that function and BSDF may pass more or less of diffuse light
 
@@ -66,13 +65,13 @@ class PaneTable(TomlTable):
     def pane(self, folder: Path) -> Pane:
         """The pane as the formulas take it; `ValueError` where its values cannot be."""
         if self.product is not None:
-            found = read_product(folder / self.product)
-            return flipped(found) if self.flipped else found
+            return replace(
+                read_pane_file(folder / self.product), turned=self.flipped
+            ).visible_pane()
         front, back = self.reflectance_front, self.reflectance_back
         back = front if back is None else back
-        coated = self.coated or front != back
-        found = Pane("pane", self.transmittance, front, back, coated)
-        return flipped(found) if self.flipped else found
+        sides = (back, front) if self.flipped else (front, back)
+        return Pane("pane", self.transmittance, *sides, self.coated or front != back)
 
 
 class RoosTable(TomlTable):
@@ -116,7 +115,8 @@ class AngularData(TomlTable):
             if self.roos is not None:
                 return roos_table(Glazing("glazing", **self.roos.model_dump()))
             if self.glazing is not None:
-                return stack_table(read_layers(folder / self.glazing))
+                layers = read_glazing_layers(folder / self.glazing)
+                return stack_table([layer.visible_pane() for layer in layers])
             return stack_table([one.pane(folder) for one in self.pane])
         except DataError:
             raise
@@ -149,44 +149,6 @@ def read_angular_table(path: Path) -> AngularTable:
         raise DataError(str(error), file=path) from error
 
 
-def read_product(path: Path) -> Pane:
-    """A pane of glass of the IGSDB's JSON: its integrated visible values, else its spectrum's."""
-    data = _json(path)
-    kind, measured = data.get("type") or "no type", data.get("measured_data") or {}
-    if kind in NO_PANE or not measured.get("is_specular"):
-        raise DataError(f"expected a specular pane, got {kind}", file=path, field="type")
-    summary = (data.get("integrated_results_summary") or [{}])[0]
-    values = [summary.get(name) for name in ("tfvis", "rfvis", "rbvis")]
-    if None in values:
-        rows = (data.get("spectral_data") or {}).get("spectral_data") or []
-        values = _of_spectrum(
-            {1e3 * r["wavelength"]: (r["T"], r["Rf"], r["Rb"]) for r in rows}, path
-        )
-    return _pane(data.get("name") or path.stem, values, data.get("coated_side"), path)
-
-
-def read_layers(path: Path) -> list[Pane]:
-    """The panes of a glazing system's JSON, whose `layers` hold spectra, the outer one first."""
-    data, panes = _json(path), []
-    for number, layer in enumerate(data.get("layers") or [], start=1):
-        where = f"layer {number}"
-        if layer.get("product_type") != "glazing":
-            kind = layer.get("product_type")
-            raise DataError(f"is no glass ({kind})", file=path, element=where)
-        rows = {float(nm): values for nm, values in (layer.get("spectral_data") or {}).items()}
-        pane = _pane(where, _of_spectrum(rows, path), layer.get("coated_side"), path)
-        panes.append(flipped(pane) if layer.get("flipped") else pane)
-    if not panes:
-        raise DataError("has no layers", file=path, field="layers")
-    return panes
-
-
-def flipped(pane: Pane) -> Pane:
-    """The pane turned round."""
-    front, back = pane.reflectance_front, pane.reflectance_back
-    return Pane(pane.name, pane.transmittance, back, front, pane.coated)
-
-
 def check_specular(klems: KlemsBsdf, angular: AngularTable | None, path: Path) -> None:
     """`DataError` where the BSDF is not that of a specular system with this function."""
     if angular is None:
@@ -202,34 +164,3 @@ def check_specular(klems: KlemsBsdf, angular: AngularTable | None, path: Path) -
     if abs(means - beam) > APART:
         message = f"passes {means:.2f} of diffuse light, the BSDF {beam:.2f}: not the same system"
         raise DataError(message, file=path, field="angular")
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from error
-    except ValueError as error:
-        raise DataError(f"is not JSON: {error}", file=path) from error
-    if not isinstance(data, dict):
-        raise DataError("expected a table of a product", file=path)
-    return data
-
-
-def _of_spectrum(rows: dict[float, tuple[float, float, float]], path: Path) -> list[float]:
-    if not rows or min(rows) > 400 or max(rows) < 760:
-        raise DataError("has no spectrum from 400 to 760 nm", file=path, field="spectral_data")
-    nm = np.array(sorted(rows))
-    return [visible_value(nm, np.array([rows[n][i] for n in nm])) for i in range(3)]
-
-
-def _pane(name: str, values: list[float], side: str | None, path: Path) -> Pane:
-    """A pane; one without a coating has the mean of what its two faces were measured at."""
-    tau, front, back = values
-    coated = (side or "Neither").lower() not in ("neither", "none", "na", "n/a", "")
-    if not coated:
-        front = back = 0.5 * (front + back)
-    try:
-        return Pane(name, tau, front, back, coated)
-    except ValueError as error:
-        raise DataError(str(error), file=path) from error

@@ -50,7 +50,8 @@ def _content(state: ShadingState) -> list:
     bands = [[name, bsdf] for name, bsdf in sorted(state.bands.items())]
     thermal = [state.g_value, state.u_value, state.g_normal, state.g_by_patch]
     beside = None if state.file is None else str(state.file)
-    return [state.name, bands, *thermal, state.closure, state.shading_position, beside]
+    held = [*thermal, state.closure, state.shading_position, state.angular]
+    return [state.name, bands, *held, beside]
 
 
 def _system(state: ShadingState, window: Window, path: Path, source: str) -> FenestrationSystem:
@@ -88,7 +89,7 @@ def held_thermal(state: ShadingState) -> dict:
         "g_by_patch": by_patch,
         "closure": state.closure or beside.closure,
         "shading_position": state.shading_position or beside.shading_position,
-        "angular": beside.angular,
+        "angular": state.angular or beside.angular,
     }
 
 

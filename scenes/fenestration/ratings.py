@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_system import ThermalSystem, checked_system
 from thermal.errors import ThermalInputError
-from thermal.layer_sun import sun_in_layers
 from thermal.ratings import (
     CLASSES,
     REFERENCE_GLAZINGS,

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from bim.building_file import held_states, is_ifc
 from bim.model import Window
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import FenestrationSystem, Given, States
@@ -32,10 +33,12 @@ def fill_windows(windows: Iterable[Window], given: Given, file: Path | None) -> 
     windows = list(windows)
     found, unfilled = held_systems(windows, given, file)
     for missing, names in unfilled.items():
+        attach = (
+            ", attach data (cfs ifc attach), or state VisibleLightTransmittance and "
+            "SolarHeatGainTransmittance (Pset_DoorWindowGlazingType)"
+        )
         raise DataError(
-            f"has no BSDF attached {missing}: give {given.ask}, attach data (cfs ifc attach), or "
-            "state VisibleLightTransmittance and SolarHeatGainTransmittance "
-            "(Pset_DoorWindowGlazingType)",
+            f"has no BSDF attached {missing}: give {given.ask}{attach if is_ifc(file) else ''}",
             file=file,
             element=f"window {_listed(names)}",
         )
@@ -51,12 +54,10 @@ def held_systems(
         return {window.guid: given.states for window in windows}, {}
     if file is None:
         raise DataError(f"a box holds no fenestration data: give {given.ask}", field="box")
-    # these read IFC: only where there is a file of it
-    from bim.ifc.fenestration_read import read_fenestration
     from scenes.fenestration.attached import attached_systems
     from scenes.fenestration.stated import stated_systems, stated_values
 
-    held = read_fenestration(file)
+    held = held_states(windows, file)
     found = _with_given(attached_systems(held, windows, file), given)
     left = [window for window in windows if window.guid not in found]
     found |= stated_systems(held, left, file, given)
@@ -72,10 +73,10 @@ def stated_u_and_g(
     windows: Iterable[Window], file: Path
 ) -> dict[str, tuple[float | None, float | None]]:
     """U and g of each window by GUID as they are attached or stated; None where neither is."""
-    from bim.ifc.fenestration_read import read_fenestration
     from scenes.fenestration.stated import stated_values
 
-    held = read_fenestration(file)
+    windows = list(windows)
+    held = held_states(windows, file)
     values = {w.guid: stated_values(held, w, file, Given()) for w in windows}
     return {guid: (one.u_value, one.g_value) for guid, one in values.items()}
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem
 from thermal.blackbox import (
     Fenestration,
@@ -19,7 +20,7 @@ from thermal.blackbox import (
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
 from thermal.gvalue import thermal_data
-from thermal.layer_sun import layered_thermal_data
+from thermal.layered import layered_thermal_data
 
 SHADE_SCATTERS = 0.5  # share of the light beyond which a BSDF is that of a shade
 
@@ -56,8 +57,8 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     if closure.unit is None:
         data = thermal_data(tau, rho, shading_position=place, **known)
     else:
-        theta = solar.basis_in.centres()[0]
-        data = layered_thermal_data(closure.unit, tau, rho, theta, **known)
+        absorbed = sun_in_layers(closure.unit, tau, rho, solar.basis_in.centres()[0])
+        data = layered_thermal_data(closure.unit, tau, rho, absorbed, **known)
     g_value = data.g_value if system.g_by_patch is None else system.g_by_patch
     back_rho, back_tau = (
         _diffuse(solar, block) for block in (solar.reflection_back, solar.transmission_back)

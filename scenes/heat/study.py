@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
-from bim.ifc.building import read_ifc
+from bim.building_file import ReadOptions, read_building_file
 from bim.model import Building, Space
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
@@ -20,15 +20,21 @@ from scenes.fenestration.resolver import fill_windows, source_notes, window_sour
 from scenes.fenestration.systems import States
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
+from scenes.heat.design_days import design_loads
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
-from scenes.heat.tables import hourly_table, year_summary
+from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.room.drawn_shades import traced_building
+from scenes.room.energy import energy_by_month, energy_summary, room_powers
+from scenes.room.humidity import felt_by, room_humidity
+from scenes.room.operation_hours import OperationHours
 from scenes.room.room import RoomSimulation, skies_for
 from scenes.room.zone import RoomZone, balances, coupled
 from scenes.run.inputs import chosen_spaces, named_spaces
 from thermal.balance import ZoneResult
+from thermal.moisture import Humidity
+from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
 
 
@@ -39,8 +45,22 @@ class ThermalYear:
     name: str
     floor_area: float  # [m2]
     hours: pd.DataFrame  # temperatures, loads, state, heat flows by hour
-    summary: dict[str, float]
+    summary: dict[str, float | str]
     months: pd.DataFrame  # discomfort in the occupied hours, by band and month
+    powers: pd.DataFrame  # heat, cold, electricity by hour [W]
+    energy: pd.DataFrame  # by month [kWh] and [kWh/m2]
+    design: pd.DataFrame | None = None  # loads of design days
+
+
+@dataclass(frozen=True, slots=True)
+class _Balanced:
+    """Rooms as they were balanced."""
+
+    rooms: Sequence[RoomZone]
+    results: list[ZoneResult]
+    humidity: list[Humidity]
+    notes: tuple[str, ...]  # what had to be assumed
+    design: pd.DataFrame | None
 
 
 def run_study(
@@ -84,13 +104,20 @@ def run_study(
         rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
         radiants.append(radiant)
         steps("heat", 1.0)
-    rooms, results, unpaired = year_of_rooms(study, rooms, weather, progress)
-    notes |= dict.fromkeys(unpaired)
+    found = _balanced(study, building, rooms, weather, progress)
+    notes |= dict.fromkeys(found.notes)
     years = []
-    for room, result, radiant in zip(rooms, results, radiants, strict=True):
+    for room, result, humidity, radiant in zip(
+        found.rooms, found.results, found.humidity, radiants, strict=True
+    ):
         if radiant is None and trace.view_factors:
             notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
-        years.append(_year(study, room, _felt(study, room.zone, result, radiant), weather))
+        felt_result = _felt(study, room.zone, result, radiant)
+        year = _year(study, room, felt_result, humidity, weather)
+        if found.design is not None:
+            own = found.design[found.design["room"] == room.zone.name]
+            year = replace(year, design=own.reset_index(drop=True))
+        years.append(year)
     return years, tuple(notes)
 
 
@@ -104,25 +131,54 @@ def _check_states(study: StudyFile, in_windows: Mapping[str, States]) -> None:
         raise DataError(message, file=study.building, field=f"control.{field}")
 
 
-def year_of_rooms(
-    study: StudyFile, rooms: Sequence[RoomZone], weather: Weather, progress: Progress
-) -> tuple[Sequence[RoomZone], list[ZoneResult], tuple[str, ...]]:
-    """The rooms' years: together where the study couples them, else one by one.
-
-    Returns: the rooms as they were taken, their years, what had to be assumed.
-    """
-    step_s, unpaired = study.options.heat_step_s, ()
+def _balanced(
+    study: StudyFile,
+    building: Building,
+    rooms: Sequence[RoomZone],
+    weather: Weather,
+    progress: Progress,
+) -> _Balanced:
+    """The rooms' years: together where the study couples them, else one by one."""
+    step_s, notes = study.options.heat_step_s, ()
+    progress("heat balance", 0.0)
+    groups: list[tuple[Sequence[RoomZone], dict]] = [([room], {}) for room in rooms]
     if study.couple:
-        progress("heat balance", 0.0)
-        rooms, links, unpaired = coupled(rooms, study.air.door_m3_s)
-        found = balances(rooms, weather, step_s, air_links=links, progress=progress)
-    else:
-        found = []
-        for number, room in enumerate(rooms):
-            progress("heat balance", number / len(rooms))
-            found += balances([room], weather, step_s, progress=progress)
-    progress("heat balance", 1.0)
-    return rooms, found, unpaired
+        rooms, links, notes = coupled(rooms, study.air.door_m3_s)
+        transfers = _transfers(study, building, rooms, weather)
+        groups = [(rooms, {"air_links": links, "transfers": transfers})]
+    results, moist, design = [], [], []
+    for number, (together, air) in enumerate(groups):
+        found = balances(together, weather, step_s, progress=progress, **air)
+        results += found
+        moist += room_humidity(together, found, weather, **air)
+        if study.design is not None:
+            cold = study.design.outdoor_c
+            design.append(design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air))
+        progress("heat balance", (number + 1) / len(groups))
+    table = pd.concat(design, ignore_index=True) if design else None
+    return _Balanced(rooms, results, moist, notes, table)
+
+
+def _transfers(
+    study: StudyFile, building: Building, rooms: Sequence[RoomZone], weather: Weather
+) -> list[AirTransfer]:
+    """The air that flows one way between rooms.
+
+    Raises: `DataError` for a room that is not there, or not simulated.
+    """
+    names = {room.space.guid: room.zone.name for room in rooms}
+    hours, found = OperationHours(study, weather), []
+    for number, table in enumerate(study.transfer):
+        place = f"transfer.{number}"
+        ends = []
+        for key in ("source", "target"):
+            guid = building.room(getattr(table, key)).space.guid
+            if guid not in names:
+                message = f"{getattr(table, key)!r} is not among the study's rooms"
+                raise DataError(message, file=study.building, field=f"{place}.{key}")
+            ends.append(names[guid])
+        found.append(AirTransfer(*ends, hours.value(table, "m3_h", place) / 3600.0))
+    return found
 
 
 def _felt(
@@ -132,12 +188,23 @@ def _felt(
     return felt(result, radiant, person.mean_radiant, _floor(zone), person.air_speed)
 
 
-def _year(study: StudyFile, room: RoomZone, result: ZoneResult, weather: Weather) -> ThermalYear:
+def _year(
+    study: StudyFile, room: RoomZone, result: ZoneResult, humidity: Humidity, weather: Weather
+) -> ThermalYear:
+    felt_by_person = felt_by(study.comfort, result, humidity)
+    powers = room_powers(room, result, humidity, weather, study.plant)
+    area = room.space.floor_area
+    summary, months = year_summary(result, weather, room.occupied)
     return ThermalYear(
         result.name,
-        room.space.floor_area,
-        hourly_table(result, room.state, room.daylight, weather, study.comfort),
-        *year_summary(result, weather, room.occupied),
+        area,
+        hourly_table(result, room.state, room.daylight, weather, felt_by_person),
+        summary
+        | comfort_summary(result, felt_by_person["pmv"], weather, room.occupied)
+        | energy_summary(powers, area),
+        months,
+        powers,
+        energy_by_month(powers, area),
     )
 
 
@@ -151,7 +218,7 @@ def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
     if study.box is not None:
         building = box_building(study.box)
         return building, list(building.spaces)
-    building = read_ifc(study.building, join=study.join)
+    building = read_building_file(study.building, ReadOptions(tuple(study.join)))
     if study.couple:
         spaces = named_spaces(building, study.spaces, study.building)
         return building, shared_constructions(spaces)

@@ -7,18 +7,19 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.head import check_head
+from bim.building_file import check_building_file
 from bim.model import BOX_PARTS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import ROUGHEST
 from mitsuba_cfs.methods import METHODS
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
+from scenes.heat.measured_weather import MeasuredTable
 from scenes.quick import HEAT, picks
 from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
+from scenes.room.schedules import OrSchedule, unknown_name
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 Part = Literal[BOX_PARTS]  # a side of the box, or all its faces of a kind
@@ -66,16 +67,6 @@ class BoxTable(TomlTable):
     construction: dict[Part, tuple[LayerTable, ...]] = Field(default_factory=dict)
 
 
-class ComfortTable(TomlTable):
-    """The person, for PMV and SET."""
-
-    metabolic_rate: Annotated[float, Field(ge=0.7, le=4)] = 1.2  # [met]
-    clothing: Annotated[float, Field(ge=0, le=2)] = 0.7  # [clo]
-    air_speed: Annotated[float, Field(ge=0, le=2)] = 0.1  # [m/s]
-    humidity: Annotated[float, Field(ge=0, le=100)] = 50.0  # relative, indoors [%]
-    mean_radiant: Literal["view factors", "room centre", "area"] = "view factors"
-
-
 class TraceTable(TomlTable):
     """How the light is computed: as the choices of those names of a run, with fewer rays."""
 
@@ -94,17 +85,33 @@ class TraceTable(TomlTable):
     view_factors: bool = True  # of the room's surfaces, for longwave and the person
 
 
+class TransferTable(TomlTable):
+    """Air that flows one way between two rooms."""
+
+    source: str  # names or GUIDs of rooms
+    target: str
+    m3_h: Annotated[float | str, OrSchedule(plausible.FLOW)]
+
+
+class DesignTable(TomlTable):
+    """The loads of design days."""
+
+    outdoor_c: Annotated[float, plausible.OUTDOOR] | None = None  # cold day; None: the weather's
+
+
 class StudyFile(OperationTables):
     """A whole study; paths are relative to the file."""
 
-    weather: Path
+    weather: Path  # an EPW file, or with `measured` a CSV file
+    measured: MeasuredTable | None = None
     building: Path | None = None
     spaces: tuple[str, ...] = ()
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     couple: bool = False  # heat flows through the walls between the rooms
+    transfer: tuple[TransferTable, ...] = ()
+    design: DesignTable | None = None  # loads of design days too
     box: BoxTable | None = None
     system: tuple[StateTable, ...] = ()  # states; none: what the building's file holds
-    comfort: ComfortTable = ComfortTable()
     trace: TraceTable = TraceTable()
     step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10
 
@@ -119,9 +126,15 @@ class StudyFile(OperationTables):
     def _fits(self) -> StudyFile:
         if (self.building is None) == (self.box is None):
             raise ValueError("give either `building` or `[box]`")
-        for key in ("spaces", "join", "couple") if self.box is not None else ():
+        for key in ("spaces", "join", "couple", "transfer") if self.box is not None else ():
             if getattr(self, key):
                 raise ValueError(f"{key}: belongs to a `building`; a box is one room")
+        if self.transfer and not self.couple:
+            raise ValueError("transfer: goes between rooms with `couple = true`")
+        for number, one in enumerate(self.transfer):
+            if isinstance(one.m3_h, str) and one.m3_h not in self.schedules:
+                fault = unknown_name(one.m3_h, self.schedules)
+                raise ValueError(f"transfer.{number}.m3_h: {fault}")
         if not self.system:
             if self.box is not None:
                 raise ValueError("system: is missing; a box holds no fenestration data")
@@ -151,8 +164,7 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
         found["trace"] = study.trace.model_copy(update=picks(HEAT, given))
     if study.building is not None:
         found["building"] = _there(here, study.building, path)
-        check_head(found["building"])
-        corrections_beside(found["building"])
+        check_building_file(found["building"])
     return study.model_copy(update=found)
 
 

@@ -7,19 +7,19 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
-from scenes.heat.study_file import ComfortTable
 from thermal.balance import ZoneResult
 from thermal.comfort import (
     ADAPTIVE_BANDS,
     adaptive_comfort,
-    pmv_ppd,
     running_mean,
     running_mean_en16798,
-    standard_effective_temperature,
     summarise,
 )
 
 FloatArray = NDArray[np.float64]
+CATEGORIES = ("I", "II", "III")  # of ADAPTIVE_BANDS
+PMV_CATEGORIES = {"I": 0.2, "II": 0.5, "III": 0.7, "IV": 1.0}  # EN 16798-1:2019, table B.1
+WARM = 26.0  # [degC] operative, above which overheating is counted, ISO 17772, DIN 4108-2
 
 
 def hourly_table(
@@ -27,19 +27,15 @@ def hourly_table(
     state: NDArray[np.int64],
     daylight: FloatArray | None,
     weather: Weather,
-    person: ComfortTable,
+    felt: dict[str, FloatArray],
 ) -> pd.DataFrame:
-    """Temperatures, votes, loads, state and heat flows by hour."""
-    about = person.model_dump(exclude={"mean_radiant"})
-    pmv, ppd = pmv_ppd(result.air_c, result.mrt_c, **about)
+    """Temperatures, votes, loads, state and heat flows by hour; felt: `felt_by`."""
     table = {
         "outdoor_c": weather.dry_bulb_c,
         "air_c": result.air_c,
         "mrt_c": result.mrt_c,
         "operative_c": result.operative_c,
-        "pmv": pmv,
-        "ppd": ppd,
-        "set_c": standard_effective_temperature(result.air_c, result.mrt_c, **about),
+        **felt,
         "heating_w": result.heating,
         "cooling_w": result.cooling,
         "shading_state": state,
@@ -54,30 +50,66 @@ def hourly_table(
     return pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
 
 
+def rows_per_day(weather: Weather) -> int:
+    """Time steps of a day."""
+    return round(24.0 / weather.step_h)
+
+
+def _in_hours(counts: NDArray[np.int64], weather: Weather) -> NDArray:
+    """Counts of time steps as hours; whole ones stay whole."""
+    return counts if weather.step_h == 1.0 else counts * weather.step_h
+
+
+def comfort_summary(
+    result: ZoneResult, pmv: FloatArray, weather: Weather, occupied: NDArray[np.bool_]
+) -> dict[str, float]:
+    """Occupied hours by categories of EN 16798-1, and warmth above 26 degC.
+
+    The adaptive categories count where the running mean lies in the standard's range; a category
+    holds the hours of those before it.
+    """
+    found = {}
+    mean = running_mean_en16798(weather.dry_bulb_c, per_day=rows_per_day(weather))
+    for name in CATEGORIES:
+        band = adaptive_comfort(result.operative_c, mean, f"EN 16798-1 {name}")
+        found[f"adaptive_{name}_h"] = np.count_nonzero(band.comfortable & occupied)
+    inside = band.applicable & occupied
+    found["adaptive_IV_h"] = np.count_nonzero(inside) - found["adaptive_III_h"]
+    for name, limit in PMV_CATEGORIES.items():
+        found[f"pmv_{name}_h"] = np.count_nonzero((np.abs(pmv) < limit) & occupied)
+    warm = np.maximum(result.operative_c - WARM, 0.0)
+    found["above_26_h"] = np.count_nonzero((warm > 0) & occupied)
+    found["above_26_kh"] = warm[occupied].sum()
+    found["above_26_kh_all_hours"] = warm.sum()
+    found = {key: float(value) * weather.step_h for key, value in found.items()}
+    mean_vote = pmv[occupied].mean() if occupied.any() else pmv.mean()
+    return found | {"pmv_mean": float(mean_vote)}
+
+
 def year_summary(
     result: ZoneResult, weather: Weather, occupied: NDArray[np.bool_]
 ) -> tuple[dict[str, float], pd.DataFrame]:
     """Energy, peaks and comfort of the occupied hours [H], and their discomfort by month."""
     month = weather.midpoints.month.to_numpy()
     found = {
-        "heating_kwh": result.heating.sum() / 1e3,
-        "cooling_kwh": result.cooling.sum() / 1e3,
+        "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
+        "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,
         "peak_heating_w": result.heating.max(),
         "peak_cooling_w": result.cooling.max(),
         "operative_min_c": result.operative_c.min(),
         "operative_max_c": result.operative_c.max(),
     }
     means = {
-        "ASHRAE": running_mean(weather.dry_bulb_c),
-        "EN": running_mean_en16798(weather.dry_bulb_c),
+        "ASHRAE": running_mean(weather.dry_bulb_c, per_day=rows_per_day(weather)),
+        "EN": running_mean_en16798(weather.dry_bulb_c, per_day=rows_per_day(weather)),
     }
     months = {}
     for band in ADAPTIVE_BANDS:
         comfort = adaptive_comfort(result.operative_c, means[band.split()[0]], band)
         counted = summarise(comfort, occupied, month)
-        found[f"comfortable_h {band}"] = counted.comfortable
-        months[f"{band} [h]"] = counted.discomfort_by_month
-        found[f"degree_hours_warm {band}"] = counted.degree_hours_warm
-        found[f"degree_hours_cold {band}"] = counted.degree_hours_cold
+        found[f"comfortable_h {band}"] = counted.comfortable * weather.step_h
+        months[f"{band} [h]"] = _in_hours(counted.discomfort_by_month, weather)
+        found[f"degree_hours_warm {band}"] = counted.degree_hours_warm * weather.step_h
+        found[f"degree_hours_cold {band}"] = counted.degree_hours_cold * weather.step_h
     table = pd.DataFrame(months, index=pd.RangeIndex(1, 13, name="month"))
     return {key: float(value) for key, value in found.items()}, table

@@ -68,6 +68,7 @@ def moved_result(result: RoomYear, space: Space) -> RoomYear:
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
         glare=replace(glare, view=replace(glare.view, position=place)),
         seconds={},
+        explored=None,  # the template's serves both
         problems=tuple(moved_problem(problem, space, name) for problem in result.problems),
         template=name,
     )

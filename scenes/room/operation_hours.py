@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +14,21 @@ from numpy.typing import NDArray
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.weather import Weather
-from scenes.room.operation_tables import PARTS, OperationTables
+from scenes.room.operation_tables import OperationTables, operated_tables
 from scenes.room.schedules import WEEK, scheduled_fields
+from scenes.toml_file import TomlTable
 from thermal.control import by_schedule
+from thermal.emitters import HeatedSlab, IdealLoads
 from thermal.errors import ThermalInputError
-from thermal.zone import IdealLoads
+from thermal.ventilation import (
+    Leakage,
+    SupplyAir,
+    WindowAiring,
+    cross_flow,
+    single_sided,
+    stack_height,
+)
+from thermal.zone import WindowElement
 
 FloatArray = NDArray[np.float64]
 
@@ -43,7 +55,10 @@ class OperationHours:
 
     def _of(self, part: str, key: str) -> FloatArray | float | None:
         """The values [H] of a schedule, or the number that stands in its place."""
-        table = getattr(self.tables, part)
+        return self.value(getattr(self.tables, part), key, part)
+
+    def value(self, table: TomlTable, key: str, place: str) -> FloatArray | float | None:
+        """The same of a table within the tables, named by its place."""
         if key not in scheduled_fields(table):
             return getattr(table, key)
         name, limits = scheduled_fields(table)[key]
@@ -53,7 +68,7 @@ class OperationHours:
             limits.checked(float(values.min()))
             limits.checked(float(values.max()))
         except ValueError as error:
-            raise DataError(f"schedule {name!r}: {error}", field=f"{part}.{key}") from None
+            raise DataError(f"schedule {name!r}: {error}", field=f"{place}.{key}") from None
         return values
 
     def _while_occupied(self, part: str, key: str) -> FloatArray:
@@ -72,19 +87,68 @@ class OperationHours:
     def heat(self, floor_area: float) -> FloatArray:
         """Heat of people and equipment [H] [W]."""
         people = self._while_occupied("gains", "persons") * self.tables.gains.person_w
-        return self._while_occupied("gains", "equipment_w_m2") * floor_area + people
+        return self.equipment(floor_area) + people
+
+    def equipment(self, floor_area: float) -> FloatArray:
+        """Power of equipment [H] [W]."""
+        return self._while_occupied("gains", "equipment_w_m2") * floor_area
+
+    def vapour(self) -> FloatArray:
+        """Vapour of people and all else [H] [kg/s]."""
+        people = self._while_occupied("gains", "persons") * self.tables.gains.person_vapour_g_h
+        return (people + self._while_occupied("gains", "vapour_g_h")) / 3.6e6
 
     def lamps(self, floor_area: float) -> FloatArray:
         """Power of the lamps without daylight [H] [W]."""
         return self._while_occupied("gains", "lighting_w_m2") * floor_area
 
-    def air_changes(self) -> FloatArray:
-        """Outdoor air [H] [1/h]."""
-        night = self._of("air", "night_ach")
+    def outdoor_air(self) -> dict[str, Any]:
+        """Outdoor air but that of opened windows, by the names of a zone's fields."""
+        night, air = self._of("air", "night_ach"), self.tables.air
         if not isinstance(night, np.ndarray):
-            night = night * working_hours(self.weather, *self.tables.air.night)
-        fan = self._while_occupied("air", "ventilation_ach")
-        return self._of("air", "infiltration_ach") + night + fan
+            night = night * working_hours(self.weather, *air.night)
+        fan = SupplyAir(
+            self._while_occupied("air", "ventilation_ach"),
+            self._of("air", "supply_c"),
+            recovery=air.heat_recovery,
+            bypass_above_c=np.inf if air.bypass_above_c is None else air.bypass_above_c,
+            least_c=-np.inf if air.least_supply_c is None else air.least_supply_c,
+        )
+        leaks = Leakage() if air.leakage is None else air.leakage.leakage()
+        return {
+            "infiltration_ach": self._of("air", "infiltration_ach"),
+            "leakage": replace(leaks, factors=air.infiltration_factors),
+            "other_air_ach": night,
+            "supply": fan,
+        }
+
+    def airing(self, windows: Sequence[WindowElement]) -> WindowAiring | None:
+        """How the windows of a room are opened; None where they are not."""
+        table = self.tables.air.windows
+        if table is None or not windows:
+            return None
+        share = self.value(table, "share", "air.windows")
+        if not isinstance(share, np.ndarray) and table.when == "occupied":
+            share = share * (self.present > 0)
+        half = np.array([0.5 * w.glazing_height for w in windows])
+        middle, areas = np.array([w.height for w in windows]), [w.area for w in windows]
+        height = stack_height(middle - half, middle + half)
+        if table.flow == "cross":
+            azimuth = [np.degrees(np.arctan2(w.normal[0], w.normal[1])) for w in windows]
+            wind, stack = cross_flow(areas, azimuth, height)
+        else:
+            wind, stack = single_sided(sum(areas), height)
+        return WindowAiring(
+            wind,
+            stack,
+            both=table.flow == "cross",
+            share=share,
+            open_above_c=table.open_above_c,
+            close_below_c=table.close_below_c,
+            least_difference=table.least_difference,
+            greatest_wind=table.greatest_wind,
+            least_outdoor_c=table.least_outdoor_c,
+        )
 
     def states(self, count: int) -> NDArray[np.int64]:
         """Shading states of the rule "schedule" [H], of windows that have so many."""
@@ -106,13 +170,29 @@ class OperationHours:
             infinity if cooling is None else cooling,
             stated.heating_limit_w or infinity,
             stated.cooling_limit_w or infinity,
+            stated.heating_radiant,
+            stated.cooling_radiant,
+        )
+
+    def slab(self, surface: str, area: float) -> HeatedSlab:
+        """The heated slab of `loads.slab` in a surface of the room of that area [m2]."""
+        table, place = self.tables.loads.slab, "loads.slab"
+        heating, cooling = (self.value(table, k, place) for k in ("heating_c", "cooling_c"))
+        return HeatedSlab(
+            surface,
+            table.depth,
+            -np.inf if heating is None else heating,
+            np.inf if cooling is None else cooling,
+            table.heating_w_m2 * area,
+            table.cooling_w_m2 * area,
+            table.band,
         )
 
     def check(self) -> None:
         """Raise `DataError` for the first value that cannot be."""
-        for part in PARTS:
-            for key in scheduled_fields(getattr(self.tables, part)):
-                self._of(part, key)
+        for place, table in operated_tables(self.tables):
+            for key in scheduled_fields(table):
+                self.value(table, key, place)
         try:
             self.loads()
         except ThermalInputError as error:

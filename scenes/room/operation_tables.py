@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -10,15 +11,18 @@ from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
+from scenes.room.air_tables import AirTable
+from scenes.room.envelope_tables import EnvelopeTable
+from scenes.room.load_tables import LoadsTable, PlantTable
 from scenes.room.schedules import (
     CLOCK,
     CalendarTable,
-    Hours,
     OrSchedule,
     ScheduleTable,
     clock_or_name,
     scheduled_fields,
     states_or_name,
+    tables_within,
     unknown_name,
 )
 from scenes.toml_file import Positive, Share, TomlTable
@@ -60,7 +64,9 @@ class GainsTable(TomlTable):
 
     equipment_w_m2: Annotated[float | str, OrSchedule(plausible.GAIN)] = 8.0
     persons: Annotated[float | str, OrSchedule(plausible.PERSONS)] = 1.0
-    person_w: Annotated[float, plausible.PERSON] = 75.0
+    person_w: Annotated[float, plausible.PERSON] = 75.0  # dry
+    person_vapour_g_h: Annotated[float, plausible.VAPOUR] = 50.0
+    vapour_g_h: Annotated[float | str, OrSchedule(plausible.VAPOUR)] = 0.0  # of all else
     lighting_w_m2: Annotated[float | str, OrSchedule(plausible.LAMPS)] = 0.0
     lighting_target_lx: Annotated[Positive, plausible.TARGET] = (
         500.0  # of the mean on the work plane; daylight dims
@@ -70,32 +76,14 @@ class GainsTable(TomlTable):
     occupied: Annotated[tuple[int, int] | str, OrSchedule(plausible.SHARE, clock_or_name)] = (8, 18)
 
 
-class AirTable(TomlTable):
-    """Outdoor air."""
+class ComfortTable(TomlTable):
+    """The person, for PMV and SET."""
 
-    infiltration_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.5
-    night_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0  # by night
-    night: Hours = (0, 7)
-    # of a fan, while occupied; the name of a schedule says its own hours
-    ventilation_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0
-    # each way through every open door between coupled rooms [m3/s]; 0: the doors are shut
-    door_m3_s: Annotated[float, plausible.DOOR_FLOW] = 0.0
-
-
-class LoadsTable(TomlTable):
-    """Ideal heating and cooling; without set points the room floats."""
-
-    heating_c: Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)] = None
-    cooling_c: Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)] = None
-    heating_limit_w: Annotated[Positive, plausible.POWER] | None = None
-    cooling_limit_w: Annotated[Positive, plausible.POWER] | None = None
-
-    @model_validator(mode="after")
-    def _do_not_cross(self) -> LoadsTable:
-        if isinstance(self.heating_c, float) and isinstance(self.cooling_c, float):
-            if self.heating_c > self.cooling_c:
-                raise ValueError("the set points cross: heating_c lies above cooling_c")
-        return self
+    metabolic_rate: Annotated[float, Field(ge=0.7, le=4)] = 1.2  # [met]
+    clothing: Annotated[float, Field(ge=0, le=2)] = 0.7  # [clo]
+    air_speed: Annotated[float, Field(ge=0, le=2)] = 0.1  # [m/s]
+    humidity: Annotated[float, Field(ge=0, le=100)] | None = None  # [%]; None: of the room's air
+    mean_radiant: Literal["view factors", "room centre", "area"] = "view factors"
 
 
 class RoomsTable(TomlTable):
@@ -107,6 +95,7 @@ class RoomsTable(TomlTable):
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
     loads: LoadsTable = LoadsTable()
+    envelope: EnvelopeTable = EnvelopeTable()
 
     @model_validator(mode="after")
     def _names_some(self) -> RoomsTable:
@@ -115,7 +104,13 @@ class RoomsTable(TomlTable):
         return self
 
 
-PARTS = ("control", "gains", "air", "loads")
+PARTS = ("control", "gains", "air", "loads", "envelope")
+
+
+def operated_tables(tables: TomlTable) -> Iterator[tuple[str, TomlTable]]:
+    """The parts of a room's tables and the tables within them, with their places."""
+    for part in PARTS:
+        yield from tables_within(getattr(tables, part), part)
 
 
 class OperationTables(TomlTable):
@@ -126,6 +121,9 @@ class OperationTables(TomlTable):
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
     loads: LoadsTable = LoadsTable()
+    envelope: EnvelopeTable = EnvelopeTable()
+    comfort: ComfortTable = ComfortTable()
+    plant: PlantTable = PlantTable()
     rooms: tuple[RoomsTable, ...] = ()  # the first that names a room holds for it
     schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
     calendar: CalendarTable = CalendarTable()
@@ -133,10 +131,10 @@ class OperationTables(TomlTable):
     @model_validator(mode="after")
     def _schedules_are_there(self) -> OperationTables:
         for number, tables in enumerate((self, *self.rooms), -1):
-            for part in PARTS:
-                for key, (name, _) in scheduled_fields(getattr(tables, part)).items():
+            place = "" if number < 0 else f"rooms.{number}."
+            for part, table in operated_tables(tables):
+                for key, (name, _) in scheduled_fields(table).items():
                     if name not in self.schedules:
-                        place = "" if number < 0 else f"rooms.{number}."
                         fault = unknown_name(name, self.schedules)
                         raise ValueError(f"{place}{part}.{key}: {fault}")
         return self

@@ -38,21 +38,39 @@ from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
-from scenes.results import DaylightResult, GlareResults, OperationResult, RoomYear, ThermalResult
+from scenes.results import (
+    DaylightResult,
+    ExploredRoom,
+    GlareResults,
+    OperationResult,
+    RoomYear,
+    ThermalResult,
+)
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.room.control import shading_states
 from scenes.room.daylight import room_daylight, room_scene
+from scenes.room.envelope import enveloped
+from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.holes import hole_problems
+from scenes.room.humidity import felt_by, room_humidity
 from scenes.room.operation import Operation
 from scenes.room.operation_hours import OperationHours
-from scenes.room.operation_tables import OperationTables
+from scenes.room.operation_tables import ComfortTable, OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.solar import RoomSun
-from scenes.room.thermal import fenestration_table, thermal_result
+from scenes.room.thermal import fenestration_table, operated_year, thermal_result
 from scenes.room.windows import room_windows
-from scenes.room.zone import RoomZone, balances, internal_gains, operated, with_states
+from scenes.room.zone import (
+    RoomZone,
+    balances,
+    internal_gains,
+    operated,
+    plain_services,
+    services_of,
+    with_states,
+)
 from thermal.balance import ZoneResult
 from thermal.errors import ThermalInputError
 
@@ -81,6 +99,7 @@ def compute_room(
     skies: AnnualSky | None = None,
     cache: MatrixCache | None = None,
     pictures: bool = True,
+    explore: bool = False,
     rate: tuple[str, NDArray[np.int64]] | None = None,
     progress: Progress = silent,
 ) -> RoomYear:
@@ -97,6 +116,7 @@ def compute_room(
         cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
             and weather do not enter V and D: variants of them cost only algebra.
         pictures: False leaves the luminance pictures and their glare out.
+        explore: True gives every hour's picture in every state, for the explorer.
         rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
 
     Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
@@ -119,9 +139,13 @@ def compute_room(
     if pictures:
         rated = room.timed("glare", lambda: room.glare(hours, year))
     dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
+    explored = room.timed("explorer", room.explored) if explore else None
     heat, balance = room.timed("thermal", room.thermal)
     ran = None if operation is None else room.operation_result(balance)
-    return RoomYear(space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes)
+    return RoomYear(
+        space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes,
+        explored=explored,
+    )  # fmt: skip
 
 
 class RoomSimulation:
@@ -258,6 +282,13 @@ class RoomSimulation:
             options=rating_of(self.outputs), progress=steps,
         )  # fmt: skip
 
+    def explored(self) -> ExploredRoom:
+        """Every hour in every state."""
+        states = max(self.windows.systems, key=len)
+        names = [state.name for state in states]
+        steps = part(self.progress, 0.0, 1.0, "explorer")
+        return explored_room(self.light, self.state, names, steps)
+
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
         if not hours and year is not None:
@@ -338,9 +369,16 @@ class RoomSimulation:
         if self.operation is not None:
             area = self.space.floor_area
             zone, lamps = operated(room.zone, self.operation, area, self.weather, plane)
-            room = replace(room, zone=zone)
+            room = enveloped(
+                replace(room, zone=zone), self.building, self.space, self.operation, self.weather
+            )
+            services = services_of(self.operation, area, self.weather)
+        else:
+            services = plain_services(self.space, self.occupied, self.options.occupancy)
         solar, gains = sun.switched(self.windows, self.thermals, state)
-        return RoomZone(self.space, room, solar, gains, state, lamps, self.occupied, plane)
+        return RoomZone(
+            self.space, room, solar, gains, state, lamps, self.occupied, plane, services
+        )
 
     def thermal(self) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort, and the balance they come from."""
@@ -348,27 +386,14 @@ class RoomSimulation:
         (balance,) = balances([self.zone], self.weather, step_s, progress=self.progress)
         self.progress("heat", 1.0)
         table = fenestration_table(self.windows, self.thermals)
-        return thermal_result(self.zone, balance, self.weather, self.occupied, table), balance
+        (humidity,) = room_humidity([self.zone], [balance], self.weather)
+        person = ComfortTable() if self.operation is None else self.operation.comfort
+        return thermal_result(
+            self.zone, balance, self.weather, felt_by(person, balance, humidity), table
+        ), balance
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""
         most = max(self.windows.systems, key=len)
-        hours = pd.DataFrame(
-            {
-                "shading_state": self.state,
-                "heating_w": balance.heating,
-                "cooling_w": balance.cooling,
-                "lighting_w": self.zone.lamps,
-            },
-            index=self.weather.midpoints,
-        ).rename_axis("time")
-        summary = {
-            "heating_kwh": balance.heating.sum() / 1e3,
-            "cooling_kwh": balance.cooling.sum() / 1e3,
-            "lighting_kwh": self.zone.lamps.sum() / 1e3,
-            "peak_heating_w": balance.heating.max(),
-            "peak_cooling_w": balance.cooling.max(),
-        }
         names = tuple(system.name for system in most)
-        summary = {key: float(value) for key, value in summary.items()}
-        return OperationResult(names, hours, summary, self.operation.control.rule)
+        return operated_year(self.zone, balance, self.weather, names, self.operation.control.rule)

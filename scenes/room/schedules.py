@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from difflib import get_close_matches
@@ -207,6 +207,19 @@ def scheduled_fields(table: TomlTable) -> dict[str, tuple[str, Limits]]:
             if isinstance(metadata, OrSchedule) and isinstance(value, str):
                 found[key] = value, metadata.limits
     return found
+
+
+def tables_within(table: TomlTable, place: str) -> Iterator[tuple[str, TomlTable]]:
+    """A table and all tables within it, with their places."""
+    yield place, table
+    for key in type(table).model_fields:
+        value = getattr(table, key)
+        if isinstance(value, TomlTable):
+            yield from tables_within(value, f"{place}.{key}")
+        elif isinstance(value, tuple):
+            for number, one in enumerate(value):
+                if isinstance(one, TomlTable):
+                    yield from tables_within(one, f"{place}.{key}.{number}")
 
 
 def unknown_name(name: str, known: Mapping[str, object]) -> str:

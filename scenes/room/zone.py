@@ -21,11 +21,24 @@ from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.gains import dimmed_share, split_gains
 from thermal.kernel import advance
+from thermal.ventilation import AirTransfer
 from thermal.zone import Gains, Zone
 
 FloatArray = NDArray[np.float64]
 COMPILING = "compiling the heat balance, once: about 10 s"
 RADIANT_SHARE = 0.5  # of the heat of people and equipment
+PERSON_VAPOUR = 50.0 / 3.6e6  # of somebody at a desk [kg/s]
+
+
+@dataclass(frozen=True, slots=True)
+class RoomServices:
+    """What a room uses and holds besides temperatures: electricity, vapour, humidity."""
+
+    equipment: FloatArray  # [H] power [W]
+    vapour: FloatArray  # [H] [kg/s]
+    fan_w_m3_s: float = 0.0  # power of the fan per air
+    humidify_to: float = 0.0  # relative humidity, 0 to 1
+    dehumidify_to: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +53,7 @@ class RoomZone:
     lamps: FloatArray  # [H] power [W]
     occupied: NDArray[np.bool_]  # [H]
     daylight: FloatArray | None  # [H] mean on the work plane [lx]; None: nothing asked for it
+    services: RoomServices
 
     @property
     def zone(self) -> Zone:
@@ -57,13 +71,19 @@ def balances(
     step_s: float,
     *,
     air_links: FloatArray | None = None,
+    transfers: Sequence[AirTransfer] = (),
     progress: Progress = silent,
 ) -> list[ZoneResult]:
     """The years of rooms that exchange heat through their partitions and doors."""
     if must_compile(advance):
         progress(COMPILING, 0.0)
     zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in rooms]
-    return list(simulate_zones(zones, climate(weather), suns, step_s=step_s, air_links=air_links))
+    row_s = 3600.0 * weather.step_h
+    found = simulate_zones(
+        zones, climate(weather), suns, step_s=min(step_s, row_s), row_s=row_s,
+        air_links=air_links, transfers=transfers,
+    )  # fmt: skip
+    return list(found)
 
 
 def coupled(
@@ -105,6 +125,26 @@ def internal_gains(space: Space, present: NDArray[np.bool_], occupancy: Occupanc
     return Gains((1 - RADIANT_SHARE) * power * present, RADIANT_SHARE * power * present)
 
 
+def plain_services(space: Space, present: NDArray[np.bool_], occupancy: Occupancy) -> RoomServices:
+    """The services of a room without tables, as `internal_gains`."""
+    persons = space.floor_area / occupancy.floor_per_person * present
+    equipment = space.floor_area * occupancy.equipment_w_m2 * present
+    return RoomServices(equipment, persons * PERSON_VAPOUR)
+
+
+def services_of(tables: OperationTables, floor_area: float, weather: Weather) -> RoomServices:
+    """The services of a room by its tables."""
+    hours, loads = OperationHours(tables, weather), tables.loads
+    low, high = loads.humidify_to, loads.dehumidify_to
+    return RoomServices(
+        hours.equipment(floor_area),
+        hours.vapour(),
+        tables.air.fan_w_m3_s,
+        0.0 if low is None else low / 100.0,
+        1.0 if high is None else high / 100.0,
+    )
+
+
 def operated(
     zone: Zone,
     tables: OperationTables,
@@ -123,7 +163,8 @@ def operated(
         lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
     found = replace(
         zone,
-        infiltration_ach=hours.air_changes(),
+        **hours.outdoor_air(),
+        airing=hours.airing(zone.windows),
         gains=split_gains(
             hours.heat(floor_area), gains.radiant_share, (lamps, gains.radiant_share)
         ),

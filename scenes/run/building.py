@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from bim.ifc.building import STAGES, read_ifc
+from bim.building_file import STAGES, ReadOptions, read_building_file
 from bim.model import Building
 from mitsuba_cfs.progress import Progress, silent, summed
 
@@ -16,16 +16,26 @@ def read_building(
     *,
     join: Sequence[str] = (),
     furniture: bool = False,
+    apertures: Sequence[str] = (),
+    surroundings: Sequence[str | PathLike[str]] = (),
+    surroundings_offset: tuple[float, float, float] | None = None,
     progress: Progress = silent,
 ) -> Building:
-    """The building of an IFC file, with the corrections kept beside it.
+    """The building of an IFC file, with the corrections kept beside it, or of another format.
 
     Args:
         join: rooms to make one, as "Hall + Living".
         furniture: whether what stands in the rooms is in their light and views.
+        apertures: materials of a Radiance scene's surfaces that are windows.
+        surroundings: files of what stands around, see `bim.with_surroundings`.
+        surroundings_offset: added to their coordinates [m] in place of any georeference.
 
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
         `problems`.
     """
     steps = summed(progress, "inputs", STAGES)
-    return read_ifc(Path(path), join=join, furniture=furniture, progress=steps)
+    options = ReadOptions(
+        tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
+        surroundings_offset,
+    )  # fmt: skip
+    return read_building_file(path, options, steps)

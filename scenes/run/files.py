@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.head import check_head
+from bim.building_file import check_building_file
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, Given, read_system
@@ -37,8 +36,7 @@ def read_files(options: JobOptions) -> JobFiles:
 
     Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
     """
-    check_head(options.building)
-    corrections_beside(options.building)
+    check_building_file(options.building)
     check_names(options.spaces)
     hours = options.room.outputs.picture_hours
     check_hours(hours)

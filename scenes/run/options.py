@@ -19,6 +19,7 @@ class BuildingOptions:
     spaces: tuple[str, ...] = ()  # names or GUIDs; none: all that the command is for
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     furniture: bool = False  # whether what stands in the rooms is in their light and views
+    apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows; none: all of glass
     cache: bool = True  # keep traced matrices and find them again
     quick: bool = False  # said in the results; what it chooses is in `scenes.quick`
     room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
@@ -34,5 +35,8 @@ class JobOptions(BuildingOptions):
     """Inputs and choices of a run."""
 
     operation: Path | None = None
+    surroundings: tuple[Path, ...] = ()  # files of what stands around
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    explore: bool = False  # every hour's picture in every shading state, for the explorer
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence

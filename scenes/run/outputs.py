@@ -17,11 +17,17 @@ from scenes.room.daylight import illuminance_table
 from scenes.room.glare import glare_table
 from scenes.run.csv_text import csv_text
 
+EXPLORER = "explore"  # folder of the explorer, inside that of the results
 
-def write_results(result: RunResult, folder: ResultFolder, write_report=None) -> None:
+
+def write_results(
+    result: RunResult, folder: ResultFolder, write_report=None, write_explorer=None
+) -> None:
     """Write all files of a run; earlier results are replaced at the end.
 
-    Args: write_report: `scenes.report.write_report`, or None for no report.
+    Args:
+        write_report: `scenes.report.write_report`, or None for no report.
+        write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
     """
     with folder.replaced() as temporary:
         several = len(result.spaces) > 1
@@ -33,6 +39,8 @@ def write_results(result: RunResult, folder: ResultFolder, write_report=None) ->
         write_table(_problems(result), temporary / "problems.csv", index=False)
         if write_report is not None:
             write_report(result, temporary / "report.html")
+        if write_explorer is not None:
+            write_explorer(result, temporary / EXPLORER)
         text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
 

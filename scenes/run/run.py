@@ -140,7 +140,13 @@ def read_inputs(
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
     building = read_building(
-        options.building, join=options.join, furniture=options.furniture, progress=steps
+        options.building,
+        join=options.join,
+        furniture=options.furniture,
+        apertures=options.apertures,
+        surroundings=options.surroundings,
+        surroundings_offset=options.surroundings_offset,
+        progress=steps,
     )
     inputs = job_inputs(building, options.spaces, files)
     progress("inputs", 1.0)
@@ -192,7 +198,8 @@ def _rooms(
     def compute(space: Space, steps: Progress) -> RoomYear:
         return compute_room(
             inputs.building, space, inputs.systems, inputs.weather, options.room,
-            operation=inputs.operation, skies=skies, cache=cache, progress=steps,
+            operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
+            progress=steps,
         )  # fmt: skip
 
     return RoomSeries(
@@ -233,6 +240,7 @@ def _manifest(
     if inputs.operation is not None:
         files["operation"] = inputs.operation.file
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
+    files |= {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
         "quick": options.quick,
@@ -244,7 +252,11 @@ def _manifest(
         "system": ", ".join(dict.fromkeys(system.name for system in used)),
         "fenestration": used_sources(inputs),
         "options": {
-            key: str(value) if isinstance(value, Path) else value
+            key: str(value)
+            if isinstance(value, Path)
+            else [str(file) for file in value]
+            if key == "surroundings"
+            else value
             for key, value in options.named().items()
         },
         "seed": options.room.sampling.seed,

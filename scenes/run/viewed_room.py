@@ -48,16 +48,20 @@ def read_viewed_room(
     progress: Progress,
     *,
     furniture: bool = False,
+    apertures: Sequence[str] = (),
 ) -> ViewedRoom:
-    """The room of an IFC file, seen in the visible band.
+    """The room of a building file, seen in the visible band.
 
     Args:
         space: its name; None: the first with a window.
         given: what the user gives for all windows.
         view_of: the view of a room; it refuses one that is not in it.
         furniture: whether what stands in the room is seen.
+        apertures: materials of a Radiance scene's windows.
     """
-    building = read_building(file, join=join, furniture=furniture, progress=progress)
+    building = read_building(
+        file, join=join, furniture=furniture, apertures=apertures, progress=progress
+    )
     room = chosen_spaces(building, () if space is None else (space,), file)[0]
     view = view_of(room)
     filled = {guid: states[:1] for guid, states in fill_windows(room.windows, given, file).items()}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.head import check_head
+from bim.building_file import check_building_file
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import checked_system
@@ -26,8 +25,7 @@ def check_files(study: Study) -> None:
     for room in study.room:
         check_names(room.spaces, f"room {room.name}: spaces")
         if room.building is not None:
-            check_head(room.building)
-            corrections_beside(room.building)
+            check_building_file(room.building)
         else:
             box_building(room.box)
     operation = None if study.operation is None else read_operation(study.operation)

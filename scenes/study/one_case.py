@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.ifc.building import read_ifc
+from bim.building_file import read_building_file
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -95,7 +95,7 @@ def _computed(case: Case) -> CaseResult:
 
 @lru_cache(maxsize=4)
 def _building(source: InputFile) -> Building:
-    return read_ifc(source.path)
+    return read_building_file(source.path)
 
 
 def _room(case: Case) -> tuple[Building, Space]:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
-from bim.ifc.building import read_ifc
-from bim.ifc.fenestration_read import read_fenestration
+from bim.building_file import held_states, read_building_file
 from bim.model import Building, Space
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import box_building
@@ -59,7 +57,7 @@ def plan_of(study: Study) -> StudyPlan:
     for room in study.room:
         building, spaces = rooms_of(room)
         source = room.box if room.box is not None else InputFile.of(room.building)
-        referenced = named if study.system else _referenced(room.building)
+        referenced = named if study.system else _referenced(building)
         referenced += tuple(map(InputFile.of, operated))
         for space in spaces:
             about = {
@@ -100,9 +98,9 @@ def _of_space(
                     )
 
 
-def _referenced(building: Path) -> tuple[InputFile, ...]:
+def _referenced(building: Building) -> tuple[InputFile, ...]:
     """The BSDF files that a building's file names, and the `.toml` files beside them."""
-    held = read_fenestration(building).values()
+    held = held_states(building.windows, building.file).values()
     named = {state.file for states in held for state in states if state.file is not None}
     beside = (other for file in sorted(named) for other in files_beside(file))
     return tuple(InputFile.of(file) for file in (*sorted(named), *beside) if file.is_file())
@@ -113,5 +111,5 @@ def rooms_of(room: RoomTable) -> tuple[Building, list[Space]]:
     if room.box is not None:
         building = box_building(room.box)
         return building, list(building.spaces)
-    building = read_ifc(room.building)
+    building = read_building_file(room.building)
     return building, chosen_spaces(building, room.spaces, room.building)

@@ -14,8 +14,8 @@ from scenes.calibration.durations import seconds_of, share_of
 from scenes.heat.study_file import BoxTable
 from scenes.quick import ROOM, picks
 from scenes.room.operation import read_operation
-from scenes.room.operation_tables import Hours
 from scenes.room.options import CHOICES, RoomOptions, named_types
+from scenes.room.schedules import Hours
 from scenes.toml_file import TomlTable, read_table, validated
 
 OF_THE_GRID = ("method", "annual_glare")

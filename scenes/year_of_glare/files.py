@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bim.ifc.corrections import corrections_beside
-from bim.ifc.head import check_head
+from bim.building_file import check_building_file
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import Given, given_light
 from scenes.run.files import check_names
@@ -27,8 +26,7 @@ def read_files(options: YearOptions) -> YearFiles:
 
     Raises: `DataError` for what cannot be used.
     """
-    check_head(options.building)
-    corrections_beside(options.building)
+    check_building_file(options.building)
     check_names(() if options.space is None else (options.space,))
     rated_views(options)
     return YearFiles(read_weather(options.weather), given_light(options.system))

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.ifc.corrections import corrections_file
+from bim.building_file import files_beside
 from bim.model import Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
@@ -67,6 +67,7 @@ class GlareYear:
     digest: str  # of all inputs
     notes: tuple[str, ...] = ()  # of systems and weather
     fenestration: Sequence[dict] = ()  # name, source and windows of each system
+    space: Space | None = None  # the room, for its plan
 
 
 def read_year(
@@ -88,7 +89,7 @@ def read_year(
     steps = part(progress, 0.1, 0.6)
     viewed = read_viewed_room(
         options.building, options.space, options.join, files.given, view_of, steps,
-        furniture=options.furniture,
+        furniture=options.furniture, apertures=options.apertures,
     )  # fmt: skip
     variants.activate()
     sampling = sampling_of(options)
@@ -99,10 +100,10 @@ def read_year(
     progress("inputs", 1.0)
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     chosen += [options.window_parts, options.glare_sources, options.glare_sun]
-    chosen += [options.sun_model, options.sky_ground, options.furniture]
+    chosen += [options.sun_model, options.sky_ground, options.furniture, options.apertures]
     # corrections change rooms and surroundings, as --join does, under the same GUID
-    corrections = corrections_file(options.building)
-    hashes = [sha256(p) for p in (options.building, options.weather, corrections) if p.is_file()]
+    files_read = (options.building, options.weather, *files_beside(options.building))
+    hashes = [sha256(path) for path in files_read]
     # not of files: the model may name others, which change by themselves
     hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in viewed.systems)))
     chosen = [code_version(__name__), *chosen, *hashes]
@@ -111,7 +112,7 @@ def read_year(
     notes = (*viewed.notes(), *weather.notes)
     return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
-        notes, viewed.sources,
+        notes, viewed.sources, viewed.space,
     )  # fmt: skip
 
 

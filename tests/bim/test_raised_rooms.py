@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ifcopenshell.api.aggregate
 import ifcopenshell.api.pset
 import ifcopenshell.api.root
+import ifcopenshell.api.spatial
 import pytest
 
 from bim.ifc.building import read_ifc
 from bim.shell import open_edges
-from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WIDTH, box_model
+from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, OPENING, WALL, WIDTH, box_model
 
 LOW = 1.5  # a space that ends here has 0.8 m of 1.3 m of the window's glass above it [m]
 VOLUME = WIDTH * DEPTH * HEIGHT
@@ -87,6 +89,29 @@ def test_stated_ceiling_is_believed(tmp_path, relation):
     building = read(tmp_path, small)
     assert building.spaces[0].raised == 0.0
     assert "kept: " in said(building) and "eiling" in said(building)
+
+
+@pytest.mark.parametrize("height", [LOW, HEIGHT])
+def test_room_does_not_rise_into_a_storey_whose_rooms_are_not_drawn(tmp_path, height):
+    building = read(tmp_path, box_model(space_height=height, roof=False, upper=True)[0])
+    assert building.spaces[0].raised == 0.0
+    assert "above its top, a storey or more" in said(building)
+
+
+def test_hall_whose_high_glass_is_filed_with_the_storey_above_is_raised(tmp_path):
+    low, (x, _, width, _) = 1.8, OPENING
+    small, _ = box_model(space_height=low, places=((x, 1.9, width, 0.8),))
+    storey = ifcopenshell.api.root.create_entity(
+        small.model, ifc_class="IfcBuildingStorey", name="upper"
+    )
+    ifcopenshell.api.aggregate.assign_object(
+        small.model, products=[storey], relating_object=small.model.by_type("IfcBuilding")[0]
+    )
+    ifcopenshell.api.spatial.assign_container(
+        small.model, products=small.model.by_type("IfcWindow"), relating_structure=storey
+    )
+    building = read(tmp_path, small)
+    assert building.spaces[0].room_volume == pytest.approx(VOLUME, rel=1e-6)
 
 
 def test_slab_that_is_no_closed_solid_is_still_between(tmp_path):

@@ -157,12 +157,12 @@ print(json.dumps(found), flush=True)
 @pytest.mark.peer
 def test_a_pane_of_the_igsdb_is_windows_at_every_angle(real_data):
     """Fresnel of the mean over the spectrum against the mean of Fresnel at each wavelength."""
-    from scenes.fenestration.angular_file import read_product
+    from mitsuba_cfs.bsdf.pane_file import read_pane_file
 
     path = real_data / "bsdf/products_spectral/igsdb_product_364.json"
     words = [sys.executable, "-c", ENGINE, str(path), json.dumps(DEGREES.tolist())]
     answer = subprocess.run(words, capture_output=True, text=True, timeout=60)
     tau, rho = np.array(json.loads(answer.stdout)).T
-    table = stack_table([read_product(path)])
+    table = stack_table([read_pane_file(path).visible_pane()])
     assert table.transmitted(THETA) == pytest.approx(tau, abs=1e-3)
     assert table.reflected("front", THETA) == pytest.approx(rho, abs=1e-3)

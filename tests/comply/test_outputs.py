@@ -158,7 +158,7 @@ needs = [{what = "sun_hours", at_least = 6.0}]
 
 
 def test_a_failing_room_is_found_again_from_its_topic(tmp_path):
-    """From the BCF file alone into the model: a topic's GUID is the space that its title names."""
+    """From the BCF file alone into the model: the topic's GUID is the space of its title."""
     import ifcopenshell
 
     rule = tmp_path / "strict.toml"

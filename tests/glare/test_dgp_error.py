@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import f
 
+from mitsuba_cfs.glare.annual import annual_glare
 from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
+from mitsuba_cfs.glare.evaluation import GlareOptions, evaluate
 from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.methods.glare import _of_paths, rated_pictures
 from tests.glare.test_outdoor_pictures import sky
 from tests.trace import rooms
 
@@ -39,6 +44,67 @@ def test_errors_of_all_hours_follow_those_of_some() -> None:
     # 400 times: the mean square is good to 7 %, and the means over neighbours bend by 2 %
     np.testing.assert_allclose(mean[middle], truth[middle], rtol=0.12)
     assert np.isnan(dgp_errors(dgp[:0], hours[:0], dgp[:0])).all()
+
+
+VIEW = fisheye((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 48)
+PIXELS = np.arange(48 * 48)
+LUMINANCE = np.where(PIXELS % 48 < 24, 500.0, 4_000.0).astype(np.float32)
+SHARE = 0.2  # of the luminance that half pictures are off
+
+
+class Rated:
+    """Pictures of one hour of which the noise is known."""
+
+    view, pixels, hours = VIEW, PIXELS, 1
+
+    @staticmethod
+    def values(batch):
+        return np.tile(LUMINANCE, (len(batch), 1))
+
+    @staticmethod
+    def without_disc(batch):
+        return Rated.values(batch), [None] * len(batch)
+
+    @staticmethod
+    def noise(batch):
+        return SHARE * Rated.values(batch)
+
+
+def dgp_of(factor: float) -> float:
+    return evaluate((factor * LUMINANCE).reshape(48, 48), VIEW).dgp
+
+
+def test_the_error_of_a_year_is_half_of_what_its_half_pictures_differ() -> None:
+    found = annual_glare(Rated(), threads=1)
+    assert found.dgp[0] == pytest.approx(dgp_of(1.0), rel=1e-6)
+    expected = abs(dgp_of(1 + SHARE) - dgp_of(1 - SHARE)) / 2
+    assert expected > 0.01
+    assert found.dgp_standard_error[0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_error_of_a_shown_picture_is_that_of_its_halves() -> None:
+    filled = SimpleNamespace(systems=[[None]], traced=SimpleNamespace(scene=Rated))
+    light = SimpleNamespace(
+        filled=filled, sky=SimpleNamespace(lit=np.zeros(1)), pictures=lambda hours, now: Rated()
+    )
+    ((_, rated),) = rated_pictures(light, np.array([0]))
+    expected = abs(dgp_of(1 + SHARE) - dgp_of(1 - SHARE)) / 2
+    assert rated.dgp_standard_error == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_error_by_paths_is_that_of_another_seed() -> None:
+    """Two pictures of as many paths each differ by sqrt(2) of the error of one."""
+
+    def picture(hour, now, seed=0, **given):
+        return ((1 + SHARE * seed) * LUMINANCE).reshape(48, 48)
+
+    filled = SimpleNamespace(scene=Rated, systems=[[None]], sampling=SimpleNamespace(seed=0))
+    light = SimpleNamespace(filled=filled, picture=picture, disc=lambda hour, now: None)
+    rows = np.zeros((1, 1), dtype=np.int64)
+    options = GlareOptions()
+    found = _of_paths(light, "DGP", np.array([0]), rows, options, lambda stage, share: None)
+    expected = abs(dgp_of(1 + SHARE) - dgp_of(1.0)) / np.sqrt(2)
+    assert found.dgp_standard_error[0] == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.slow

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
+
+from scenes.evidence.devtools import chromium
 
 LISTEN = """<script>
 window.faults = [];
@@ -88,12 +89,6 @@ USE = """
       clientX: at.left + at.width * 171.5 / 365, clientY: at.top + at.height * 11.5 / 24 }));
     report.tip = document.querySelector(".tip").textContent;
 """
-
-
-def chromium() -> str | None:
-    """The browser's command, if there is one."""
-    names = ("chromium", "chromium-browser", "google-chrome")
-    return next((found for name in names if (found := shutil.which(name))), None)
 
 
 def inspect(page: str, folder: Path, *flags: str, width: int = 1400, use: str = USE) -> dict:

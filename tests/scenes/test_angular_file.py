@@ -74,10 +74,10 @@ def test_a_coated_pane_may_be_turned(tmp_path):
 
 
 def test_layers_of_a_glazing_system_are_read(tmp_path, real_data):
-    from scenes.fenestration.angular_file import read_layers
+    from mitsuba_cfs.bsdf.pane_file import read_glazing_layers
 
     path = real_data / "bsdf/products_spectral/afc_glazing_system_dgl00_clr.json"
-    panes = read_layers(path)
+    panes = [layer.visible_pane() for layer in read_glazing_layers(path)]
     told = json.loads(path.read_text())
     omega = KLEMS_FULL.projected_solid_angles()
     means = np.diag(np.array(told["visible_front_transmittance"])) * omega
@@ -94,7 +94,7 @@ def test_layers_of_a_glazing_system_are_read(tmp_path, real_data):
         ('[angular]\ntable = "none.csv"', r"none.csv: cannot be read"),
         ('[angular]\ntable = "glass.xml"', "expected the columns theta_deg"),
         ("[angular]", "expected one of table, roos, pane and glazing"),
-        ('[[angular.pane]]\nproduct = "glass.csv"', "is not JSON"),
+        ('[[angular.pane]]\nproduct = "glass.csv"', "is no spectral row"),
         ("[[angular.pane]]\ncoated = true", "either product or transmittance"),
         (
             "[[angular.pane]]\ntransmittance = 0.3\nreflectance_front = 0.1",
@@ -117,3 +117,35 @@ def test_what_scatters_has_no_function_of_an_angle(tmp_path):
     path.with_suffix(".toml").write_text(ROOS)
     with pytest.raises(DataError, match="scatters 100 %"):
         read_system(path)
+
+
+def test_reflectances_of_a_table_are_read(tmp_path):
+    names = ("theta_deg", "transmittance", "reflectance_front", "reflectance_back")
+    rows = ["0,0.7,0.12,0.2", "60,0.6,0.2,0.3", "90,0,1,1"]
+    (tmp_path / "sides.csv").write_text("\n".join([",".join(names), *rows]))
+    found = system(tmp_path, '[angular]\ntable = "sides.csv"').angular
+    assert found.reflected("front", 0.0) == pytest.approx(0.12)
+    assert found.reflected("back", np.radians(60)) == pytest.approx(0.3)
+
+
+def test_a_stated_pane_may_be_turned(tmp_path):
+    toml = (
+        "[[angular.pane]]\ntransmittance = 0.7\nreflectance_front = 0.10\n"
+        "reflectance_back = 0.15\nflipped = true"
+    )
+    glass = Pane("coated", 0.7, 0.15, 0.10, coated=True)
+    found = system(tmp_path, toml, glass).angular
+    assert found.reflected("front", 0.0) == pytest.approx(0.15, abs=2e-3)
+    assert found.reflected("back", 0.0) == pytest.approx(0.10, abs=2e-3)
+
+
+def test_a_unit_has_as_many_panes_as_it_says(tmp_path):
+    one = Glazing("unit", 0.70, 0.12, 0.13, 1)
+    found = system(tmp_path, ROOS + "\npanes = 1", one).angular
+    assert found.transmitted(THETA) == pytest.approx(roos_table(one).transmitted(THETA))
+    assert abs(found.transmitted(THETA[2]) - roos_table(UNIT).transmitted(THETA[2])) > 0.01
+
+
+def test_the_files_that_it_names_are_beside_it(tmp_path):
+    system(tmp_path, '[angular]\ntable = "glass.csv"')
+    assert [p.name for p in files_beside(tmp_path / "glass.xml")] == ["glass.toml", "glass.csv"]

@@ -13,8 +13,8 @@ from mitsuba_cfs.errors import DataError
 from scenes.cli import run
 from scenes.commands.dgp import command
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.room_views import turned
 from scenes.year_of_glare.options import YearOptions
-from scenes.year_of_glare.views import turned
 
 INSIDE = "-vta -vp 1.46 3.2 1.2 -vd 0 -1 0 -vh 180 -vv 180"
 

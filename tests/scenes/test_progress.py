@@ -8,7 +8,8 @@ import itertools
 import pytest
 from rich.console import Console
 
-from bim.ifc.building import STAGES, read_ifc
+from bim.building_file import STAGES
+from bim.ifc.building import read_ifc
 from mitsuba_cfs.progress import Stage, TimeLeft, item, part, spoken_left, summed
 from scenes.commands import compiling
 from scenes.commands.progress_bar import ProgressBar

@@ -31,7 +31,7 @@ def hours_of(schedule: dict, weather: Weather, **more) -> np.ndarray:
     tables = OperationTables.model_validate(
         {"air": {"infiltration_ach": "x"}, "schedules": {"x": schedule}} | more
     )
-    return OperationHours(tables, weather).air_changes()
+    return OperationHours(tables, weather).outdoor_air()["infiltration_ach"]
 
 
 WORK = [{"hours": [8, 18], "value": 1.0}]
@@ -99,7 +99,9 @@ def test_constant_numbers_are_as_ever_to_the_last_bit(weather) -> None:
     present = ((clock >= 8) & (clock < 18)).astype(float)
     np.testing.assert_array_equal(hours.heat(19.7), (8.0 * 19.7 + 2.0 * 75.0) * present)
     np.testing.assert_array_equal(hours.lamps(19.7), 7.3 * 19.7 * present)
-    np.testing.assert_array_equal(hours.air_changes(), 0.5 + 1.7 * (clock < 7))
+    air = hours.outdoor_air()
+    assert air["infiltration_ach"] == 0.5
+    np.testing.assert_array_equal(air["other_air_ach"], 1.7 * (clock < 7))
 
 
 def test_rooms_and_types_are_operated_otherwise(weather) -> None:

@@ -14,6 +14,7 @@ from bim.ifc.fenestration_read import read_fenestration
 from bim.ifc.targets import Targets
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_file import ThermalFile
 from scenes.fenestration.thermal_system import thermal_system
@@ -24,7 +25,7 @@ from thermal.closure import ERRORS, TYPICAL_FILMS, Closure
 from thermal.errors import ThermalInputError
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, Openings
 from thermal.iso15099 import iso15099_data, iso15099_u_value, prescribed
-from thermal.layer_sun import layered_thermal_data, sun_in_layers
+from thermal.layered import layered_thermal_data
 
 BLIND = Path(__file__).parents[2] / "scenes" / "demo" / "venetian_blind.xml"
 ROOT = Path(__file__).parents[2]
@@ -97,7 +98,7 @@ def test_what_layers_absorb_adds_up_and_panes_get_their_part(unit):
         assert absorbed[0, shade] > 0.4 and absorbed[0, 1:].max() < 0.06
     else:
         assert absorbed[0, :2].min() > 0.15
-    g = layered_thermal_data(unit, tau, rho, theta).g_value
+    g = layered_thermal_data(unit, tau, rho, absorbed).g_value
     inward = (g - tau) / (1 - tau - rho)
     # of the shade's own heat nearly all comes in from inside, nearly none from outside
     assert inward[0] > 0.4 if unit is INTERNAL else inward[0] < 0.2

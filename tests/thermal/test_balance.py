@@ -11,8 +11,9 @@ from thermal.balance import BalanceOptions, simulate, simulate_zones
 from thermal.blackbox import Fenestration, layer_absorptances
 from thermal.climate import Solar, no_sun
 from thermal.conduction import half_of_symmetric, u_value
+from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
-from thermal.zone import Gains, IdealLoads, Layer, OpaqueSurface, WindowElement, Zone
+from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone
 
 SOUTH = np.array([0.0, -1.0, 0.0])
 FILMS = {"inside_convection": "constant", "outside_convection": "constant", "outside_film": 20.0}

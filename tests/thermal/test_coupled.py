@@ -15,7 +15,8 @@ from tests.thermal.rooms import PLASTER, box, climate, sun
 from thermal.balance import BalanceOptions, simulate_zones
 from thermal.blackbox import Fenestration
 from thermal.climate import no_sun
-from thermal.zone import Gains, IdealLoads, Layer, OpaqueSurface, Zone
+from thermal.emitters import IdealLoads
+from thermal.zone import Gains, Layer, OpaqueSurface, Zone
 
 OFFICE = Path(__file__).parents[2] / "scenes" / "demo" / "office.ifc"
 WALL = (PLASTER, Layer(0.05, 2.3, 2300.0, 1000.0), PLASTER)

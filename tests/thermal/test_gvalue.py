@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from mitsuba_cfs.bsdf.glazing import roos_factor
 from tests.conftest import WINDOW_GLAZING
 from thermal.errors import ThermalInputError
 from thermal.glazing import (
@@ -14,7 +15,6 @@ from thermal.glazing import (
     en410_g_value,
     en673_u_value,
     gap_resistance,
-    roos_angular_factor,
 )
 from thermal.gvalue import (
     InternalShade,
@@ -53,15 +53,17 @@ def test_en410_agrees_with_window_s_engine():
 
 def test_roos_factor():
     # EQUATIONS.md 3.6: f(60 deg; p = 2, q = 4) = .87439
-    assert roos_angular_factor(np.radians(60.0)) == pytest.approx(0.87439, abs=5e-6)
-    np.testing.assert_allclose(roos_angular_factor([0.0, np.pi / 2]), [1.0, 0.0], atol=1e-12)
+    assert roos_factor(np.radians(60.0), panes=2, category=4.0) == pytest.approx(0.87439, abs=5e-6)
+    np.testing.assert_allclose(
+        roos_factor([0.0, np.pi / 2], panes=2, category=4.0), [1.0, 0.0], atol=1e-12
+    )
 
 
 def test_roos_factor_follows_the_reference_glazing():
     data = json.loads((WINDOW_GLAZING / "blackbox_dgu.json").read_text())
     theta = np.radians([row["theta"] for row in data["angular"]])
     g = np.array([row["g"] for row in data["angular"]])
-    model = g[0] * roos_angular_factor(theta, panes=2, category=3)
+    model = g[0] * roos_factor(theta, panes=2, category=3)
     assert np.sqrt(np.mean((model - g) ** 2)) < 0.009  # EQUATIONS.md: .008 rms
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scenes.evidence.validation.sunlit_facade import Device, Fin, Overhang
 from scenes.evidence.validation.sunlit_room import BoxRoom
 from thermal.blackbox import Fenestration
-from thermal.zone import Gains, IdealLoads, Layer, OpaqueSurface, WindowElement, Zone, scheduled
+from thermal.emitters import IdealLoads
+from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone, scheduled
 
 FloatArray = NDArray[np.float64]
 WIDTH, DEPTH, HEIGHT = 8.0, 6.0, 2.7

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.glazing import Pane
+from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean, pane_optics, stack
 from mitsuba_cfs.directions import window_frame
 from scenes.evidence.validation.ashrae140_cases import NORMALS, SEEN_FROM, Opening, opening_rooms
 from scenes.evidence.validation.facade_sun import FacadeSun, SunSteps, facade_sun
@@ -15,7 +17,6 @@ from scenes.evidence.validation.sunlit_room import BeamTable, diffuse_hits
 from thermal.blackbox import R_INNER, R_OUTER, Fenestration, layer_absorptances
 from thermal.climate import Solar
 from thermal.glazing import Gap, double_glazing_resistance, en410_g_value, en673_u_value
-from thermal.panes import coated_pane, hemispherical, stack, turned, uncoated_pane
 from thermal.shortwave import spread_evenly
 from thermal.zone import Zone
 
@@ -43,13 +44,14 @@ class AshraeGlazing:
 def glass(kind: str) -> AshraeGlazing:
     """The double (600), low-e (660) or single (670) glazing, through U, g and the Blackbox."""
     thickness, tau, rho = PANE
-    clear = uncoated_pane(ANGLES, tau, rho)
-    panes = {"single": [clear], "double": [clear, clear]}.get(kind, [coated_pane(ANGLES, *LOW_E)])
+    clear = pane_optics(Pane("clear", tau, rho, rho), ANGLES)
+    low_e = pane_optics(Pane("low-e", *LOW_E, coated=True), ANGLES)
+    panes = {"single": [clear], "double": [clear, clear]}.get(kind, [low_e])
     thick = [thickness] * len(panes)
     gap = AIR_GAP
     if kind == "low-e":
         panes, thick, gap = [*panes, clear], [LOW_E_THICKNESS, thickness], ARGON_GAP
-    optics, behind = stack(panes), stack([turned(p) for p in panes[::-1]])
+    optics, behind = stack(panes), stack([pane.turned() for pane in panes[::-1]])
     if len(panes) == 2:
         u = en673_u_value(thick, [gap], emissivity_in=0.84)
         resistance = double_glazing_resistance((thick[0], thick[1]), gap)
@@ -59,8 +61,8 @@ def glass(kind: str) -> AshraeGlazing:
     films = {"outer_film": 1.0 / R_OUTER, "inner_film": 1.0 / R_INNER}
     share, back = (_in_two(o.absorptance) for o in (optics, behind))
     g = en410_g_value(optics.tau, share, between, **films)
-    layers = layer_absorptances(optics.tau, optics.rho, g, u, item=f"{kind} glazing")
-    mean = {k: float(hemispherical(v, ANGLES)) for k, v in (
+    layers = layer_absorptances(optics.tau, optics.rho_front, g, u, item=f"{kind} glazing")
+    mean = {k: float(hemispherical_mean(v, ANGLES)) for k, v in (
         ("tau", optics.tau), ("outer", layers.outer), ("inner", layers.inner),
         ("back", optics.rho_back), ("back outer", back[:, 1]), ("back inner", back[:, 0]),
     )}  # fmt: skip

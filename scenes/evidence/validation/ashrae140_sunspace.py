@@ -9,7 +9,8 @@ from scenes.evidence.validation import ashrae140_sun
 from scenes.evidence.validation.facade_sun import SunSteps
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar
-from thermal.zone import Gains, IdealLoads, OpaqueSurface, Zone
+from thermal.emitters import IdealLoads
+from thermal.zone import Gains, OpaqueSurface, Zone
 
 SUNSPACE_DEPTH = 2.0
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_tracer import interior_surfaces, window_groups
 from mitsuba_cfs.bsdf.blinds import venetian_blind
+from mitsuba_cfs.bsdf.glazing import roos_factor
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from thermal.glazing import roos_angular_factor
 
 GLASS_TRANSMITTANCE, GLASS_BACK, GLASS_FRONT = 0.55, 0.17, 0.19  # Table 1, at normal incidence
 SLAT = {"depth": 0.080, "radius": 0.104, "spacing": 0.072}
@@ -56,7 +56,9 @@ def test_room() -> BlindRoom:
 
 def glass_transmittance(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
     """Transmittance [...] of the double glazing at the cosine of incidence."""
-    return GLASS_TRANSMITTANCE * roos_angular_factor(np.arccos(np.clip(cosine, 0, 1)))
+    return GLASS_TRANSMITTANCE * roos_factor(
+        np.arccos(np.clip(cosine, 0, 1)), panes=2, category=4.0
+    )
 
 
 def glass_reflectance(cosine: NDArray[np.float64], normal: float) -> NDArray[np.float64]:

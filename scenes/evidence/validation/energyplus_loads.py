@@ -17,7 +17,7 @@ import pandas as pd
 from scenes.evidence.validation import reference_room, reference_systems
 from scenes.evidence.validation.energyplus_cases import EPW_FILES, STEPS, site
 from thermal.balance import simulate
-from thermal.zone import IdealLoads
+from thermal.emitters import IdealLoads
 
 SET_POINTS = IdealLoads(heating_c=20.0, cooling_c=26.0)
 

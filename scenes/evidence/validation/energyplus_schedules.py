@@ -83,7 +83,7 @@ def our_year(orientation: str) -> tuple[Weather, ZoneResult]:
     hours = OperationHours(OperationTables.model_validate(tomllib.loads(OFFICE)), weather)
     zone = replace(
         reference_room.zone(orientation, system.fenestration),
-        infiltration_ach=hours.air_changes(),
+        **hours.outdoor_air(),
         gains=split_gains(hours.heat(FLOOR_AREA), 0.5),
         loads=hours.loads(),
     )

@@ -1,13 +1,15 @@
 r"""Rooms with surfaces that reflect like a mirror, by Radiance and by this project: Ev and DGP.
 
-    python -m scenes.evidence.validation.gloss [--cases mirror floor metal] [--json FILE]
+    python -m scenes.evidence.validation.gloss [--cases mirror glass metal floor] [--json FILE]
 
 The room of the dissertation's Table 1 with its window to the north, seen from 2 m behind the
 opening under a clear sky, the sun behind the house.  "mirror": a facade of reflectance 0.8 stands
-10 m before it and sends the sun back; "metal": the same of rough metal, alpha 0.15; "floor": a
-floor of smooth lacquer, Radiance's `plastic` of specularity 0.05, the sky alone.  Ev by `rtrace`
-of a point, DGP of `rpict`'s picture with this Ev (`evalglare -i`); ours by paths and, of the
-pictures, by the five-phase method.
+10 m before it and sends the sun back; "glass": the same of panes before something dark, as a facade
+of glass is; "metal": of rough metal, alpha 0.15; "floor": a floor of smooth lacquer, Radiance's
+`plastic` of specularity 0.05, the sky alone.  Ev by `rtrace` of a point, DGP of `rpict`'s picture
+with this Ev (`evalglare -i`); ours by paths and, of the pictures, by the five-phase method.
+Radiance sends the sun on from `mirror` alone: its facade of glass is one whose reflectance is that
+of the pane at the sun's angle, seen as `glass`.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ import numpy as np
 import mitsuba_cfs as cfs
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
-from mitsuba_cfs.gloss import Gloss, lacquer, mirror
+from mitsuba_cfs.gloss import Gloss, lacquer, mirror, pane
 from mitsuba_cfs.images.view import View, fisheye
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -40,14 +42,21 @@ from scenes.evidence.validation.rendered_scene import RenderedScene
 EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
 TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
 FACADE = 10.0  # before the window [m]
+BACKING = np.array([0.0, 0.05, 0.0])  # of dark behind panes [m]
 SIZE = 200  # [px]
 SUN = np.array([0.25, -1.0, 0.8]) / np.linalg.norm([0.25, -1.0, 0.8])
-SUN_ILLUMINANCE = {"mirror": 80_000.0, "metal": 15_000.0, "floor": 0.0}  # normal to it [lx]
+SUN_ILLUMINANCE = {
+    "mirror": 80_000.0,
+    "glass": 80_000.0,
+    "metal": 15_000.0,
+    "floor": 0.0,
+}  # normal to it [lx]
 SKY_ILLUMINANCE = 12_000.0  # on the ground [lx]
 CACHED = "-ps 1 -pa 0 -ss 16 -ab 5 -ad 512 -as 0 -aa 0.2 -ar 32 -lr 8 -lw 1e-3"  # of the pictures
 POINT = "-u+ -ss 1e5 -ab 8 -ad 16384 -aa 0 -lr 20 -lw 1e-9"  # of Ev; several rays to each lobe
 MATERIALS: dict[str, Gloss] = {
-    "mirror": mirror(0.8), "metal": mirror(0.6, 0.15), "floor": lacquer(0.05),
+    "mirror": mirror(0.8), "glass": pane(1.52, 0.985), "metal": mirror(0.6, 0.15),
+    "floor": lacquer(0.05),
 }  # fmt: skip
 
 
@@ -90,6 +99,7 @@ class Outcome:
     dgp: float
     dgp_five_phase: float
     without: float  # our Ev with the specular part of no surface
+    diffuse: float  # our Ev with as much reflected, at normal incidence, but diffusely
 
 
 def case(name: str) -> Case:
@@ -127,10 +137,28 @@ def rendered(given: Case, folder: Path) -> RenderedScene:
     body = len(given.interior.triangles)
     radiance.write_surfaces(given.interior, folder / "room.rad")
     after = np.arange(len(given.exterior.triangles)) >= body
-    radiance.write_surfaces(given.exterior.some(after), folder / "outdoors.rad")
+    if given.name == "glass":
+        _write_panes(given.exterior.some(after), folder / "outdoors.rad")
+    else:
+        radiance.write_surfaces(given.exterior.some(after), folder / "outdoors.rad")
     scene = RenderedScene(folder, "room.rad outdoors.rad", CACHED, POINT)
     scene.set_sky(given.patches, 4, SUN, given.sun_luminance)
     return scene
+
+
+def _write_panes(facade: Surfaces, path: Path) -> None:
+    """A facade of `glass` that sends the sun on as `mirror`, and black behind it."""
+    (gloss,) = {facade.gloss[i] for i in facade.surface}
+    rho = float(gloss.reflectance(abs(SUN[1])))  # the facade looks south
+    lines = [
+        "void glass panes\n0\n0\n3 .985 .985 .985\n",
+        f"void mirror facade\n1 panes\n0\n3 {rho:.9g} {rho:.9g} {rho:.9g}\n",
+        "void plastic dark\n0\n0\n5 0 0 0 0 0\n",
+    ]
+    for i, triangle in enumerate(facade.triangles):
+        lines.append(radiance.polygon("facade", f"facade{i}", triangle))
+        lines.append(radiance.polygon("dark", f"dark{i}", triangle + BACKING))
+    path.write_text("\n".join(lines))
 
 
 def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Outcome:
@@ -139,7 +167,9 @@ def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Ou
     folder.mkdir(parents=True, exist_ok=True)
     theirs = rendered(given, folder)
     ev, ev_error = theirs.eye_illuminance(view, points)
-    found, plain = (_eye(one, view) for one in (given, _without_gloss(given)))
+    found, plain, even = (
+        _eye(one, view) for one in (given, _without_gloss(given), _diffuse(given))
+    )
     picture = point_in_time_picture(given.lit, given.sky, view, samples=64)
     picture_of_theirs = theirs.picture(view)
     phases, at_point = _five_phase(given, view)
@@ -149,6 +179,7 @@ def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Ou
     return Outcome(
         name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]), ours.Ev,
         third.Ev, at_point, rated.dgp, ours.dgp, third.dgp, float(plain.values[0]),
+        float(even.values[0]),
     )  # fmt: skip
 
 
@@ -184,6 +215,17 @@ def _eye(given: Case, view: View):
 def _without_gloss(given: Case) -> Case:
     bare = (replace(s, gloss=()) for s in (given.interior, given.exterior))
     return replace(given, **dict(zip(("interior", "exterior"), bare, strict=True)))
+
+
+def _diffuse(given: Case) -> Case:
+    """As gloss was taken before: a reflectance that scatters evenly."""
+    even = []
+    for surfaces in (given.interior, given.exterior):
+        glosses = surfaces.gloss or (None,) * (int(surfaces.surface.max()) + 1)
+        more = np.array([0.0 if gloss is None else gloss.at_normal for gloss in glosses])
+        rho = surfaces.reflectance + more[surfaces.surface]
+        even.append(replace(surfaces, reflectance=rho, gloss=()))
+    return replace(given, interior=even[0], exterior=even[1])
 
 
 def main() -> None:

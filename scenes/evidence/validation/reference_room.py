@@ -11,9 +11,10 @@ from scenes.evidence.validation.reference_systems import Optics, ReferenceSystem
 from scenes.evidence.validation.sunlit_room import BeamTable, BoxRoom, diffuse_hits, first_hits
 from thermal.blackbox import Fenestration
 from thermal.climate import Climate, Solar, sky_temperature
+from thermal.emitters import IdealLoads
 from thermal.longwave import area_view_factors
 from thermal.shortwave import spread_evenly
-from thermal.zone import Gains, IdealLoads, Layer, OpaqueSurface, WindowElement, Zone, work_hours
+from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone, work_hours
 
 FloatArray = NDArray[np.float64]
 ORIENTATIONS = {"S": 180, "SE": 135, "E": 90, "NE": 45, "N": 0, "NW": 315, "W": 270, "SW": 225}

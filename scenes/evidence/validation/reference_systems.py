@@ -23,7 +23,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean
 from mitsuba_cfs.directions import incident_azimuth
+from scenes.fenestration.layer_sun import sun_in_layers
 from thermal.blackbox import (
     R_INNER,
     R_OUTER,
@@ -38,8 +40,6 @@ from thermal.closure import Closure
 from thermal.glazing import Gap, gap_resistance
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
 from thermal.iso15099 import iso15099_data, yearly_g_values
-from thermal.layer_sun import sun_in_layers
-from thermal.panes import hemispherical
 from thermal.shade_layers import sheet_layer, venetian_layer
 
 FloatArray = NDArray[np.float64]
@@ -160,7 +160,7 @@ def _of_layers(folder: Path, name: str, optics: Optics) -> tuple[Closure, float,
     found = g(optics.tau, optics.rho, optics.theta)
     diffuse = optics.diffuse.copy()
     if optics.phi is None:
-        diffuse[:, 2] = hemispherical(found, optics.theta)
+        diffuse[:, 2] = hemispherical_mean(found, optics.theta)
     else:
         diffuse[:, 2] = _halves(folder, optics.phi, found[None])[:, 0]
     found = replace(optics, g=found, diffuse=diffuse)

@@ -29,7 +29,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.blinds import venetian_blind
 from mitsuba_cfs.bsdf.generate import generate_tensor_tree
 from mitsuba_cfs.bsdf.glazing import uncoated_values
-from mitsuba_cfs.bsdf.periodic import plastic
+from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.evaluation import evaluate
@@ -121,7 +121,8 @@ class PicturedSystem:
             bsdf = read_bsdf_xml(SYSTEM).band("Visible")
             self.system = PathOptics(mi.load_dict(klems_plugin(bsdf)))
         else:
-            write_bsdf_xml(_tree(), folder / "tree.xml")
+            if not (folder / "tree.xml").exists():
+                write_bsdf_xml(blind_tree(), folder / "tree.xml")
             self.material = "void aBSDF window\n5 tree.xml 0 0 1 .\n0\n0\n"
             self.system = lit_system(read_bsdf_xml(folder / "tree.xml").band("Visible"))
 
@@ -133,11 +134,16 @@ def _normal_values() -> tuple[float, float]:
     return tau, r + r * a * tau
 
 
-def _tree() -> BsdfFile:
-    """The dissertation's blind at 40 degrees as tensor trees."""
+def blind_layer(reflectance: float = 0.55) -> PeriodicLayer:
+    """The dissertation's blind at 40 degrees."""
     slats = {"depth": 0.080, "radius": 0.104, "spacing": 0.072, "tilt": np.radians(40)}
-    layer = venetian_blind(plastic("slat", 0.55), **slats)
-    trees, _ = generate_tensor_tree(layer, TREE_LEVELS, samples=TREE_SAMPLES, seed=1)
+    return venetian_blind(plastic("slat", reflectance), **slats)
+
+
+def blind_tree(levels: int = TREE_LEVELS) -> BsdfFile:
+    """Its tensor trees."""
+    samples = TREE_SAMPLES >> 2 * max(levels - TREE_LEVELS, 0)
+    trees, _ = generate_tensor_tree(blind_layer(), levels, samples=samples, seed=1)
     return BsdfFile({"Visible": trees[0]}, name="blind", manufacturer="mitsuba-cfs", thickness=0.08)
 
 

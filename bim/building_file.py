@@ -1,0 +1,162 @@
+"""A building from a file of any format that is read: its name's ending tells which.
+
+One entry of `FORMATS` is all that a new format adds here; what fills the windows of a building
+that is no IFC lies in its `Window.states`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from bim.fenestration import ShadingState
+from bim.ifc.corrections import corrections_beside, corrections_file
+from bim.ifc.head import check_head
+from bim.model import Building, Window
+from mitsuba_cfs.errors import DataError
+
+Progress = Callable[[str, float], None]
+STAGES = {"opening": 0.4, "geometry": 0.3, "rooms": 0.2, "surroundings": 0.1}  # shares of the time
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """What is chosen of a building's file; each format says which of them it has."""
+
+    join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
+    furniture: bool = False  # whether what stands in the rooms is in their light and views
+    apertures: tuple[str, ...] = ()  # materials of the surfaces that are windows
+    surroundings: tuple[Path, ...] = ()  # files of what stands around, with any format
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+
+
+@dataclass(frozen=True, slots=True)
+class BuildingFormat:
+    """How files of some endings are checked and read; the readers load what they need."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    check: Callable[[Path], None]  # what can be said at once, before anything heavy is loaded
+    read: Callable[[Path, ReadOptions, Progress], Building]
+    has: tuple[str, ...] = ()  # fields of `ReadOptions` that it knows
+
+
+def read_building_file(
+    path: str | PathLike[str],
+    options: ReadOptions | None = None,
+    progress: Progress | None = None,
+) -> Building:
+    """The building of an IFC file, with the corrections kept beside it, or of another format.
+
+    Args: progress: called with the stage's name and the fraction of it that is done.
+
+    Raises: `DataError` for a file that cannot be used, or an option that its format has not.
+    """
+    options = options or ReadOptions()
+    path = Path(path)
+    kind = _format(path)
+    for field, value in (("join", options.join), ("apertures", options.apertures)):
+        if value and field not in kind.has:
+            raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
+    building = kind.read(path, options, progress or (lambda stage, fraction: None))
+    if not options.surroundings:
+        return building
+    from bim.context.surroundings import with_surroundings
+
+    return with_surroundings(building, options.surroundings, options.surroundings_offset)
+
+
+def check_building_file(path: str | PathLike[str]) -> None:
+    """What can be said at once of a building's file, and of the corrections beside it.
+
+    Raises: `DataError` for a file that is none of its format.
+    """
+    _format(Path(path)).check(Path(path))
+
+
+def is_ifc(path: str | PathLike[str]) -> bool:
+    """Whether the file is read as IFC."""
+    return _format(Path(path)) is IFC
+
+
+def held_states(
+    windows: Iterable[Window], path: str | PathLike[str]
+) -> dict[str, tuple[ShadingState, ...]]:
+    """The shading states that a building's file holds for its windows, by GUID."""
+    if is_ifc(path):
+        from bim.ifc.fenestration_read import read_fenestration
+
+        return read_fenestration(path)
+    return {window.guid: window.states for window in windows if window.states}
+
+
+def files_beside(path: str | PathLike[str]) -> tuple[Path, ...]:
+    """The files that change what is read of a building's file, besides itself."""
+    corrections = corrections_file(path)
+    return (corrections,) if is_ifc(path) and corrections.is_file() else ()
+
+
+def _format(path: Path) -> BuildingFormat:
+    """The format of a file's ending; IFC where the ending is unknown, whose check names it."""
+    ending = path.suffix.lower()
+    return next((kind for kind in FORMATS if ending in kind.suffixes), IFC)
+
+
+def check_ifc(path: Path) -> None:
+    """What can be said at once of an IFC file, and of the corrections beside it."""
+    check_head(path)
+    corrections_beside(path)
+
+
+def _read_ifc(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.ifc.building import read_ifc
+
+    return read_ifc(path, join=options.join, furniture=options.furniture, progress=progress)
+
+
+def _check_there(path: Path) -> None:
+    if not path.is_file():
+        raise DataError("no such file", file=path)
+
+
+def _read_radiance(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.radiance.building import read_radiance_building
+
+    progress("opening", 0.0)
+    return read_radiance_building(path, options.apertures)
+
+
+def _check_honeybee(path: Path) -> None:
+    from bim.honeybee.schema import read_json
+
+    read_json(path)
+
+
+def _read_honeybee(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.honeybee.building import read_honeybee
+
+    progress("rooms", 0.0)
+    return read_honeybee(path, join=options.join, furniture=options.furniture)
+
+
+def _check_gbxml(path: Path) -> None:
+    from bim.gbxml.document import read_document
+
+    read_document(path)
+
+
+def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Building:
+    from bim.gbxml.building import read_gbxml
+
+    progress("rooms", 0.0)
+    return read_gbxml(path, join=options.join, furniture=options.furniture)
+
+
+FLAGS = {"join": "join", "apertures": "aperture"}
+IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
+RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures",))
+HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
+GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
+FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)

@@ -1,0 +1,222 @@
+"""A building from rooms that a file draws as polygons: what honeybee and gbXML have in common."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from bim.account import Account, StoreyAccount
+from bim.coarser import coarser
+from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
+from bim.model import Building, Element, Problem, Space
+from bim.names import found_by_name, label_of
+from bim.outdoors import unblinded
+from bim.planes import newell_normal
+from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
+from bim.shell import open_edges
+from mitsuba_cfs.errors import DataError, RoomError
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnModel:
+    """What a file of polygons holds."""
+
+    path: Path
+    name: str
+    rooms: tuple[DrawnRoom, ...]
+    elements: tuple[Element, ...] = ()  # shades and context
+    furniture: Mapping[str, tuple[Element, ...]] = field(default_factory=dict)  # by room
+    problems: tuple[Problem, ...] = ()
+    latitude_deg: float | None = None
+    longitude_deg: float | None = None
+    elevation: float = 0.0  # [m]
+
+
+def drawn_building(
+    model: DrawnModel, *, join: Sequence[str] = (), furniture: bool = False
+) -> Building:
+    """The building with rooms that are closed, and what came through.
+
+    Args:
+        join: rooms to make one, as "Hall + Living".
+        furniture: whether what stands in the rooms is in their light and views.
+    """
+    rooms = list(model.rooms)
+    for text in join:
+        rooms = _joined(rooms, text, model.path)
+    problems = list(model.problems)
+    spaces: list[Space] = []
+    for room in rooms:
+        try:
+            space, more = space_of(room)
+        except RoomError as error:
+            label = label_of(room.name, room.long_name, room.guid)
+            what = f"room {label}: its boundary cannot be built"
+            problems.append(Problem(room.guid, what, f"left out: {error}", "room", _glass(room)))
+            continue
+        problems += more
+        spaces.append(space)
+    spaces, more = _furnished(spaces, model, furniture)
+    problems += more
+    elements = [*_envelope(rooms, spaces), *model.elements]
+    outdoors = unblinded(elements, spaces)
+    traced, fine = coarser(list(outdoors.elements))
+    problems += [*outdoors.problems, *fine]
+    return Building(
+        model.name, tuple(spaces), tuple(traced), tuple(dict.fromkeys(problems)),
+        model.latitude_deg, model.longitude_deg, model.elevation, model.path,
+        _account(model, rooms, spaces, problems),
+    )  # fmt: skip
+
+
+def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom]:
+    """The rooms with those that a text names made one; air between them goes."""
+    names = [name.strip() for name in text.split("+") if name.strip()]
+    if len(names) < 2:
+        message = f"expected rooms with a plus between them, as 'Hall + Living', got {text!r}"
+        raise DataError(message, field="--join")
+    try:
+        own = [found_by_name([_Labelled(room) for room in rooms], name, "room") for name in names]
+    except (KeyError, ValueError) as error:
+        raise DataError(str(error.args[0]), file=path, field="--join") from None
+    chosen = {one.guid: one.room for one in own}
+    first = own[0].room
+    faces = tuple(
+        face
+        for room in chosen.values()
+        for face in room.faces
+        if not (face.is_open and face.neighbour in chosen)
+    )
+    areas = [room.stated_area for room in chosen.values()]
+    volumes = [room.stated_volume for room in chosen.values()]
+    one = replace(
+        first,
+        name=" + ".join(label_of(r.name, r.long_name, r.guid) for r in chosen.values()),
+        long_name="",
+        faces=faces,
+        stated_area=None if None in areas else sum(areas),
+        stated_volume=None if None in volumes else sum(volumes),
+    )
+    others = [_towards(room, chosen, first.guid) for room in rooms if room.guid not in chosen]
+    return [_towards(one, chosen, first.guid), *others]
+
+
+def _towards(room: DrawnRoom, joined: Mapping[str, DrawnRoom], guid: str) -> DrawnRoom:
+    """The room with faces that lie towards joined rooms lying towards the one they became."""
+    faces = (
+        replace(face, neighbour=guid) if face.neighbour in joined else face for face in room.faces
+    )
+    return replace(room, faces=tuple(faces))
+
+
+@dataclass(frozen=True, slots=True)
+class _Labelled:
+    """A drawn room by the names that people use."""
+
+    room: DrawnRoom
+
+    @property
+    def guid(self) -> str:
+        return self.room.guid
+
+    @property
+    def name(self) -> str:
+        return self.room.name
+
+    @property
+    def long_name(self) -> str:
+        return self.room.long_name
+
+    @property
+    def label(self) -> str:
+        return label_of(self.name, self.long_name, self.guid)
+
+
+def _furnished(
+    spaces: Sequence[Space], model: DrawnModel, wanted: bool
+) -> tuple[list[Space], list[Problem]]:
+    count = sum(len(model.furniture.get(space.guid, ())) for space in spaces)
+    if not count or not wanted:
+        left = Problem(
+            "furniture", f"{count} piece(s) of furniture", "left out; --furniture counts them"
+        )
+        return list(spaces), [left] if count else []
+    found = [replace(s, furniture=tuple(model.furniture.get(s.guid, ()))) for s in spaces]
+    return found, [Problem("furniture", f"{count} piece(s) of furniture", "in light and views")]
+
+
+def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Element]:
+    """The building's own skin as it shades and reflects outdoors: faces and glass that look out."""
+    drawn = {face.guid: face for room in rooms for face in room.faces}
+    finishes = {one.guid: one.finish for face in drawn.values() for one in (face, *face.openings)}
+    found = []
+    for space in spaces:
+        for face in space.faces:
+            if face.adjacency == "outside":
+                outer = finishes[face.element].outer
+                value = FACADE_REFLECTANCE if outer is None else outer
+                name, kind = face.name, "IfcDoor" if face.kind == "door" else "IfcWall"
+                found.append(Element(face.element or "", name, kind, face.triangles, value, value))
+        found += [
+            Element(w.guid, w.name, "IfcWindow", w.triangles, GLASS_REFLECTANCE, GLASS_REFLECTANCE)
+            for w in space.windows
+        ]
+    return found
+
+
+def _glazed(room: DrawnRoom) -> list[tuple[DrawnFace, DrawnOpening]]:
+    """The openings of a room with glass that looks out, with their faces."""
+    return [
+        (face, opening)
+        for face in room.faces
+        for opening in face.openings
+        if face.adjacency == "outside" and opening.glazing is not None
+    ]
+
+
+def _glass(room: DrawnRoom) -> float:
+    """Area of a room's glass that looks out, as drawn [m2]."""
+    return float(sum(np.linalg.norm(newell_normal(o.ring)) for _, o in _glazed(room)))
+
+
+def _account(
+    model: DrawnModel,
+    rooms: Sequence[DrawnRoom],
+    spaces: Sequence[Space],
+    problems: Sequence[Problem],
+) -> Account:
+    """What of the file's rooms and glass came through."""
+    failed = {problem.where for problem in problems if problem.lost == "room"}
+    drawn = Counter(room.storey for room in model.rooms)
+    # a joined room is as many rooms as the file had of it
+    lost = Counter(room.storey for room in rooms if room.guid in failed)
+    out: Counter[str] = Counter()
+    used: Counter[str] = Counter()
+    for room in rooms:
+        out[room.storey] += _glass(room)
+    for space in spaces:
+        used[space.storey] += sum(window.area for window in space.windows)
+    glazed = sum(len(_glazed(room)) for room in rooms)
+    return Account(
+        tuple(
+            StoreyAccount(
+                name, drawn[name] - lost[name], drawn[name], out[name], min(used[name], out[name])
+            )
+            for name in drawn
+        ),
+        glazed,
+        sum(len(space.windows) for space in spaces),
+        0.0,
+        0.0,
+        sum(_glass(room) for room in rooms if room.guid in failed),
+        0.0,
+        0.0,
+        missing=tuple(
+            label_of(room.name, room.long_name, room.guid) for room in rooms if room.guid in failed
+        ),
+        leaking=tuple(space.label for space in spaces if open_edges(space.shell)),
+    )

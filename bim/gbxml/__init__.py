@@ -1,0 +1,1 @@
+"""gbXML in and out."""

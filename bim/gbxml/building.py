@@ -1,0 +1,206 @@
+"""A building from a gbXML file: `read_gbxml`.
+
+A surface belongs to the one or two spaces that it names; for the second one it is turned round.
+Openings lie in the plane of their surface.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections import Counter
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.defaults import FACADE_REFLECTANCE
+from bim.drawn_building import DrawnModel, drawn_building
+from bim.gbxml.constructions import Constructions
+from bim.gbxml.document import Document, read_document
+from bim.model import Building, Element, Problem
+from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, triangles_of_rings
+
+KINDS = {  # of a surface: kind of the face of its first room, and what lies beyond with one room
+    "InteriorWall": ("wall", "adiabatic"),
+    "ExteriorWall": ("wall", "outside"),
+    "UndergroundWall": ("wall", "ground"),
+    "Roof": ("", "outside"),
+    "Ceiling": ("", "adiabatic"),
+    "UndergroundCeiling": ("", "ground"),
+    "InteriorFloor": ("", "adiabatic"),
+    "RaisedFloor": ("floor", "outside"),
+    "ExposedFloor": ("floor", "outside"),
+    "SlabOnGrade": ("floor", "ground"),
+    "UndergroundSlab": ("floor", "ground"),
+    "Air": ("", "adiabatic"),
+    "EmbeddedColumn": ("wall", "adiabatic"),
+}
+OUTDOORS = ("Shade", "FreestandingColumn")
+GLAZED = ("FixedWindow", "OperableWindow", "FixedSkylight", "OperableSkylight", "SlidingDoor")
+
+
+def read_gbxml(
+    path: str | PathLike[str], *, join: Sequence[str] = (), furniture: bool = False
+) -> Building:
+    """The building of a gbXML file, in metres, turned to true north.
+
+    Read are spaces, surfaces, openings, shades, constructions with layers, window types, location.
+
+    Args:
+        join: rooms to make one, as "Hall + Living"; air between them goes.
+        furniture: not in gbXML.
+
+    Raises: `DataError` that names file, element and field; what the model lacks is in the
+        building's `problems`.
+    """
+    path = Path(path)
+    return drawn_building(_Reader(read_document(path)).drawn(), join=join, furniture=furniture)
+
+
+class _Reader:
+    """A document with what its surfaces refer to."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.constructions = Constructions(document)
+        self.problems: list[Problem] = []
+        self.turn = self._turn()
+
+    def drawn(self) -> DrawnModel:
+        """The document as polygons."""
+        document, root = self.document, self.document.root
+        spaces = {s.get("id", ""): s for s in document.all("Campus/Building/Space")}
+        faces: dict[str, list[DrawnFace]] = {guid: [] for guid in spaces}
+        elements: list[Element] = []
+        unplaced: Counter[str] = Counter()
+        for surface in document.all("Campus/Surface"):
+            ring = document.ring(surface)
+            if ring is None:
+                raise document.fault("has no polygon", surface, "PlanarGeometry/PolyLoop")
+            beside = self._beside(surface, spaces)
+            kind = surface.get("surfaceType", "")
+            if kind in OUTDOORS or not beside:
+                elements += self._shade(surface, ring @ self.turn.T)
+            elif kind not in KINDS:
+                unplaced[kind] += 1
+            else:
+                for number, guid in enumerate(beside):
+                    faces[guid].append(self._face(surface, ring @ self.turn.T, beside, number))
+        self.problems += [
+            Problem(document.file.name, f"{n} surface(s) of type {k!r:.40}", "left out")
+            for k, n in unplaced.items()
+        ]
+        storeys = {
+            s.get("id", ""): _name(s) for s in document.all("Campus/Building/BuildingStorey")
+        }
+        rooms = tuple(self._room(one, faces[guid], storeys) for guid, one in spaces.items())
+        campus = root.find("Campus")
+        name = "" if campus is None else _name(campus)
+        return DrawnModel(
+            document.file, name or document.file.stem, rooms, tuple(elements),
+            problems=tuple(self.problems),
+            latitude_deg=self._location("Latitude", 90.0),
+            longitude_deg=self._location("Longitude", 180.0),
+            elevation=(self._location("Elevation", 1e5) or 0.0) * document.length,
+        )  # fmt: skip
+
+    def _location(self, field: str, most: float) -> float | None:
+        found = self.document.root.find(f"Campus/Location/{field}")
+        if found is None or not (found.text or "").strip():
+            return None
+        return self.document.number(found, least=-most, most=most)
+
+    def _turn(self) -> NDArray[np.float64]:
+        """Rotation [3, 3] from the model's axes to the world's, by CADModelAzimuth."""
+        azimuth = self._location("CADModelAzimuth", 360.0)
+        if not azimuth:
+            return np.eye(3)
+        what = f"CADModelAzimuth {azimuth:g}"
+        done = f"the model's y axis is turned {azimuth:g} degrees from north to east"
+        self.problems.append(Problem(self.document.file.name, what, done))
+        c, s = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
+        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def _beside(
+        self, surface: ElementTree.Element, spaces: dict[str, ElementTree.Element]
+    ) -> list[str]:
+        """The spaces that a surface names, each once."""
+        named = [one.get("spaceIdRef", "") for one in surface.iterfind("AdjacentSpaceId")]
+        for name in named:
+            if name not in spaces:
+                raise self.document.fault(f"no Space {name!r:.60}", surface, "AdjacentSpaceId")
+        return list(dict.fromkeys(named))[:2]
+
+    def _face(
+        self,
+        surface: ElementTree.Element,
+        ring: NDArray[np.float64],
+        beside: Sequence[str],
+        number: int,
+    ) -> DrawnFace:
+        """The surface as the face of one of its rooms; number 1 sees its other side."""
+        guid, kind = surface.get("id", ""), surface.get("surfaceType", "")
+        face_kind, alone = KINDS[kind]
+        between = len(beside) == 2
+        finish = self.constructions.finish(surface.get("constructionIdRef"))
+        if number:
+            ring, finish = ring[::-1], finish.turned()
+            guid, face_kind = f"{guid}-2", face_kind if face_kind == "wall" else ""
+        return DrawnFace(
+            guid, _name(surface), face_kind, (ring,), "space" if between else alone,
+            beside[1 - number] if between else None, finish,
+            tuple(
+                one
+                for opening in surface.iterfind("Opening")
+                if (one := self._opening(opening, number)) is not None
+            ),
+            kind == "Air",
+        )  # fmt: skip
+
+    def _opening(self, opening: ElementTree.Element, number: int) -> DrawnOpening | None:
+        ring, guid = self.document.ring(opening), opening.get("id", "")
+        if not guid:
+            raise self.document.fault("has no id", opening, "id")
+        kind = opening.get("openingType", "")
+        if ring is None or kind == "Air":
+            if not number:
+                what = f"{_name(opening)}: " + ("has no polygon" if ring is None else "is open air")
+                self.problems.append(Problem(guid, what, "closed"))
+            return None
+        guid = f"{guid}-2" if number else guid
+        ring = ring @ self.turn.T
+        if kind in GLAZED:
+            values = self.constructions.window(opening)
+            return DrawnOpening(guid, _name(opening), ring, glazing=values)
+        finish = self.constructions.finish(opening.get("constructionIdRef"))
+        return DrawnOpening(guid, _name(opening), ring, finish.turned() if number else finish)
+
+    def _shade(self, surface: ElementTree.Element, ring: NDArray[np.float64]) -> list[Element]:
+        finish = self.constructions.finish(surface.get("constructionIdRef"))
+        value = FACADE_REFLECTANCE if finish.outer is None else finish.outer
+        triangles = triangles_of_rings((ring,))
+        if not len(triangles):
+            return []
+        guid = surface.get("id", "")
+        return [Element(guid, _name(surface), "IfcShadingDevice", triangles, value, value)]
+
+    def _room(
+        self, space: ElementTree.Element, faces: Sequence[DrawnFace], storeys: dict[str, str]
+    ) -> DrawnRoom:
+        area, volume = (
+            None
+            if (found := space.find(field)) is None
+            else factor * self.document.number(found, least=0.0)
+            for field, factor in (("Area", self.document.area), ("Volume", self.document.volume))
+        )
+        return DrawnRoom(
+            space.get("id", ""), _name(space), tuple(faces),
+            storeys.get(space.get("buildingStoreyIdRef", ""), ""),
+            stated_area=area or None, stated_volume=volume or None,
+        )  # fmt: skip
+
+
+def _name(element: ElementTree.Element) -> str:
+    return (element.findtext("Name") or "").strip() or element.get("id", "")

@@ -1,0 +1,125 @@
+"""Constructions and window types of a gbXML file: layers, and what windows state."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from functools import cached_property
+
+from bim.gbxml.document import Document
+from bim.model import Construction, MaterialLayer
+from bim.polygon_rooms import GlazingValues, SurfaceFinish
+
+NO_MASS_CONDUCTIVITY = (
+    0.04  # of a layer that states its resistance alone: an insulation's [W/(m K)]
+)
+NO_MASS = (20.0, 1450.0)  # its density, heat capacity: bim.defaults.EPS
+
+
+class Constructions:
+    """What the surfaces and openings of a document refer to, read when they do."""
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self._finishes: dict[str, SurfaceFinish] = {}
+        self._windows: dict[str, GlazingValues] = {}
+
+    @cached_property
+    def _by_id(self) -> dict[str, dict[str, ElementTree.Element]]:
+        kinds = ("Construction", "Layer", "Material", "WindowType")
+        return {kind: {one.get("id", ""): one for one in self.document.all(kind)} for kind in kinds}
+
+    def finish(self, name: str | None) -> SurfaceFinish:
+        """Layers and reflectances of a construction; what it does not state is None."""
+        if name is None or name not in self._by_id["Construction"]:
+            return SurfaceFinish()
+        if name not in self._finishes:
+            self._finishes[name] = self._finish(self._by_id["Construction"][name])
+        return self._finishes[name]
+
+    def _finish(self, one: ElementTree.Element) -> SurfaceFinish:
+        layers = tuple(self._layers(one))
+        name = _name(one)
+        construction = Construction(name, layers, self.document.file.name) if layers else None
+        inner = {band: self._share(one, "Reflectance", f"Int{band}") for band in ("Vis", "Solar")}
+        outer = self._share(one, "Reflectance", "ExtVis")
+        absorbed = self._share(one, "Absorptance", "IntSolar")
+        solar = inner["Solar"]
+        if solar is None and absorbed is not None:
+            solar = 1.0 - absorbed
+        emissivity = self._share(one, "Emittance", "IntIR")
+        found = SurfaceFinish(construction, inner["Vis"], solar, outer=outer)
+        return found if emissivity is None else SurfaceFinish(
+            construction, inner["Vis"], solar, emissivity, outer=outer
+        )  # fmt: skip
+
+    def _layers(self, one: ElementTree.Element) -> list[MaterialLayer]:
+        """The layers of a construction, outermost first, as gbXML orders them."""
+        found = []
+        for reference in one.iterfind("LayerId"):
+            layer = self._referred(one, "Layer", reference.get("layerIdRef"))
+            for inner in layer.iterfind("MaterialId"):
+                material = self._referred(layer, "Material", inner.get("materialIdRef"))
+                found.append(self._layer(material))
+        return found
+
+    def _referred(
+        self, owner: ElementTree.Element, kind: str, name: str | None
+    ) -> ElementTree.Element:
+        found = self._by_id[kind].get(name or "")
+        if found is None:
+            raise self.document.fault(f"no {kind} {name!r:.60}", owner)
+        return found
+
+    def _layer(self, material: ElementTree.Element) -> MaterialLayer:
+        fields = ("Thickness", "Conductivity", "Density", "SpecificHeat")
+        thickness, conductivity, density, capacity = (
+            self.document.quantity(material, field) for field in fields
+        )
+        resistance = self.document.quantity(material, "R-value")
+        if not thickness or not conductivity:
+            if not resistance:
+                message = "expected Thickness and Conductivity, or R-value"
+                raise self.document.fault(message, material)
+            thickness = thickness or NO_MASS_CONDUCTIVITY * resistance
+            conductivity = thickness / resistance
+        default = NO_MASS
+        return MaterialLayer(
+            _name(material), thickness, conductivity, density or default[0], capacity or default[1]
+        )
+
+    def window(self, opening: ElementTree.Element) -> GlazingValues:
+        """What an opening's window type, else its construction states."""
+        name = opening.get("windowTypeIdRef") or opening.get("constructionIdRef") or ""
+        known = self._by_id["WindowType"].get(name)
+        if known is None:
+            known = self._by_id["Construction"].get(name)
+        if known is None:
+            return GlazingValues(name=name)
+        if name not in self._windows:
+            g_value = known.find("SolarHeatGainCoeff")
+            u_value = self.document.quantity(known, "U-value")
+            panes = len(known.findall("Glaze"))
+            self._windows[name] = GlazingValues(
+                u_value or None,
+                None if g_value is None else self.document.number(g_value, least=0.0, most=1.0),
+                self._share(known, "Transmittance", "Visible"),
+                self._share(known, "Transmittance", "Solar"),
+                panes or None,
+                _name(known),
+            )
+        return self._windows[name]
+
+    def _share(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
+        """A share of 1 of that kind; near normal incidence where there are several."""
+        for one in owner.iterfind(what):
+            if one.get("type") == kind and one.get("incidentAngle", "0") in ("0", "0.0", ""):
+                value = self.document.number(one, least=0.0, most=100.0)
+                value = value / 100.0 if one.get("unit") == "Percent" else value
+                if value > 1:
+                    raise self.document.fault(f"expected 0 to 1, got {value:g}", owner, what)
+                return value
+        return None
+
+
+def _name(element: ElementTree.Element) -> str:
+    return (element.findtext("Name") or "").strip() or element.get("id", "")

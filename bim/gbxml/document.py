@@ -1,0 +1,184 @@
+"""A gbXML file as elements without namespaces, with its units: `read_document`.
+
+Entities are refused: a file of a few lines with them can fill the memory or read other files.
+
+Source: gbXML schema 0.37 to 7.03 (https://www.gbxml.org).
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.errors import DataError
+
+MOST_BYTES = 256 << 20
+DEEPEST = 100  # elements within each other
+METRES = {
+    "Kilometers": 1e3, "Meters": 1.0, "Centimeters": 0.01, "Millimeters": 1e-3, "Miles": 1609.344,
+    "Yards": 0.9144, "Feet": 0.3048, "Inches": 0.0254,
+}  # fmt: skip
+SQUARE_METRES = {
+    "SquareKilometers": 1e6, "SquareMeters": 1.0, "SquareCentimeters": 1e-4,
+    "SquareMillimeters": 1e-6, "SquareMiles": 1609.344**2, "SquareYards": 0.9144**2,
+    "SquareFeet": 0.3048**2, "SquareInches": 0.0254**2,
+}  # fmt: skip
+CUBIC_METRES = {
+    "CubicKilometers": 1e9, "CubicMeters": 1.0, "CubicCentimeters": 1e-6, "CubicMillimeters": 1e-9,
+    "CubicMiles": 1609.344**3, "CubicYards": 0.9144**3, "CubicFeet": 0.3048**3,
+    "CubicInches": 0.0254**3,
+}  # fmt: skip
+# units of a quantity's own attribute, as factors to SI
+BTU_INCH = 0.1442279  # BTU in/(h ft2 F) in W/(m K)
+SI = {
+    "U-value": {"WPerSquareMeterK": 1.0, "BtuPerHourSquareFtF": 5.678263},
+    "R-value": {"SquareMeterKPerW": 1.0, "HrSquareFtFPerBTU": 1 / 5.678263},
+    "Conductivity": {"WPerMeterK": 1.0, "WPerCmC": 100.0, "BtuPerHourFtF": 12 * BTU_INCH},
+    "Density": {"KgPerCubicM": 1.0, "GramsPerCubicCm": 1e3, "LbsPerCubicIn": 27679.905,
+                "LbsPerCubicFt": 16.018463},
+    "SpecificHeat": {"JPerKgK": 1.0, "BTUPerLbF": 4186.8},
+    "Thickness": METRES,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """The root element and the factors to metres."""
+
+    file: Path
+    root: ElementTree.Element
+    length: float
+    area: float
+    volume: float
+
+    def fault(self, message: str, element: ElementTree.Element, field: str | None = None):
+        """An error that names the file, the element by its id, and the field."""
+        name = f"{element.tag} {element.get('id', '')}".strip()
+        return DataError(message, file=self.file, element=name, field=field)
+
+    def all(self, path: str) -> Iterator[ElementTree.Element]:
+        """The elements of a path that have an id."""
+        for element in self.root.iterfind(path):
+            if not element.get("id"):
+                raise self.fault("has no id", element, "id")
+            yield element
+
+    def number(
+        self, element: ElementTree.Element, *, least: float = -math.inf, most: float = math.inf
+    ) -> float:
+        """The number that an element holds, within limits."""
+        text = (element.text or "").strip()
+        try:
+            value = float(text)
+        except ValueError:
+            raise self.fault(f"expected a number, got {text[:40]!r}", element) from None
+        if not (math.isfinite(value) and least <= value <= most):
+            raise self.fault(f"expected {least:g} to {most:g}, got {text[:40]}", element)
+        return value
+
+    def quantity(self, owner: ElementTree.Element, name: str) -> float | None:
+        """A quantity [SI] of an element by the unit that it states; None where it has none."""
+        found = owner.find(name)
+        if found is None:
+            return None
+        units = SI[name]
+        unit = found.get("unit", next(iter(units)))
+        if unit not in units:
+            raise self.fault(f"unit {unit[:40]!r}, expected of {', '.join(units)}", owner, name)
+        try:
+            return units[unit] * self.number(found, least=0.0)
+        except DataError as error:
+            raise self.fault(error.message, owner, name) from None
+
+    def ring(self, owner: ElementTree.Element) -> NDArray[np.float64] | None:
+        """The polygon [N, 3] [m] of an element's PlanarGeometry; None without one."""
+        loop = owner.find("PlanarGeometry/PolyLoop")
+        if loop is None:
+            return None
+        points = []
+        for point in loop.iterfind("CartesianPoint"):
+            corner = [self._coordinate(one, owner) for one in point.iterfind("Coordinate")]
+            if len(corner) != 3:
+                message = f"expected 3 coordinates, got {len(corner)}"
+                raise self.fault(message, owner, "CartesianPoint")
+            points.append(corner)
+        if len(points) < 3:
+            raise self.fault(f"expected 3 points or more, got {len(points)}", owner, "PolyLoop")
+        return self.length * np.asarray(points)
+
+    def _coordinate(self, element: ElementTree.Element, owner: ElementTree.Element) -> float:
+        try:
+            return self.number(element, least=-1e9, most=1e9)
+        except DataError as error:
+            raise self.fault(error.message, owner, "Coordinate") from None
+
+
+def read_document(path: Path) -> Document:
+    """The elements of a gbXML file.
+
+    Raises: `DataError` for a file that cannot be read, is no gbXML, or declares entities.
+    """
+    root = _root(path)
+    if root.tag != "gbXML":
+        raise DataError(f"expected gbXML, got {root.tag[:40]}", file=path)
+
+    def factor(field: str, units: dict[str, float], default: str) -> float:
+        unit = root.get(field, default)
+        if unit not in units:
+            message = f"{unit[:40]!r}, expected of {', '.join(units)}"
+            raise DataError(message, file=path, element="gbXML", field=field)
+        return units[unit]
+
+    return Document(
+        path, root, factor("lengthUnit", METRES, "Meters"),
+        factor("areaUnit", SQUARE_METRES, "SquareMeters"),
+        factor("volumeUnit", CUBIC_METRES, "CubicMeters"),
+    )  # fmt: skip
+
+
+def _root(path: Path) -> ElementTree.Element:
+    """The root of an XML file, its elements and attributes without namespaces."""
+    builder = ElementTree.TreeBuilder()
+    parser = expat.ParserCreate(namespace_separator="}")
+    depth = 0
+
+    def local(name: str) -> str:
+        return name.rpartition("}")[2]
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > DEEPEST:
+            line = parser.CurrentLineNumber
+            raise DataError(f"line {line}: elements nested too deeply", file=path)
+        builder.start(local(name), {local(key): value for key, value in attributes.items()})
+
+    def end(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(local(name))
+
+    def refuse(*_: object) -> None:
+        raise DataError("declares entities, which are not read", file=path)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = builder.data
+    parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise DataError(f"is too big: at most {MOST_BYTES >> 20} MiB are read", file=path)
+        parser.Parse(path.read_bytes(), True)
+        return builder.close()
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        if isinstance(error, DataError):
+            raise
+        raise DataError(f"is no XML: {error}", file=path) from None

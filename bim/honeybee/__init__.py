@@ -1,0 +1,1 @@
+"""honeybee models (HBJSON) in and out."""

@@ -1,0 +1,326 @@
+"""A building from a honeybee model (HBJSON): `read_honeybee`.
+
+Light is by the modifiers of honeybee-radiance, heat by the constructions of honeybee-energy, as
+honeybee's own recipes take them; where one of the two is missing, the other stands for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from bim.defaults import FACADE_REFLECTANCE
+from bim.drawn_building import DrawnModel, drawn_building
+from bim.fenestration import ShadingState
+from bim.honeybee.energy import EnergyLibrary, OpaqueValues
+from bim.honeybee.library import OUTDOORS, PARTS
+from bim.honeybee.radiance import ModifierLibrary
+from bim.honeybee.schema import (
+    Condition,
+    HoneybeeAperture,
+    HoneybeeDoor,
+    HoneybeeModel,
+    HoneybeeRoom,
+    RoomFace,
+    Shade,
+    ShadeMesh,
+    read_model,
+)
+from bim.model import Building, Element, Problem
+from bim.planes import newell_normal
+from bim.polygon_rooms import (
+    DrawnFace,
+    DrawnOpening,
+    DrawnRoom,
+    GlazingValues,
+    SurfaceFinish,
+    triangles_of_rings,
+)
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import pane_shares
+
+ADJACENCY = {"Outdoors": "outside", "Ground": "ground", "Surface": "space"}
+KINDS = {"Wall": "wall", "Floor": "floor"}  # the others by their slope
+
+
+def read_honeybee(
+    path: str | PathLike[str], *, join: Sequence[str] = (), furniture: bool = False
+) -> Building:
+    """The building of an HBJSON file, in metres.
+
+    Read are rooms with faces, apertures, doors and shades, constructions and construction sets,
+    modifiers and modifier sets, BSDF data, and the states of dynamic groups of apertures.
+
+    Args:
+        join: rooms to make one, as "Hall + Living"; air boundaries between them go.
+        furniture: whether indoor shades are in the rooms' light and views.
+
+    Raises: `DataError` that names file, object and field; what the model lacks is in the
+        building's `problems`.
+    """
+    path = Path(path)
+    return drawn_building(_Reader(read_model(path), path).drawn(), join=join, furniture=furniture)
+
+
+class _Reader:
+    """A model with its libraries."""
+
+    def __init__(self, model: HoneybeeModel, path: Path) -> None:
+        self.model, self.path, self.scale = model, path, model.scale
+        self.energy = EnergyLibrary(model.properties.energy, path)
+        self.light = ModifierLibrary(model.properties.radiance, path)
+        self.problems: list[Problem] = []
+        self.rooms = {room.identifier for room in model.rooms or ()}
+
+    def drawn(self) -> DrawnModel:
+        """The model as polygons."""
+        model = self.model
+        rooms = tuple(self._room(room) for room in model.rooms or ())
+        elements = [e for room in model.rooms or () for e in self._shades(_outdoor(room), room)]
+        elements += [
+            e for shade in (*(model.orphaned_shades or ()), *(model.shade_meshes or ()))
+            for e in self._shades([shade], None)
+        ]  # fmt: skip
+        for face in model.orphaned_faces or ():
+            elements += self._orphan(face, "IfcWall")
+            elements += self._shades(_outdoor(face), None)
+        furniture = {
+            room.identifier: tuple(self._shades(_indoor(room), room)) for room in model.rooms or ()
+        }
+        for kind in ("orphaned_apertures", "orphaned_doors"):
+            count = len(getattr(model, kind) or ())
+            if count:
+                what = f"{count} {kind.replace('_', ' ')}, which belong to no room"
+                self.problems.append(Problem(self.path.name, what, "left out"))
+        many = [room.label for room in model.rooms or () if room.multiplier > 1]
+        if many:
+            what = f"multipliers of {', '.join(many[:4])}"
+            self.problems.append(Problem(self.path.name, what, "each such room is counted once"))
+        return DrawnModel(
+            self.path, model.label, rooms, tuple(elements), furniture, tuple(self.problems)
+        )
+
+    def _room(self, room: HoneybeeRoom) -> DrawnRoom:
+        faces = tuple(self._face(face, room) for face in room.faces)
+        label = "" if room.label == room.identifier else room.label
+        return DrawnRoom(room.identifier, label or room.identifier, faces, room.story or "")
+
+    def _face(self, face: RoomFace, room: HoneybeeRoom) -> DrawnFace:
+        condition = face.boundary_condition
+        adjacency, neighbour = self._behind(face, condition)
+        openings = [self._opening(one, face, room) for one in face.apertures or ()]
+        openings += [self._opening(one, face, room) for one in face.doors or ()]
+        part = PARTS.get(face.face_type, "")
+        field = _set_field(condition, energy=True)
+        name = self.energy.name(face.properties.energy, room.properties.energy, part, field)
+        if face.face_type == "AirBoundary":
+            name = None
+        kind = KINDS.get(face.face_type, "")
+        return DrawnFace(
+            face.identifier, face.label, kind, face.geometry.rings(self.scale), adjacency,
+            neighbour, self._finish(face, room, name, part), tuple(openings),
+            face.face_type == "AirBoundary",
+        )  # fmt: skip
+
+    def _behind(self, face: RoomFace, condition: Condition) -> tuple[str, str | None]:
+        adjacency = ADJACENCY.get(condition.type, "adiabatic")
+        if adjacency != "space":
+            return adjacency, None
+        others = [name for name in condition.boundary_condition_objects if name in self.rooms]
+        if others:
+            return adjacency, others[-1]
+        what = f"{face.label}: lies towards a room that is not in the file"
+        self.problems.append(Problem(face.identifier, what, "taken as adiabatic"))
+        return "adiabatic", None
+
+    def _finish(
+        self,
+        one: RoomFace | HoneybeeDoor,
+        room: HoneybeeRoom | None,
+        construction: str | None,
+        part: str,
+    ) -> SurfaceFinish:
+        """What modifiers say of light and the construction of heat."""
+        opaque = None if construction is None else self.energy.opaque(construction)
+        field = _set_field(one.boundary_condition, energy=False)
+        modifier = self.light.name(one.properties.radiance, room.properties.radiance, part, field)
+        material = None if modifier is None else self.light.material(modifier)
+        if material is None or not material.is_opaque or material.kind == "trans":
+            return _by_construction(opaque)
+        solar = None if opaque is None or opaque.inner_solar is None else opaque.inner_solar
+        gloss = material.gloss
+        if gloss is not None and (solar or 0.0) + gloss.at_normal > 1:
+            solar = 1.0 - gloss.at_normal
+        return SurfaceFinish(
+            None if opaque is None else opaque.construction, material.diffuse,
+            material.diffuse if solar is None else solar,
+            0.9 if opaque is None else opaque.emissivity, gloss,
+            material.diffuse if opaque is None else opaque.outer_visible,
+        )  # fmt: skip
+
+    def _opening(self, one: HoneybeeAperture, face: RoomFace, room: HoneybeeRoom) -> DrawnOpening:
+        rings = one.geometry.rings(self.scale)
+        part, fields = _opening_set(one, face)
+        own, of_room = one.properties, room.properties
+        name = self.energy.name(own.energy, of_room.energy, part, f"{fields}_construction")
+        if not one.is_glass:
+            finish = self._finish(one, room, name, part)
+            return DrawnOpening(one.identifier, one.label, rings[0], finish)
+        if len(rings) > 1:
+            what = f"{one.label}: has holes"
+            self.problems.append(Problem(one.identifier, what, "closed"))
+        height = float(np.ptp(rings[0][:, 2])) or float(np.sqrt(_area(rings[0])))
+        values = None if name is None else self.energy.window(name, height)
+        if name is not None and self.energy.has_shade(name):
+            what = f"{one.label}: shades and states of construction {name} are not read"
+            self.problems.append(Problem(one.identifier, what, "its glazing without them"))
+        modifier = self.light.name(own.radiance, of_room.radiance, part, f"{fields}_modifier")
+        glazing = self._by_modifier(one, values or GlazingValues(name=name or ""), modifier)
+        states = self._states(one, modifier, glazing)
+        return DrawnOpening(one.identifier, one.label, rings[0], glazing=glazing, states=states)
+
+    def _by_modifier(
+        self, one: HoneybeeAperture, values: GlazingValues, modifier: str | None
+    ) -> GlazingValues:
+        """The values with the visible transmittance of a glass."""
+        material = None if modifier is None else self.light.material(modifier)
+        if material is None or material.kind == "BSDF":
+            return values
+        if material.kind != "glass":
+            what = f"{one.label}: its modifier {modifier} is {material.kind}, not glass"
+            self.problems.append(Problem(one.identifier, what, "its construction's values hold"))
+            return values
+        tau, _ = pane_shares(1.0, material.index, material.transmissivity)
+        return GlazingValues(
+            values.u_value, values.g_value, float(tau), values.solar, values.panes,
+            values.name or material.name,
+        )  # fmt: skip
+
+    def _states(
+        self, one: HoneybeeAperture, modifier: str | None, values: GlazingValues
+    ) -> tuple[ShadingState, ...]:
+        """The BSDFs of an aperture: of its modifier, and of its dynamic states."""
+        found = []
+        listed = one.properties.radiance.get("states") or []
+        listed = listed if isinstance(listed, list) else []
+        names = [modifier, *(s.get("modifier") for s in listed[1:] if isinstance(s, dict))]
+        clear = 0
+        for number, name in enumerate(names):
+            label = "" if number == 0 else str(name)
+            state = self.light.state(name, label) if isinstance(name, str) else None
+            if state is not None:
+                found.append(_with_values(state, values, shaded=number > 0))
+            elif number:
+                clear += 1
+        if clear:
+            what = f"{one.label}: {clear} of its states have no BSDF"
+            self.problems.append(Problem(one.identifier, what, "left out; --operation gives some"))
+        return tuple(found) if found and found[0].name == "" else ()
+
+    def _orphan(self, face: RoomFace, kind: str) -> Iterator[Element]:
+        rings = face.geometry.rings(self.scale)
+        name = self.light.name(face.properties.radiance, {}, PARTS.get(face.face_type, ""),
+                               "exterior_modifier")  # fmt: skip
+        yield from self._element(face.identifier, face.label, kind, triangles_of_rings(rings), name)
+
+    def _shades(
+        self, shades: Iterable[Shade | ShadeMesh], room: HoneybeeRoom | None
+    ) -> Iterator[Element]:
+        room_light = {} if room is None else room.properties.radiance
+        for shade in shades:
+            try:
+                triangles = (
+                    shade.geometry.triangles(self.scale)
+                    if isinstance(shade, ShadeMesh)
+                    else triangles_of_rings(shade.geometry.rings(self.scale))
+                )
+            except IndexError:
+                message = "a face has a corner that there is not"
+                raise DataError(message, file=self.path, element=shade.identifier,
+                                field="geometry.faces") from None  # fmt: skip
+            part, field = "shade_set", "exterior_modifier"
+            if shade.is_detached and room is None:
+                part, field = "", "context_modifier"
+            name = self.light.name(shade.properties.radiance, room_light, part, field)
+            kind = "IfcBuildingElementProxy" if shade.is_detached else "IfcShadingDevice"
+            yield from self._element(shade.identifier, shade.label, kind, triangles, name)
+
+    def _element(
+        self, guid: str, name: str, kind: str, triangles: np.ndarray, modifier: str | None
+    ) -> Iterator[Element]:
+        material = None if modifier is None else self.light.material(modifier)
+        value, gloss = FACADE_REFLECTANCE, None
+        if material is not None and material.kind in ("glass", "trans", "BSDF"):
+            what = f"{name}: lets light through ({material.name})"
+            self.problems.append(Problem(guid, what, "taken as opaque"))
+            value = material.diffuse
+        elif material is not None:
+            value, gloss = material.diffuse, material.gloss
+        if len(triangles):
+            yield Element(guid, name, kind, triangles, value, value, gloss=gloss)
+
+
+def _by_construction(opaque: OpaqueValues | None) -> SurfaceFinish:
+    if opaque is None:
+        return SurfaceFinish()
+    return SurfaceFinish(
+        opaque.construction, opaque.inner_visible, opaque.inner_solar, opaque.emissivity, None,
+        opaque.outer_visible,
+    )  # fmt: skip
+
+
+def _with_values(state: ShadingState, values: GlazingValues, *, shaded: bool) -> ShadingState:
+    """A BSDF with U and g of the construction; those of a shaded state are not known."""
+    if shaded:
+        return state
+    return ShadingState(
+        state.name, state.bands, u_value=values.u_value, g_normal=values.g_value,
+        shading_position="none" if values.g_value is not None else None,
+    )  # fmt: skip
+
+
+def _set_field(condition: Condition, *, energy: bool) -> str:
+    """Field of a surface in its set; adiabatic ones have the interior's."""
+    noun = "construction" if energy else "modifier"
+    if condition.type == "Ground" and energy:
+        return "ground_construction"
+    return f"{'exterior' if condition.type in OUTDOORS else 'interior'}_{noun}"
+
+
+def _opening_set(one: HoneybeeAperture, face: RoomFace) -> tuple[str, str]:
+    """The set of an opening and the first word of its field there."""
+    inside = one.boundary_condition.type not in OUTDOORS
+    if isinstance(one, HoneybeeDoor):
+        where = "interior" if inside else "exterior"
+        if one.is_glass:
+            return "door_set", f"{where}_glass"
+        overhead = face.face_type in ("RoofCeiling", "Floor") and not inside
+        return "door_set", "overhead" if overhead else where
+    if inside:
+        return "aperture_set", "interior"
+    return "aperture_set", "window" if face.face_type == "Wall" else "skylight"
+
+
+def _outdoor(thing: HoneybeeRoom | RoomFace) -> list[Shade]:
+    """The outdoor shades of a room or face and of all that it holds."""
+    return [shade for one in _within(thing) for shade in one.outdoor_shades or ()]
+
+
+def _indoor(thing: HoneybeeRoom | RoomFace) -> list[Shade]:
+    return [shade for one in _within(thing) for shade in one.indoor_shades or ()]
+
+
+def _within(thing: HoneybeeRoom | RoomFace) -> Iterator[HoneybeeRoom | RoomFace | HoneybeeAperture]:
+    yield thing
+    if isinstance(thing, HoneybeeRoom):
+        for face in thing.faces:
+            yield from _within(face)
+    else:
+        yield from (*(thing.apertures or ()), *(thing.doors or ()))
+
+
+def _area(ring: np.ndarray) -> float:
+    return float(np.linalg.norm(newell_normal(ring)))

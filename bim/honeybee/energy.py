@@ -1,0 +1,223 @@
+"""Constructions of a honeybee model as layers and as what windows state.
+
+A surface's construction is its own, else its room's construction set's, else the model's global
+set's.  Sources: honeybee-schema, "ConstructionSet"; EnergyPlus Input Output Reference, whose
+materials these are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bim.honeybee.library import NamedObjects
+from bim.model import Construction, MaterialLayer
+from bim.polygon_rooms import GlazingValues
+from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
+from mitsuba_cfs.errors import DataError
+from thermal.errors import ThermalInputError
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
+from thermal.iso15099 import NFRC, iso15099_g_values, iso15099_u_value
+
+NO_MASS_CONDUCTIVITY = (
+    0.04  # of a layer that states its resistance alone: an insulation's [W/(m K)]
+)
+NO_MASS_DENSITY, NO_MASS_CAPACITY = 20.0, 1450.0  # [kg/m3], [J/(kg K)]: bim.defaults.EPS
+AIR_LAYER = (1.23, 1008.0)  # density, heat capacity of an air layer, as bim.boundaries
+GASES = {"Air": "air", "Argon": "argon", "Krypton": "krypton", "Xenon": "xenon"}
+GAPS = ("EnergyWindowMaterialGas", "EnergyWindowMaterialGasMixture")
+SHADED = ("WindowConstructionShade", "WindowConstructionDynamic")
+
+
+@dataclass(frozen=True, slots=True)
+class OpaqueValues:
+    """Layers of an opaque construction and what its two sides absorb."""
+
+    construction: Construction
+    inner_visible: float | None  # reflectances of the side towards the room
+    inner_solar: float | None
+    outer_visible: float | None
+    emissivity: float
+
+
+class EnergyLibrary:
+    """Materials, constructions and sets of a file, read when something refers to them."""
+
+    def __init__(self, energy: Mapping[str, Any], file: Path) -> None:
+        self.file = file
+        self.objects = NamedObjects(energy, ("materials", "constructions"), "construction", file)
+        self._opaque: dict[str, OpaqueValues] = {}
+        self._windows: dict[str, GlazingValues] = {}
+
+    def name(
+        self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str
+    ) -> str | None:
+        """Name of a surface's construction; None where nothing states one.
+
+        Args: part, field: where a construction set has it, such as "wall_set".
+        """
+        if isinstance(own.get("construction"), str):
+            return own["construction"]
+        return self.objects.name_by_set(room, part, field)
+
+    def _construction(self, name: str) -> dict[str, Any]:
+        return self.objects.find("constructions", name) or {}
+
+    def opaque(self, name: str) -> OpaqueValues | None:
+        """The layers of a construction; None for what is no opaque one (air boundary, unknown)."""
+        if name not in self._opaque:
+            one = self._construction(name)
+            layers = self._layers(one)
+            if not layers or not str(one.get("type", "")).startswith("Opaque"):
+                return None
+            self._opaque[name] = self._opaque_values(name, layers)
+        return self._opaque[name]
+
+    def _opaque_values(self, name: str, layers: Sequence[dict]) -> OpaqueValues:
+        inner, outer = layers[-1], layers[0]
+        return OpaqueValues(
+            Construction(name, tuple(self._layer(one) for one in layers), self.file.name),
+            self._reflectance(inner, "visible"),
+            self._reflectance(inner, "solar"),
+            self._reflectance(outer, "visible"),
+            self.objects.number(inner, "thermal_absorptance", 0.9, most=1.0),
+        )
+
+    def _layers(self, construction: Mapping[str, Any]) -> list[dict]:
+        """A construction's materials, outermost first; [] where one of them is not there."""
+        own = construction.get("materials") or construction.get("layers") or []
+        if not isinstance(own, list):
+            raise self.objects.fault("expected a list of materials", construction, "materials")
+        found = []
+        for one in own:
+            material = one if isinstance(one, dict) else self.objects.find("materials", str(one))
+            if material is None:
+                raise self.objects.fault(f"no material {one!r:.60}", construction, "materials")
+            found.append(material)
+        return found
+
+    def _layer(self, material: Mapping[str, Any]) -> MaterialLayer:
+        name, kind = str(material["identifier"]), material.get("type")
+        if kind == "EnergyMaterialNoMass":
+            thickness = NO_MASS_CONDUCTIVITY * self.objects.number(material, "r_value", least=1e-5)
+            rest = (NO_MASS_CONDUCTIVITY, NO_MASS_DENSITY, NO_MASS_CAPACITY)
+            return MaterialLayer(name, thickness, *rest)
+        if kind == "EnergyWindowMaterialGas":  # an air layer of a wall, such as honeybee's default
+            thickness = self.objects.number(material, "thickness", 0.0125, least=1e-4)
+            return MaterialLayer(name, thickness, thickness / 0.18, *AIR_LAYER)
+        fields = ("thickness", "conductivity", "density", "specific_heat")
+        return MaterialLayer(name, *(self.objects.number(material, f, least=1e-9) for f in fields))
+
+    def _reflectance(self, material: Mapping[str, Any], band: str) -> float | None:
+        """1 - absorptance; the visible one is the solar one where it is not stated."""
+        solar = self.objects.number(material, "solar_absorptance", 0.7, most=1.0)
+        field = f"{band}_absorptance"
+        return 1.0 - self.objects.number(material, field, solar, most=1.0)
+
+    def window(self, name: str, height: float) -> GlazingValues | None:
+        """What a window construction states; None for an unknown or opaque one.
+
+        Panes and gaps are calculated: transmittances by all reflections at normal incidence, U
+        and g by ISO 15099 in the conditions of NFRC.  Args: height: of the glass [m].
+        """
+        if name not in self._windows:
+            construction = self._construction(name)
+            kind = str(construction.get("type", ""))
+            if kind.startswith(SHADED[1]):
+                states = construction.get("constructions") or [{}]
+                construction = states[0] if isinstance(states[0], dict) else {}
+            elif kind.startswith(SHADED[0]):
+                construction = construction.get("window_construction") or {}
+            values = self._glazing(name, self._layers(construction), height)
+            if values is None:
+                return None
+            self._windows[name] = values
+        return self._windows[name]
+
+    def has_shade(self, name: str) -> bool:
+        """Whether a window's construction has a shade, or states that are not read."""
+        one = self._construction(name)
+        layered = str(one.get("type", "")).startswith(SHADED)
+        return layered or any(
+            str(m.get("type", "")).endswith(("Shade", "Blind")) for m in self._layers(one)
+        )
+
+    def _glazing(self, name: str, layers: Sequence[dict], height: float) -> GlazingValues | None:
+        kinds = [str(one.get("type", "")) for one in layers]
+        simple = [
+            m for m, k in zip(layers, kinds, strict=True) if k.startswith("EnergyWindowMaterialSim")
+        ]
+        if simple:
+            one = simple[0]
+            return GlazingValues(
+                self.objects.number(one, "u_factor", least=1e-6),
+                self.objects.number(one, "shgc", least=1e-6, most=1.0),
+                self.objects.number(one, "vt", 0.54, least=1e-6, most=1.0),
+                name=name,
+            )
+        panes = [
+            m for m, k in zip(layers, kinds, strict=True) if k == "EnergyWindowMaterialGlazing"
+        ]
+        gaps = [m for m, k in zip(layers, kinds, strict=True) if k in GAPS]
+        if not panes or len(gaps) != len(panes) - 1:
+            return None
+        try:
+            return self._layered(name, panes, gaps, height)
+        except ThermalInputError as error:
+            raise DataError(str(error), file=self.file, element=name) from None
+
+    def _layered(
+        self, name: str, panes: Sequence[dict], gaps: Sequence[dict], height: float
+    ) -> GlazingValues:
+        bands = {}
+        for band in ("visible", "solar"):
+            bands[band] = [self._pane(pane, band) for pane in panes]
+        visible, solar = (stack(bands[band]) for band in ("visible", "solar"))
+        layers = [
+            GlazingLayer(
+                self.objects.number(pane, "thickness", 0.003, least=1e-6),
+                self.objects.number(pane, "conductivity", 0.9, least=1e-4),
+                (
+                    self.objects.number(pane, "emissivity", 0.84, least=1e-4, most=1.0),
+                    self.objects.number(pane, "emissivity_back", 0.84, least=1e-4, most=1.0),
+                ),
+                self.objects.number(pane, "infrared_transmittance", 0.0, most=1.0),
+            )
+            for pane in panes
+        ]
+        unit = GlazingUnit(
+            tuple(layers), tuple(self._gap(gap) for gap in gaps), float(np.clip(height, 0.05, 50.0))
+        )
+        g_value = iso15099_g_values(unit, NFRC[1], solar.tau, solar.absorptance)
+        u_value = iso15099_u_value(unit, NFRC[0])
+        return GlazingValues(
+            u_value, float(g_value), float(visible.tau), float(solar.tau), len(panes), name
+        )
+
+    def _pane(self, pane: Mapping[str, Any], band: str) -> PaneOptics:
+        tau, rho = (
+            self.objects.number(pane, f"{band}_{what}", default, most=1.0)
+            for what, default in (("transmittance", 0.85), ("reflectance", 0.075))
+        )
+        back = pane.get(f"{band}_reflectance_back")
+        back = rho if not isinstance(back, int | float) else float(back)
+        if tau + max(rho, back) > 1 + 1e-9 or back < 0:
+            raise self.objects.fault(
+                "passes and reflects more than it gets", pane, f"{band}_reflectance"
+            )
+        return PaneOptics(np.array(tau), np.array(rho), np.array(back))
+
+    def _gap(self, gap: Mapping[str, Any]) -> GasGap:
+        width = self.objects.number(gap, "thickness", 0.0125, least=5e-4, most=1.0)
+        names = gap.get("gas_types") or [gap.get("gas_type", "Air")]
+        shares = gap.get("gas_fractions") or [1.0]
+        known = isinstance(names, list) and isinstance(shares, list) and len(names) == len(shares)
+        if not known or not all(one in GASES for one in names):
+            raise self.objects.fault(f"expected of {', '.join(GASES)}", gap, "gas_type")
+        return GasGap(
+            width, tuple((GASES[n], float(s)) for n, s in zip(names, shares, strict=True))
+        )

@@ -1,0 +1,120 @@
+"""Modifiers of a honeybee model as Radiance materials; BSDF data and the states of windows.
+
+A surface's modifier is its own, else its room's modifier set's, else the model's global set's.
+
+Source: honeybee-schema, "Modifier" and "ModifierSet".
+"""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bim.fenestration import ShadingState
+from bim.honeybee.library import NamedObjects
+from bim.radiance.materials import RadianceMaterial, material_of
+from bim.radiance.primitives import VOID, Primitive
+from mitsuba_cfs.bsdf.xml import read_bsdf_xml
+from mitsuba_cfs.errors import DataError
+
+COLOURS = ("r", "g", "b")
+OPAQUE_FIELDS = {
+    "plastic": ("specularity", "roughness"),
+    "metal": ("specularity", "roughness"),
+    "trans": ("specularity", "roughness", "transmitted_diff", "transmitted_spec"),
+    "mirror": (),
+}
+
+
+class ModifierLibrary:
+    """Modifiers and modifier sets of a file, read when something refers to them."""
+
+    def __init__(self, radiance: Mapping[str, Any], file: Path) -> None:
+        self.file = file
+        self.objects = NamedObjects(radiance, ("modifiers",), "modifier", file)
+        self._materials: dict[str, RadianceMaterial] = {}
+        self._states: dict[str, ShadingState] = {}
+
+    def name(
+        self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str
+    ) -> str | None:
+        """Name of a surface's modifier; None where nothing states one.
+
+        Args: part, field: where a modifier set has it, such as "wall_set".
+        """
+        if isinstance(own.get("modifier"), str):
+            return own["modifier"]
+        return self.objects.name_by_set(room, part, field)
+
+    def material(self, name: str) -> RadianceMaterial | None:
+        """The Radiance material of a modifier; None where the file has none of that name."""
+        if name not in self._materials:
+            modifier = self.objects.find("modifiers", name)
+            if modifier is None:
+                return None
+            self._materials[name] = self._material(modifier)
+        return self._materials[name]
+
+    def _material(self, modifier: Mapping[str, Any]) -> RadianceMaterial:
+        kind = _kind(modifier)
+        numbers: list[float] = []
+        if kind in OPAQUE_FIELDS:
+            numbers = [self.objects.number(modifier, f"{c}_reflectance", 0.0) for c in COLOURS]
+            numbers += [self.objects.number(modifier, field, 0.0) for field in OPAQUE_FIELDS[kind]]
+        elif kind == "glass":
+            numbers = [self.objects.number(modifier, f"{c}_transmissivity", 0.0) for c in COLOURS]
+            index = modifier.get("refraction_index")
+            numbers += (
+                [] if index is None else [self.objects.number(modifier, "refraction_index", 1.52)]
+            )
+        elif kind == "BSDF":
+            return RadianceMaterial(modifier["identifier"], "BSDF", bsdf=modifier["identifier"])
+        name = modifier["identifier"]
+        try:
+            return material_of(Primitive(VOID, kind, name, (), tuple(numbers), self.file, 0))
+        except DataError as error:  # which names a line; there is none
+            raise DataError(error.message, file=self.file, element=name) from None
+
+    def state(self, name: str, label: str = "") -> ShadingState | None:
+        """The BSDF of a modifier as a shading state; None where it is none."""
+        modifier = self.objects.find("modifiers", name) or {}
+        if _kind(modifier) != "BSDF":
+            return None
+        if name not in self._states:
+            self._states[name] = self._bsdf(modifier)
+        held = self._states[name]
+        return ShadingState(name=label, bands=held.bands)
+
+    def _bsdf(self, modifier: Mapping[str, Any]) -> ShadingState:
+        name, data = modifier["identifier"], modifier.get("bsdf_data")
+        if not isinstance(data, str):
+            raise DataError("expected the text of a BSDF XML", file=self.file, element=name,
+                            field="bsdf_data")  # fmt: skip
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "bsdf.xml"
+            path.write_bytes(_decoded(data))
+            try:
+                bands = read_bsdf_xml(path).bands
+            except DataError as error:
+                raise DataError(error.message, file=self.file, element=name, field="bsdf_data")\
+                    from None  # fmt: skip
+        return ShadingState(bands=dict(bands))
+
+
+def _kind(modifier: Mapping[str, Any]) -> str:
+    """Radiance's name of a modifier's type, which files write with either first letter."""
+    kind = str(modifier.get("type", ""))
+    return kind if kind.upper() == kind else kind[:1].lower() + kind[1:]
+
+
+def _decoded(data: str) -> bytes:
+    """The XML of a modifier: as text, or in base 64 as some writers keep it."""
+    if data.lstrip().startswith("<"):
+        return data.encode("utf-8")
+    try:
+        return base64.b64decode(data, validate=True)
+    except ValueError:
+        return data.encode("utf-8")

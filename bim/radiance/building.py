@@ -1,0 +1,177 @@
+"""A Radiance scene as a `Building` of one room."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.defaults import default_construction
+from bim.model import Building, Element, Face, Problem, Space, Window
+from bim.names import numbered
+from bim.radiance.daylight import held_states, opaque_objects, scene_windows
+from bim.radiance.indoors import THICK, Indoors, indoors_of
+from bim.radiance.materials import SYSTEMS
+from bim.radiance.scene import RadianceObject, RadianceScene, read_radiance
+from bim.shell import enclosed_volume, open_edges
+from mitsuba_cfs.errors import DataError, RoomError
+
+NEAR = 0.3  # of the floor's level, for its other parts [m]
+FLAT = 0.5  # cosine from which a surface is floor or ceiling
+LIKELY = (0.5, 2.0)  # enclosed volume over that of floor and height, where the shell is sound
+
+
+def read_radiance_building(path: Path, apertures: Sequence[str] = ()) -> Building:
+    """The room of a Radiance scene file.
+
+    Args: apertures: materials or modifiers of its windows; by default all of glass or with a BSDF.
+
+    Raises: `DataError` for what is no scene, has no such material, or shows no room.
+    """
+    scene = read_radiance(path)
+    named = apertures or _clear(scene, path)
+    panes, surfaces = scene.of_modifiers(named), scene_windows(scene, named)
+    names = numbered([surface.name for surface in surfaces])
+    windows = tuple(
+        Window(
+            name, name, surface.triangles, opening_area=_area(surface.triangles),
+            type_name=pane.material.name, states=held_states(pane),
+        )
+        for name, surface, pane in zip(names, surfaces, panes, strict=True)
+    )  # fmt: skip
+    objects = opaque_objects(scene)
+    if not objects:
+        raise DataError("has no opaque surface", file=path)
+    indoors = indoors_of(objects, windows)
+    if not indoors.bounds.any():
+        raise DataError("no surface is indoors: is the room closed?", file=path, field="--aperture")
+    space, problems = _space(path.stem, objects, indoors, windows)
+    elements = tuple(
+        _element(f"{path.stem}-{i}", thing, thing.triangles)
+        for i, thing in enumerate(objects)
+        if not indoors.stands[indoors.owner == i].any()
+    )
+    found = (*scene.problems, *problems)
+    return Building(path.stem, (space,), elements, found, file=path)
+
+
+def _clear(scene: RadianceScene, path: Path) -> list[str]:
+    kinds = ("glass", *SYSTEMS)
+    names = {thing.material.name for thing in scene.objects if thing.material.kind in kinds}
+    if not names:
+        there = ", ".join(sorted({thing.material.name for thing in scene.objects})[:12])
+        message = f"has no glass and no BSDF: name the windows' material, there are {there}"
+        raise DataError(message, file=path, field="--aperture")
+    return sorted(names)
+
+
+def _space(
+    name: str,
+    objects: Sequence[RadianceObject],
+    indoors: Indoors,
+    windows: tuple[Window, ...],
+) -> tuple[Space, list[Problem]]:
+    pieces = _furniture(objects, indoors)
+    seen = indoors.bounds.any(axis=0) & ~indoors.furniture
+    faces = _faces(objects, indoors.outward(seen), indoors.owner[seen], windows)
+    floor = sum(face.area for face in faces if face.kind == "floor")
+    if not floor:
+        raise RoomError(f"space {name}: has no floor")
+    shell = np.concatenate([part.triangles for part in (*faces, *windows)])
+    volume = enclosed_volume(shell)
+    drawn = floor * float(np.ptp(shell[..., 2]))
+    problems = [
+        Problem(name, "a Radiance scene states no constructions",
+                "default ones; walls without windows are adiabatic")
+    ]  # fmt: skip
+    if not LIKELY[0] * drawn < volume < LIKELY[1] * drawn:
+        what = f"its surfaces enclose {volume:.1f} m3, floor times height is {drawn:.1f} m3"
+        problems.append(Problem(name, what, "the latter is used"))
+        volume = drawn
+    leaks = open_edges(shell)
+    if leaks:
+        what = f"room {name}: {leaks} edges of its surfaces do not meet another's"
+        problems.append(Problem(name, what, "light may leak there, where there is a gap"))
+    return Space(
+        f"{name}-room", name, "", volume, floor, faces, windows, volume, furniture=pieces
+    ), problems
+
+
+def _faces(
+    objects: Sequence[RadianceObject],
+    triangles: NDArray[np.float64],
+    owner: NDArray[np.int64],
+    windows: Sequence[Window],
+) -> tuple[Face, ...]:
+    """Triangles of one material in one plane as a face each."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    areas = 0.5 * np.linalg.norm(normals, axis=1)
+    normals /= 2 * areas[:, None]
+    offsets = np.einsum("ij,ij->i", normals, triangles[:, 0])
+    level = _floor_level(triangles, normals, areas)
+    planes: dict[tuple, list[int]] = {}
+    for i, (normal, offset) in enumerate(zip(normals, offsets, strict=True)):
+        plane = (*np.round(normal, 3) + 0.0, round(float(offset), 3))
+        planes.setdefault((objects[owner[i]].material.name, *plane), []).append(i)
+    faces = []
+    for chosen in planes.values():
+        thing = objects[owner[chosen[0]]]
+        own = triangles[chosen]
+        normal, z = normals[chosen[0]], own[..., 2].mean()
+        kind = "ceiling" if normal[2] > FLAT else "wall"
+        if normal[2] < -FLAT and abs(z - level) < NEAR:
+            kind = "floor"
+        outside = any(_beside(own, normal, window) for window in windows)
+        beyond = "outside" if outside else "adiabatic"
+        shine = thing.material
+        faces.append(
+            Face(thing.name, kind, own, beyond, default_construction(kind, beyond),
+                 shine.diffuse, shine.diffuse, gloss=shine.gloss, element=thing.name)
+        )  # fmt: skip
+    return tuple(faces)
+
+
+def _furniture(objects: Sequence[RadianceObject], indoors: Indoors) -> tuple[Element, ...]:
+    """What stands in the room, with a GUID for each body, and what is lit in cavities round it."""
+    pieces = []
+    for i in np.unique(indoors.owner[indoors.furniture]):
+        own = indoors.furniture & (indoors.owner == i)
+        stands = indoors.stands[own].any()
+        guid = f"furniture-{indoors.body[i]}" if stands else f"cavity-{i}"
+        # their normals leave the room: those of a body are turned to leave the body
+        triangles = indoors.outward(own)[:, ::-1]
+        pieces.append(_element(guid, objects[i], triangles))
+    return tuple(pieces)
+
+
+def _floor_level(
+    triangles: NDArray[np.float64], normals: NDArray[np.float64], areas: NDArray[np.float64]
+) -> float:
+    """Height of most of what lies below the room [m]."""
+    low = normals[:, 2] < -FLAT
+    heights = np.round(triangles[low][..., 2].mean(axis=1), 2)
+    if not len(heights):
+        return float(triangles[..., 2].min())
+    levels, index = np.unique(heights, return_inverse=True)
+    return float(levels[np.argmax(np.bincount(index, areas[low]))])
+
+
+def _beside(triangles: NDArray[np.float64], normal: NDArray[np.float64], window: Window) -> bool:
+    """Whether a face lies in the wall of a window."""
+    apart = (triangles.mean(axis=(0, 1)) - window.centre) @ window.normal
+    return bool(normal @ window.normal > 0.99 and abs(apart) < THICK)
+
+
+def _element(guid: str, thing: RadianceObject, triangles: NDArray[np.float64]) -> Element:
+    shine = thing.material
+    return Element(
+        guid, thing.name, shine.kind, triangles, shine.diffuse, shine.diffuse,
+        material=shine.name, gloss=shine.gloss,
+    )  # fmt: skip
+
+
+def _area(triangles: NDArray[np.float64]) -> float:
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return float(0.5 * np.linalg.norm(cross, axis=1).sum())

@@ -1,0 +1,205 @@
+"""Files of panes: Optics (IGDB) text, products of the IGSDB, layers of a glazing system (JSON)."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.en410 import visible_value
+from mitsuba_cfs.bsdf.glazing import Pane
+from mitsuba_cfs.errors import DataError
+
+FloatArray = NDArray[np.float64]
+VISIBLE_NM = (400.0, 760.0)  # that a spectrum is to cover for visible values
+UNCOATED = ("neither", "none", "na", "n/a", "")
+
+
+@dataclass(frozen=True, slots=True)
+class PaneFile:
+    """What the file of a pane says of it; front is its own front, None is what it does not say."""
+
+    path: Path
+    name: str
+    # [N, 4] wavelength [nm] rising, transmittance, front and back reflectance; N may be 0
+    spectrum: FloatArray
+    coated: bool = False
+    turned: bool = False  # the front is towards the room
+    thickness: float | None = None  # [m]
+    conductivity: float | None = None  # [W/(m K)]
+    emissivity: tuple[float | None, float | None] = (None, None)
+    infrared_transmittance: float | None = None
+    # transmittance, front and back reflectance for daylight
+    visible: tuple[float, float, float] | None = None
+
+    def visible_pane(self) -> Pane:
+        """The pane in the visible band: by the values that are stated, else by its spectrum.
+
+        One without a coating has the mean of what its two faces were measured at.
+        """
+        tau, front, back = self.visible or self._of_spectrum()
+        if not self.coated:
+            front = back = 0.5 * (front + back)
+        if self.turned:
+            front, back = back, front
+        try:
+            return Pane(self.name, tau, front, back, self.coated)
+        except ValueError as error:
+            raise DataError(str(error), file=self.path) from error
+
+    def _of_spectrum(self) -> tuple[float, float, float]:
+        nm = self.spectrum[:, 0]
+        if not len(nm) or nm[0] > VISIBLE_NM[0] or nm[-1] < VISIBLE_NM[1]:
+            low, high = VISIBLE_NM
+            message = f"has no spectrum from {low:g} to {high:g} nm"
+            raise DataError(message, file=self.path, field="spectral_data")
+        tau, front, back = (visible_value(nm, column) for column in self.spectrum[:, 1:].T)
+        return tau, front, back
+
+
+def read_pane_file(path: str | PathLike[str]) -> PaneFile:
+    """The pane of an Optics (IGDB) text file or of an IGSDB product's JSON file.
+
+    Raises: `DataError` that names the file and what is missing.
+    """
+    path = Path(path)
+    text = _text(path)
+    if text.lstrip().startswith("{") and '"' in text.lstrip()[:40]:
+        return _product(_json(text, path), path)
+    return _optics(text, path)
+
+
+def read_glazing_layers(path: str | PathLike[str]) -> list[PaneFile]:
+    """The panes of a glazing system's JSON, whose `layers` hold spectra, the outer one first."""
+    path = Path(path)
+    panes = []
+    for number, layer in enumerate(_json(_text(path), path).get("layers") or [], start=1):
+        where = f"layer {number}"
+        kind = layer.get("product_type")
+        if kind != "glazing":
+            raise DataError(f"is no glass ({kind})", file=path, element=where)
+        rows = [[float(nm), *values] for nm, values in (layer.get("spectral_data") or {}).items()]
+        coated = _is_coated(layer.get("coated_side"))
+        turned = bool(layer.get("flipped"))
+        panes.append(PaneFile(path, where, _spectrum(rows, path), coated, turned))
+    if not panes:
+        raise DataError("has no layers", file=path, field="layers")
+    return panes
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+
+
+def _json(text: str, path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise DataError(f"is not JSON: {error}", file=path) from None
+    if not isinstance(data, dict):
+        raise DataError("expected a table of a product", file=path)
+    return data
+
+
+def _product(product: dict[str, Any], path: Path) -> PaneFile:
+    """A product of the IGSDB: its measured data, and what it states of daylight."""
+    measured = product.get("measured_data")
+    if not isinstance(measured, dict) or not measured:
+        raise DataError("is no IGSDB product (measured_data)", file=path)
+    kind = product.get("type") or "no type"
+    if kind in ("shading", "material") or measured.get("is_specular") is False:
+        raise DataError(f"expected a specular pane, got {kind}", file=path, field="type")
+    if measured.get("thickness") is None and product.get("composition"):
+        raise DataError("is a shade or a product of parts, not a pane", file=path)
+    try:
+        rows = (product.get("spectral_data") or {}).get("spectral_data") or []
+        rows = [[1e3 * row["wavelength"], row["T"], row["Rf"], row["Rb"]] for row in rows]
+    except (KeyError, TypeError, AttributeError) as error:
+        message = f"expected rows of wavelength, T, Rf, Rb ({error})"
+        raise DataError(message, file=path, field="spectral_data") from None
+    summary = (product.get("integrated_results_summary") or [{}])[0]
+    stated = tuple(summary.get(name) for name in ("tfvis", "rfvis", "rbvis"))
+    thickness = measured.get("thickness")
+    return PaneFile(
+        path, product.get("name") or path.stem, _spectrum(rows, path),
+        _is_coated(product.get("coated_side")),
+        thickness=None if thickness is None else thickness / 1000.0,
+        conductivity=measured.get("conductivity"),
+        emissivity=(measured.get("emissivity_front"), measured.get("emissivity_back")),
+        infrared_transmittance=measured.get("tir_front"),
+        visible=None if None in stated else stated,
+    )  # fmt: skip
+
+
+_HEADER = re.compile(r"^\{(?P<content>.*)\}(?P<value>.*)$")
+
+
+def _optics(text: str, path: Path) -> PaneFile:
+    """The pane of an Optics text file: headers in braces, then wavelength, T, Rf, Rb."""
+    headers, rows = {}, []
+    for line in text.splitlines():
+        header = _HEADER.match(line.strip())
+        if header:
+            key, _, value = header["content"].partition(":")
+            headers[key.strip().lower()] = (value.strip() or header["value"]).strip()
+        elif line.strip():
+            try:
+                rows.append([float(word) for word in line.split()[:4]])
+            except ValueError:
+                raise DataError(f"is no spectral row: {line.strip()[:40]!r}", file=path) from None
+    if not rows or {len(row) for row in rows} != {4}:
+        raise DataError("expected rows of wavelength, T, Rf, Rb", file=path)
+    if "nano" not in headers.get("units, wavelength units", "").lower():
+        rows = [[1000.0 * row[0], *row[1:]] for row in rows]
+    numbers = re.findall(r"[\d.]+", headers.get("emissivity, front back", ""))
+    front, back, *_ = [*(float(n) for n in numbers[:2]), None, None]
+    millimetres = _number(headers.get("thickness"))
+    return PaneFile(
+        path, headers.get("product name") or path.stem, _spectrum(rows, path),
+        _is_coated(headers.get("coated side")),
+        thickness=None if millimetres is None else millimetres / 1000.0,
+        conductivity=_number(headers.get("conductivity")),
+        emissivity=(front, back),
+        infrared_transmittance=_number(headers.get("ir transmittance", "").partition("=")[2]),
+    )  # fmt: skip
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        return float(text or "")
+    except ValueError:
+        return None
+
+
+def _is_coated(side: Any) -> bool:
+    return str(side or "").lower() not in UNCOATED
+
+
+def _spectrum(rows: Sequence[Sequence[float]], path: Path) -> FloatArray:
+    """Rows of wavelength [nm] and shares as an array [N, 4], checked."""
+    if not rows:
+        return np.zeros((0, 4))
+    try:
+        table = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        table = np.zeros(0)
+    if table.ndim != 2 or table.shape[1] != 4 or not np.isfinite(table).all():
+        raise DataError("expected rows of wavelength, T, Rf, Rb", file=path, field="spectral_data")
+    table = table[np.argsort(table[:, 0], kind="stable")]
+    if np.any(np.diff(table[:, 0]) <= 0):
+        raise DataError("names a wavelength twice", file=path, field="spectral_data")
+    worst = float(np.max(table[:, 1] + table[:, 2:].max(axis=1)))
+    if table[:, 1:].min() < -1e-3 or worst > 1.02:
+        message = f"T + R reaches {worst:.3f}: expected shares of 1"
+        raise DataError(message, file=path, field="spectral_data")
+    return np.column_stack([np.round(table[:, 0], 3), np.clip(table[:, 1:], 0.0, 1.0)])

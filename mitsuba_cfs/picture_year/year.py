@@ -1,0 +1,195 @@
+"""A year of a view's pictures: patterns for what varies slowly, codes for what is sharp.
+
+    L[pixel] = share reflected[row]            surfaces, by patterns
+             + window[pixel] ratio[pixel]      pixels that show windows, by patterns and their error
+             + beam[pixel]                     the sun's straight beam on surfaces, by codes
+
+Illuminances at the eye are those of the pictures themselves: each part of each hour is scaled to
+its own.  The sun's disc is apart, as it is for glare (`mitsuba_cfs.glare.sun_disc`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.glare.annual import Pictures, full_picture
+from mitsuba_cfs.glare.evaluation import evaluate
+from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
+from mitsuba_cfs.glare.sun_disc import SunDisc
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.picture_year.codes import coded, packed, unpacked
+from mitsuba_cfs.picture_year.low_rank import MOST, Patterns, patterns_of
+from mitsuba_cfs.progress import Progress, silent
+
+SAMPLE = 400  # hours that the patterns are found from
+ROWS, WINDOWS = 64, 32  # patterns of surfaces, of pixels that show windows
+OFTEN = 0.3  # of the hours: pixels with light of their own in more of them are kept by patterns
+FAINT = 2.0  # [cd/m2] of the sun's beam on a pixel: less is left out
+UNLIKE = 0.08  # of the logarithm: window pixels that patterns miss by more are coded
+FLOOR = 0.02  # of an hour's mean window luminance: below it no such pixel is coded
+CHECKED = 100  # hours whose DGP is compared
+BATCH_BYTES = 64 * 2**20  # of the pictures of a batch of hours
+
+
+@dataclass(frozen=True, slots=True)
+class DgpCheck:
+    """DGP of some hours by the pictures themselves and by what is kept of them."""
+
+    hours: NDArray[np.int64]  # [c] numbers among the hours of the year's pictures
+    dgp: NDArray[np.float64]  # [c]
+    kept: NDArray[np.float64]  # [c]
+
+    @property
+    def largest(self) -> float:
+        """The largest difference."""
+        return float(np.abs(self.kept - self.dgp).max(initial=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class PictureYear:
+    """The pictures of a view in some hours H."""
+
+    view: View
+    pixels: NDArray[np.int64]  # [n] row * width + column of the pixels that show something
+    row: NDArray[np.int64]  # [n] row of the surfaces' patterns
+    share: NDArray[np.float32]  # [n] of the pixel that shows surfaces
+    window: NDArray[np.int64]  # [w] numbers of the pixels that are kept as windows
+    rows: Patterns  # of m rows
+    windows: Patterns  # of w pixels
+    scale: NDArray[np.float32]  # [2, H] of rows and windows
+    amounts: tuple[NDArray[np.int16], NDArray[np.int16]]  # [H, r] of rows and windows, in steps
+    amount_step: tuple[NDArray[np.float32], NDArray[np.float32]]  # [r]
+    floor: NDArray[np.float32]  # [H] luminance below which no window pixel is corrected
+    codes: tuple[bytes, ...]  # [H] beam [n] and ratio [w], see `codes.packed`
+    discs: tuple[SunDisc | None, ...]  # [H]
+    check: DgpCheck | None = None
+
+    def values(self, hour: int) -> NDArray[np.float32]:
+        """Luminance [n] of the pixels in an hour, without the sun's disc."""
+        beam, ratio = unpacked(self.codes[hour], (len(self.pixels), len(self.window)))
+        found = self._part(0, hour)[self.row] * self.share + beam.values(0.0)
+        shown = self._part(1, hour)
+        if ratio.code.any():
+            known = np.maximum(shown, self.floor[hour])
+            shown = np.where(ratio.code > 0, known * ratio.values(1.0), shown)
+        found[self.window] += shown
+        return found
+
+    def _part(self, which: int, hour: int) -> NDArray[np.float32]:
+        patterns = (self.rows, self.windows)[which]
+        amounts = self.amounts[which][hour] * self.amount_step[which]
+        return patterns.values(self.scale[which, [hour]], amounts[None])[0]
+
+
+def picture_year(pictures: Pictures, *, seed: int = 0, progress: Progress = silent) -> PictureYear:
+    """All pictures of a view's hours, compressed, and what that changes of DGP in some of them.
+
+    Args: seed: of the hours that the patterns are found from, and of those that are compared.
+    """
+    work = _Work(pictures, seed)
+    chosen = np.random.default_rng(seed).permutation(pictures.hours)
+    checked = set(chosen[:CHECKED].tolist())
+    rated: dict[int, float] = {}
+    done = 0
+    for batch in _batches(pictures):
+        rows, own = pictures.by_rows(batch)
+        work.add(batch, rows, own)
+        for hour in checked.intersection(batch.tolist()):
+            at = hour - int(batch[0])
+            whole = rows[at][work.row] * work.share + own[at]
+            rated[hour] = work.dgp(whole, work.discs[hour])
+        done += len(batch)
+        progress("explorer", done / max(pictures.hours, 1))
+    year = work.year()
+    hours = np.array(sorted(rated), dtype=np.int64)
+    kept = [work.dgp(year.values(h), year.discs[h]) for h in hours.tolist()]
+    check = DgpCheck(hours, np.array([rated[h] for h in hours.tolist()]), np.array(kept))
+    return work.year(check)
+
+
+def _batches(pictures: Pictures) -> Iterator[NDArray[np.int64]]:
+    size = max(1, BATCH_BYTES // (8 * max(len(pictures.pixels), 1)))
+    for start in range(0, pictures.hours, size):
+        yield np.arange(start, min(start + size, pictures.hours))
+
+
+class _Work:
+    """What is found of the hours, batch by batch."""
+
+    def __init__(self, pictures: Pictures, seed: int) -> None:
+        self._pictures = pictures
+        shared, H = pictures.shared, pictures.hours
+        self.row, self.share = shared.row, shared.share
+        sample = np.random.default_rng(seed).choice(H, min(SAMPLE, H), replace=False)
+        rows, own = self._sampled(np.sort(sample))
+        often = (own > 0).mean(axis=0) > OFTEN if H else np.zeros(len(self.share), dtype=bool)
+        self.window = np.flatnonzero(often | (self.share < 1))
+        self._sparse = np.ones(len(self.share), dtype=bool)
+        self._sparse[self.window] = False
+        count = np.bincount(self.row, minlength=rows.shape[1])
+        even = np.ones(len(self.window))
+        self.patterns = (
+            patterns_of(rows, np.maximum(count, 1), ROWS),
+            patterns_of(own[:, self.window], even, WINDOWS),
+        )
+        self._geometry = GlareView(pictures.view)
+        projected = in_picture_order(self._geometry.projected).ravel()[pictures.pixels]
+        of_rows = np.bincount(self.row, projected * self.share, minlength=rows.shape[1])
+        self._weights = of_rows, projected[self.window]
+        self.scale = np.zeros((2, H), dtype=np.float32)
+        self._amounts = [np.zeros((H, p.rank)) for p in self.patterns]
+        self.floor = np.zeros(H, dtype=np.float32)
+        self.codes: list[bytes] = [b""] * H
+        self.discs: list[SunDisc | None] = [None] * H
+
+    def _sampled(self, hours: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
+        parts = [self._pictures.by_rows(hours[i : i + 50]) for i in range(0, len(hours), 50)]
+        rows, own = zip(*parts, strict=True)
+        return np.concatenate(rows), np.concatenate(own)
+
+    def add(self, batch: NDArray[np.int64], rows: NDArray, own: NDArray) -> None:
+        """Keep a batch of hours: luminance of rows [h, m] and of the pixels' own [h, n]."""
+        shown = own[:, self.window]
+        known = self._fitted(0, batch, rows), self._fitted(1, batch, shown)
+        self.floor[batch] = FLOOR * shown.mean(axis=1) if shown.size else 0.0
+        for i, hour in enumerate(batch.tolist()):
+            beam = coded(own[i], self._sparse & (own[i] > FAINT))
+            floor = max(float(self.floor[hour]), 1e-6)
+            ratio = np.maximum(shown[i], floor) / np.maximum(known[1][i], floor)
+            wrong = coded(ratio, np.abs(np.log(ratio)) > UNLIKE)
+            self.codes[hour] = packed(beam, wrong)
+        for hour, disc in zip(batch.tolist(), self._pictures.discs(batch), strict=True):
+            self.discs[hour] = disc
+
+    def _fitted(self, which: int, batch: NDArray[np.int64], values: NDArray) -> NDArray:
+        """The hours [h, ..] as the patterns have them, with the illuminance at the eye kept."""
+        patterns, weight = self.patterns[which], self._weights[which]
+        scale, amounts = patterns.amounts(values)
+        known = patterns.values(scale, amounts)
+        lux, now = values @ weight, known @ weight
+        factor = np.divide(lux, now, out=np.ones_like(lux), where=now > 0)
+        self.scale[which, batch] = scale * factor
+        self._amounts[which][batch] = amounts
+        return known * factor[:, None]
+
+    def dgp(self, values: NDArray, disc: SunDisc | None) -> float:
+        """DGP of pixels' luminance [n] and a disc."""
+        picture = full_picture(values, self._pictures.pixels, self._pictures.view)
+        return evaluate(picture, self._geometry, disc=disc).dgp
+
+    def year(self, check: DgpCheck | None = None) -> PictureYear:
+        """What has been kept."""
+        steps = [np.abs(a).max(axis=0, initial=1e-12) / MOST for a in self._amounts]
+        whole = [
+            np.round(a / s).astype(np.int16) for a, s in zip(self._amounts, steps, strict=True)
+        ]
+        return PictureYear(
+            self._pictures.view, self._pictures.pixels, self.row, self.share, self.window,
+            *self.patterns, self.scale, (whole[0], whole[1]),
+            (steps[0].astype(np.float32), steps[1].astype(np.float32)),
+            self.floor, tuple(self.codes), tuple(self.discs), check,
+        )  # fmt: skip

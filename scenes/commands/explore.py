@@ -1,0 +1,65 @@
+"""`cfs explore`: any hour of the results of `cfs run --explore`, in a browser."""
+
+from __future__ import annotations
+
+import tempfile
+import webbrowser
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from mitsuba_cfs.errors import DataError
+
+RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
+
+
+@click.command()
+@click.argument("results", type=RESULTS, nargs=-1, required=True, metavar="RESULTS...")
+@click.option(
+    "--out", type=click.Path(path_type=Path),
+    help="Write one folder that opens as a file, and end.",
+)  # fmt: skip
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="On the loopback address; 0: any."
+)
+@click.option("--no-browser", is_flag=True, help="Only say the address.")
+def command(results: Sequence[Path], out: Path | None, port: int, no_browser: bool) -> None:
+    """Walk through any hour of runs: pictures, glare, plans with patches of sun, temperatures.
+
+    RESULTS are folders of `cfs run --explore`.  Those of several runs can be seen side by side.
+    The page is served to this machine alone until Ctrl-C; it asks for nothing elsewhere.
+    """
+    from scenes.explore.folder import explorer_of, join_explorers
+    from scenes.result_folder import ResultFolder
+
+    folders = [explorer_of(one) for one in results]
+    if out is not None:
+        with ResultFolder(out, "explore", inputs=results).replaced() as place:
+            join_explorers(results, place)
+        click.echo(f"explorer: {out / 'index.html'}")
+        return
+    with tempfile.TemporaryDirectory() as place:
+        folder = folders[0]
+        if len(results) > 1:
+            folder = Path(place)
+            join_explorers(results, folder)
+        _serve(folder, port, open_it=not no_browser)
+
+
+def _serve(folder: Path, port: int, *, open_it: bool) -> None:
+    from scenes.explore.serve import server
+
+    try:
+        running = server(folder, port)
+    except OSError as error:
+        raise DataError(f"port {port} cannot be used: {error.strerror}", field="--port") from None
+    with running:
+        address = f"http://127.0.0.1:{running.server_port}/"
+        click.echo(f"{address} until Ctrl-C")
+        if open_it:
+            webbrowser.open(address)
+        try:
+            running.serve_forever()
+        except KeyboardInterrupt:
+            click.echo("ended")

@@ -1,0 +1,94 @@
+"""The explorer's folder: the page, its scripts and the data of one or several runs."""
+
+from __future__ import annotations
+
+import base64
+import shutil
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_text
+from scenes.explore.packing import read_data, write_data
+from scenes.explore.room_files import write_room
+from scenes.figures.scale import ColourScale
+from scenes.results import RunResult
+from scenes.run.outputs import EXPLORER
+
+CASE = "case.js"
+PAGE = files(__package__) / "templates"
+STYLE = files("scenes.report") / "templates" / "style.css"
+STEPS = 256  # of the palette
+
+
+def write_explorer(result: RunResult, folder: Path) -> None:
+    """Write the explorer of a run's rooms that were computed for it.
+
+    A room that is equal to another has that one's light, and is named with it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "data").mkdir(exist_ok=True)
+    entries = []
+    for number, room in enumerate(one for one in result.spaces if one.explored is not None):
+        entry = write_room(folder, f"room{number}", result, room)
+        equal = [o.space.label for o in result.spaces if o.template == room.space.label]
+        entry["name"] += "".join(f", {label}" for label in equal)
+        entries.append(entry)
+    first = result.times[0]
+    colours = ColourScale(0, 1, "", "").rgba((np.arange(STEPS) + 0.5) / STEPS)[:, :3]
+    write_data(
+        folder / CASE,
+        {
+            "title": result.building.name or "Building",
+            "site": str(result.manifest.get("site", "")),
+            "first_day": f"{first:%Y-%m-%d}",
+            "hours": len(result.times),
+            "palette": base64.b64encode(colours.tobytes()).decode("ascii"),
+            "rooms": entries,
+        },
+    )
+    write_page(folder)
+
+
+def write_page(folder: Path) -> None:
+    """Write the page with its style and scripts."""
+    for one in sorted(PAGE.iterdir(), key=lambda one: one.name):
+        if one.is_file():
+            write_text(folder / one.name, one.read_text("utf-8"))
+    write_text(folder / "style.css", STYLE.read_text("utf-8"))
+
+
+def explorer_of(results: Path) -> Path:
+    """The explorer's folder of a folder of results.
+
+    Raises: `DataError` where there is none.
+    """
+    for folder in (results / EXPLORER, results):
+        if (folder / CASE).is_file():
+            return folder
+    raise DataError("holds no explorer: compute it again with `cfs run --explore`", file=results)
+
+
+def join_explorers(folders: Sequence[Path], target: Path) -> None:
+    """Write one explorer of several; each one's data lie in a folder of their own.
+
+    Raises: `DataError` where their years are not of one length.
+    """
+    cases = [read_data(explorer_of(folder) / CASE) for folder in folders]
+    joined: dict[str, Any] = cases[0] | {"rooms": []}
+    for number, (folder, case) in enumerate(zip(folders, cases, strict=True)):
+        if case["hours"] != joined["hours"]:
+            message = f"has {case['hours']} hours, {folders[0]} has {joined['hours']}"
+            raise DataError(message, file=folder)
+        shutil.copytree(explorer_of(folder) / "data", target / str(number) / "data")
+        for entry in case["rooms"]:
+            named = {"name": f"{folder.name}: {entry['name']}", "file": f"{number}/{entry['file']}"}
+            for key in ("models", "lux"):
+                named[key] = [f"{number}/{name}" for name in entry[key]]
+            joined["rooms"].append(entry | named)
+    write_data(target / CASE, joined)
+    write_page(target)

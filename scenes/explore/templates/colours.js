@@ -1,0 +1,83 @@
+// Luminance as colours: as the eye adapts to it, or as falsecolour; two pictures as their ratio.
+(() => {
+  "use strict";
+  const KEY = 0.18; // middle grey of the tone-mapped picture
+  const MOST_RATIO = 8; // end of the difference's scale, to either side
+
+  // Colours of a palette (bytes, 3 a step) for 0..1
+  function shade(palette, fraction) {
+    const steps = palette.length / 3, at = Math.max(0, Math.min(steps - 1, Math.floor(fraction * steps)));
+    return 3 * at;
+  }
+
+  // Reinhart et al. (2002), global operator (4): the log-average becomes middle grey
+  function toneCurve(values) {
+    let sum = 0, count = 0, largest = 0;
+    for (const v of values) if (v > largest) largest = v;
+    for (const v of values) if (v > 0) { sum += Math.log(Math.max(v, largest * 1e-9)); count++; }
+    if (!count) return () => 0;
+    const factor = KEY / Math.exp(sum / count), sample = [];
+    for (let i = 0; i < values.length; i += 16) if (values[i] > 0) sample.push(factor * values[i]);
+    sample.sort((a, b) => a - b);
+    const white = Math.max(sample[Math.floor(sample.length * 0.995)] || 1, 1);
+    return (v) => { const s = factor * v; return Math.min(s * (1 + s / (white * white)) / (1 + s), 1); };
+  }
+  const srgb = (v) => 255 * (v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055);
+
+  // An image [height, width] of the pixels' values; pixels without one stay clear
+  function image(view, pixels, colour) {
+    const picture = new ImageData(view.width, view.height), out = picture.data;
+    for (let i = 0; i < pixels.length; i++) {
+      const at = 4 * pixels[i];
+      colour(i, out, at);
+      out[at + 3] = 255;
+    }
+    return picture;
+  }
+
+  function toneMapped(view, pixels, values, curve) {
+    return image(view, pixels, (i, out, at) => { out[at] = out[at + 1] = out[at + 2] = srgb(curve(values[i])); });
+  }
+
+  function falseColour(view, pixels, values, palette, low, high) {
+    const base = Math.log(low), span = Math.log(high / low);
+    return image(view, pixels, (i, out, at) => {
+      const from = shade(palette, (Math.log(Math.max(values[i], low)) - base) / span);
+      for (let k = 0; k < 3; k++) out[at + k] = palette[from + k];
+    });
+  }
+
+  // Blue where the second is darker, red where it is brighter, pale where they are alike
+  function ratioColour(ratio) {
+    const t = Math.max(-1, Math.min(1, Math.log(ratio) / Math.log(MOST_RATIO))), a = Math.abs(t);
+    const end = t < 0 ? [33, 102, 172] : [178, 24, 43];
+    return end.map((c) => Math.round(247 + (c - 247) * a));
+  }
+  function difference(view, pixels, one, other) {
+    return image(view, pixels, (i, out, at) => {
+      const c = ratioColour(Math.max(other[i], 0.1) / Math.max(one[i], 0.1));
+      out[at] = c[0]; out[at + 1] = c[1]; out[at + 2] = c[2];
+    });
+  }
+
+  // Paint the outline of the glare sources: labels in scan order
+  function outlines(picture, labels) {
+    const { width: nx, height: ny, data } = picture;
+    const label = (x, y) => (x < 0 || y < 0 || x >= nx || y >= ny ? 0 : labels[x * ny + ny - 1 - y]);
+    for (let y = 0; y < ny; y++) {
+      for (let x = 0; x < nx; x++) {
+        const own = label(x, y), edge = own && [[1, 0], [-1, 0], [0, 1], [0, -1]].some(([a, b]) => label(x + a, y + b) !== own);
+        if (!edge) continue;
+        const at = 4 * (y * nx + x);
+        data[at] = 255; data[at + 1] = 0; data[at + 2] = 144; data[at + 3] = 255;
+      }
+    }
+  }
+
+  function gradient(palette) {
+    const stops = [];
+    for (let i = 0; i <= 16; i++) { const at = shade(palette, i / 16); stops.push(`rgb(${palette[at]},${palette[at + 1]},${palette[at + 2]})`); }
+    return `linear-gradient(90deg,${stops.join(",")})`;
+  }
+  Object.assign(cfs, { shade, toneCurve, toneMapped, falseColour, difference, ratioColour, outlines, gradient, MOST_RATIO });
+})();

@@ -1,0 +1,163 @@
+// The page: one hour for all that is shown, one or two variants, and their difference.
+(() => {
+  "use strict";
+  const byId = (id) => document.getElementById(id);
+  const PLAY = 200; // [ms] an hour at least
+  const explorer = { rooms: [], variants: [], panels: [], playing: false };
+  let turn = 0; // of the update under way; an older one is dropped
+
+  async function start() {
+    const data = await cfs.load("case");
+    explorer.data = data;
+    explorer.calendar = new cfs.Calendar(data.first_day, data.hours);
+    explorer.palette = cfs.bytesOf(data.palette);
+    byId("title").textContent = data.title;
+    byId("site").textContent = data.site;
+    for (const entry of data.rooms) {
+      let promise;
+      const room = () => (promise ||= cfs.Room.load(entry));
+      const group = data.rooms.length > 1 ? entry.name : "Shading";
+      if (entry.states.length > 1) explorer.variants.push({ group, label: "as operated", state: -1, room, entry });
+      entry.states.forEach((label, state) => explorer.variants.push({ group, label, state, room, entry }));
+    }
+    const count = explorer.variants.length, second = Math.min(count - 1, explorer.variants.findIndex((v) => v.state === 1));
+    ["one", "two"].forEach((id, i) => {
+      const box = byId("panel").content.firstElementChild.cloneNode(true);
+      box.id = id;
+      byId("panels").append(box);
+      explorer.panels.push(new cfs.Panel(box, explorer.variants, i ? Math.max(second, 0) : 0, update));
+    });
+    byId("compare").disabled = count < 2;
+    hands(data);
+    await update();
+    document.body.dataset.ready = "yes";
+  }
+
+  function hands() {
+    const date = byId("date"), hour = byId("hour");
+    date.max = explorer.calendar.days - 1;
+    [date.value, hour.value] = beginning();
+    for (const one of [date, hour]) one.addEventListener("input", update);
+    for (const id of ["colours", "high", "outline", "on-floor", "on-desk", "compare"]) byId(id).addEventListener("change", update);
+    byId("play").addEventListener("click", () => (explorer.playing ? stop() : play()));
+    const carpet = byId("carpet");
+    carpet.addEventListener("click", (event) => {
+      const box = carpet.getBoundingClientRect();
+      date.value = Math.floor((event.clientX - box.left) / box.width * explorer.calendar.days);
+      hour.value = 23 - Math.floor((event.clientY - box.top) / box.height * 24);
+      update();
+    });
+    const months = byId("months");
+    for (const [day, name] of explorer.calendar.months()) {
+      const mark = document.createElement("span");
+      mark.style.left = `${100 * day / explorer.calendar.days}%`;
+      mark.textContent = name;
+      months.append(mark);
+    }
+    addEventListener("resize", update);
+  }
+
+  // The hour named behind the address's # (MM-DDThh), else noon of the spring equinox
+  function beginning() {
+    const found = /^#(\d\d)-(\d\d)T(\d\d)$/.exec(location.hash) || [0, "03", "21", "12"], { calendar } = explorer;
+    for (let d = 0; d < calendar.days; d++) {
+      const date = calendar.date(d);
+      if (date.getUTCMonth() + 1 === Number(found[1]) && date.getUTCDate() === Number(found[2])) return [d, Number(found[3])];
+    }
+    return [0, 12];
+  }
+
+  function look() {
+    const planes = ["floor", "desk"].filter((name) => byId("on-" + name).checked);
+    return { colours: byId("colours").value, high: Number(byId("high").value), outline: byId("outline").checked, planes, palette: explorer.palette };
+  }
+
+  async function update() {
+    const mine = ++turn, day = Number(byId("date").value), clock = Number(byId("hour").value), hour = day * 24 + clock;
+    const both = byId("compare").checked;
+    document.body.classList.toggle("both", both);
+    byId("date-now").textContent = explorer.calendar.words(day);
+    byId("hour-now").textContent = `${clock}:00 to ${clock + 1}:00`;
+    byId("hour").setAttribute("aria-valuetext", byId("hour-now").textContent);
+    byId("date").setAttribute("aria-valuetext", byId("date-now").textContent);
+    const shown = explorer.panels.slice(0, both ? 2 : 1), found = [];
+    for (const panel of shown) found.push(await panel.compute(hour)); // one scan may serve both
+    if (mine !== turn) return;
+    const sun = Array.from(found[0].room.arrays.sun.subarray(3 * hour, 3 * hour + 3));
+    const lit = found.find((f) => f.l !== undefined), curve = lit ? cfs.toneCurve(lit.values) : () => 0;
+    shown.forEach((panel, i) => panel.paint(found[i], hour, day, look(), sun, curve));
+    paintDifference(found);
+    sayHour(found[0], sun, lit);
+    paintCarpet(found[0], day, clock);
+    paintScale();
+    explorer.found = found;
+    explorer.now = hour;
+  }
+
+  function paintDifference(found) {
+    const alike = found.length === 2 && found.every((f) => f.l !== undefined)
+      && found[0].values.length === found[1].values.length;
+    byId("difference").hidden = !alike;
+    if (!alike) return;
+    const { view } = found[0].room.facts, canvas = byId("ratio");
+    canvas.width = view.width;
+    canvas.height = view.height;
+    canvas.getContext("2d").putImageData(cfs.difference(view, found[0].room.arrays.pixels, found[0].values, found[1].values), 0, 0);
+    const d = found[1].glare.dgp - found[0].glare.dgp, median = (f) => Array.from(f.lux).sort((a, b) => a - b)[f.lux.length >> 1];
+    const sign = (v, digits) => (v < 0 ? "−" : "+") + Math.abs(v).toFixed(digits);
+    byId("changes").textContent = `The second has DGP ${sign(d, 3)}, ${sign(found[1].glare.Ev - found[0].glare.Ev, 0)} lx at the eye, `
+      + `${sign(median(found[1]) - median(found[0]), 0)} lx in the median of the work plane.`;
+  }
+
+  function sayHour(found, sun, lit) {
+    const degrees = (v) => Math.round(v * 180 / Math.PI), altitude = degrees(Math.asin(Math.max(-1, Math.min(1, sun[2]))));
+    let text = "Sun below the horizon.";
+    if (altitude > 0) {
+      const azimuth = (degrees(Math.atan2(sun[0], sun[1])) + 360) % 360;
+      text = `Sun ${altitude}° high, ${azimuth}° from north by east`;
+      text += found.l === undefined ? "." : `, ${cfs.number(found.room.arrays.sun_lux[found.l], 2)} lx normal to its beam.`;
+    }
+    byId("sun").textContent = text;
+    byId("time").textContent = lit ? `Picture ${lit.milliseconds.toFixed(0)} ms, glare ${lit.glareMilliseconds.toFixed(0)} ms, with unpacking ${lit.wholeMilliseconds.toFixed(0)} ms.` : "";
+    const check = found.room.facts.checks[found.state];
+    byId("error").textContent = check ? `In ${check.hours.length} hours drawn at random the DGP shown differs from that of the uncompressed pictures by ${check.largest.toFixed(4)} at most, ${check.mean.toFixed(4)} in the mean.` : "";
+  }
+
+  function paintCarpet(found, day, clock) {
+    const { room, variant } = found, values = new Float32Array(explorer.calendar.days * 24).fill(NaN);
+    room.arrays.lit.forEach((hour, l) => { values[hour] = room.arrays.eye[room.stateOf(variant.state, hour) * room.L + l]; });
+    cfs.paintCarpet(byId("carpet"), values, explorer.calendar.days, explorer.palette, 50, 20000, [day, clock]);
+  }
+
+  function paintScale() {
+    const { colours, high, palette } = look(), box = byId("scale");
+    box.hidden = colours === "seen";
+    byId("bar").style.background = cfs.gradient(palette);
+    byId("low-end").textContent = `${cfs.number(high / 1000, 2)} cd/m²`;
+    byId("high-end").textContent = `${cfs.number(high, 2)} cd/m²`;
+    for (const bar of document.querySelectorAll(".lux-bar")) bar.style.background = cfs.gradient(palette);
+    const ratios = Array.from({ length: 9 }, (_, i) => `rgb(${cfs.ratioColour(cfs.MOST_RATIO ** ((i - 4) / 4)).join()})`);
+    byId("ratio-bar").style.background = `linear-gradient(90deg,${ratios.join(",")})`;
+  }
+
+  async function play() {
+    explorer.playing = true;
+    byId("play").textContent = "Pause";
+    const date = byId("date"), hour = byId("hour");
+    while (explorer.playing) {
+      const begun = performance.now();
+      let clock = Number(hour.value) + 1, day = Number(date.value);
+      if (clock > 21) { clock = 4; day = (day + 1) % explorer.calendar.days; }
+      hour.value = clock;
+      date.value = day;
+      await update();
+      await new Promise((done) => { setTimeout(done, Math.max(0, PLAY - (performance.now() - begun))); });
+    }
+  }
+  function stop() {
+    explorer.playing = false;
+    byId("play").textContent = "Play";
+  }
+  cfs.explorer = explorer;
+  start().catch((error) => { byId("fault").hidden = false; byId("fault").textContent = `This page cannot be shown: ${error.message}`; throw error; });
+})();

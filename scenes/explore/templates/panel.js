@@ -1,0 +1,114 @@
+// One variant on the page: its picture, its figures, its plan.
+(() => {
+  "use strict";
+  const TEMPERATURES = [["operative", "operative", "--operative"], ["air", "air", "--air"], ["outdoor", "outdoors", "--outdoor"]];
+
+  class Panel {
+    // root: its element; variants: [{label, room (a promise), state}]
+    constructor(root, variants, first, changed) {
+      Object.assign(this, { root, variants });
+      this.at = (name) => root.querySelector("." + name);
+      const select = this.at("variant");
+      for (const [title, group] of Map.groupBy(variants.map((v, i) => [v, i]), ([v]) => v.group)) {
+        const box = document.createElement("optgroup");
+        box.label = title;
+        for (const [variant, i] of group) box.append(new Option(variant.label, i));
+        select.append(box);
+      }
+      select.value = first;
+      select.addEventListener("change", changed);
+      this.at("eye").addEventListener("pointermove", (event) => this.point(event));
+      this.at("eye").addEventListener("pointerleave", () => { this.at("under").textContent = "\u00a0"; });
+      this.at("plan").addEventListener("pointermove", (event) => { if (this.drawing) this.at("there").textContent = this.drawing.words(event) || "\u00a0"; });
+    }
+
+    get variant() { return this.variants[this.at("variant").value]; }
+
+    async compute(hour) {
+      const variant = this.variant, room = await variant.room();
+      const state = room.stateOf(variant.state, hour), l = room.number.get(hour);
+      if (l === undefined) return { room, state, variant };
+      const [rated, lux] = await Promise.all([room.rated(state, l), room.illuminance(state, l)]);
+      return { room, state, variant, l, lux, ...rated, values: rated.values.slice(), labels: rated.glare.labels.slice() };
+    }
+
+    // look: {colours, high, outline, planes, palette}; curve: shared by the panels side by side
+    paint(found, hour, day, look, sun, curve) {
+      this.found = found;
+      const { room, state } = found, view = room.facts.view, canvas = this.at("eye"), pen = canvas.getContext("2d");
+      canvas.width = view.width;
+      canvas.height = view.height;
+      if (found.l !== undefined) {
+        const { pixels } = room.arrays;
+        const picture = look.colours === "seen"
+          ? cfs.toneMapped(view, pixels, found.values, curve)
+          : cfs.falseColour(view, pixels, found.values, look.palette, look.high / 1000, look.high);
+        if (look.outline) cfs.outlines(picture, found.labels);
+        pen.putImageData(picture, 0, 0);
+      }
+      this.say(found);
+      this.drawing ||= null;
+      if (!this.drawing || this.drawing.plan !== room.plan) this.drawing = new cfs.Plan(this.at("plan"), room.plan, look.palette);
+      const shining = found.l !== undefined && sun[2] > 0.01 && room.arrays.sun_lux[found.l] > 0;
+      const beams = shining ? room.beams(state, found.l) : [];
+      this.drawing.paint(found.lux || null, shining ? { direction: sun, groups: beams, planes: look.planes } : null);
+      this.sayLight(found, beams, sun);
+      this.sayHeat(room, hour, day);
+    }
+
+    say(found) {
+      const { glare, room, state } = found, set = (name, text) => { this.at(name).textContent = text; };
+      set("state", room.facts.states[state]);
+      const dgp = this.at("dgp");
+      dgp.className = "dgp";
+      if (!glare) {
+        set("dgp", "the sun is down");
+        set("figures", "\u00a0");
+        return;
+      }
+      dgp.classList.add(cfs.glareClass(glare.dgp));
+      set("dgp", `DGP ${glare.dgp.toFixed(3)} ${cfs.glareClass(glare.dgp)}`);
+      const n = glare.sources.length, sources = n ? `${n} glare source${n > 1 ? "s" : ""}` : "no glare source";
+      const seen = glare.sources.some((s) => s.sun) ? ", the sun's disc in view" : "";
+      set("figures", `${cfs.number(glare.Ev)} lx at the eye, ${sources}${seen}, up to ${cfs.number(glare.largest, 2)} cd/m²`);
+    }
+
+    sayLight(found, beams, sun) {
+      const { lux, room } = found;
+      if (!lux) { this.at("light").textContent = "\u00a0"; return; }
+      const sorted = Array.from(lux).sort((a, b) => a - b), middle = sorted[sorted.length >> 1];
+      let text = `Work plane: median ${cfs.number(middle)} lx, ${cfs.number(sorted[0])} to ${cfs.number(sorted.at(-1))} lx.`;
+      const most = Math.max(0, ...beams.map((b) => b.through)), direct = room.arrays.sun_lux[found.l] * Math.max(sun[2], 0) * most;
+      if (direct >= 1) text += ` Sun patches bring up to ${cfs.number(direct, 2)} lx.`;
+      else if (beams.length) text += " No sun passes straight.";
+      this.at("light").textContent = text;
+    }
+
+    sayHeat(room, hour, day) {
+      const lines = TEMPERATURES.filter(([name]) => room.arrays[name]).map(([name, label, colour]) => ({
+        label, colour, now: room.arrays[name][hour], values: room.arrays[name].subarray(day * 24, day * 24 + 24),
+        dash: name === "outdoor" ? [2, 3] : name === "air" ? [7, 3] : [],
+      }));
+      this.at("heat").hidden = !lines.length;
+      if (!lines.length) return;
+      const loads = [["heating", "heating"], ["cooling", "cooling"], ["lighting", "lamps"]]
+        .filter(([name]) => room.arrays[name] && room.arrays[name][hour] >= 1)
+        .map(([name, label]) => `${label} ${cfs.number(room.arrays[name][hour], 2)} W`);
+      const operated = room.facts.states.length > 1 ? " (of the year as operated)" : "";
+      this.at("temperatures").textContent = lines.map((l) => `${l.label} ${l.now.toFixed(1)} °C`).concat(loads).join(", ") + operated;
+      cfs.paintDay(this.at("day"), lines, hour % 24);
+    }
+
+    point(event) {
+      const { found } = this;
+      if (!found || found.l === undefined) return;
+      const box = this.at("eye").getBoundingClientRect(), { view } = found.room.facts;
+      const x = Math.floor((event.clientX - box.left) / box.width * view.width), y = Math.floor((event.clientY - box.top) / box.height * view.height);
+      this.lookup ||= new Map();
+      if (!this.lookup.has(found.room)) this.lookup.set(found.room, new Map(Array.from(found.room.arrays.pixels, (p, i) => [p, i])));
+      const i = this.lookup.get(found.room).get(y * view.width + x);
+      this.at("under").textContent = i === undefined ? "\u00a0" : `${cfs.number(found.values[i])} cd/m² under the pointer`;
+    }
+  }
+  cfs.Panel = Panel;
+})();

@@ -1,0 +1,65 @@
+// A room of a case: its arrays, and the pictures and illuminances of its shading states.
+(() => {
+  "use strict";
+  const LUX_STEP = 0.002; // of the logarithm of 1 + lux, see scenes/explore/files.py
+
+  class Room {
+    static async load(entry) {
+      const data = await cfs.load(entry.file), arrays = await cfs.arraysOf(data.arrays);
+      return new Room(entry, data, arrays);
+    }
+
+    constructor(entry, data, arrays) {
+      Object.assign(this, { entry, facts: data.facts, models: entry.models, luxFiles: entry.lux, arrays });
+      const { lit, blockers } = arrays;
+      this.number = new Map(Array.from(lit, (hour, l) => [hour, l])); // of an hour of the year
+      this.L = lit.length;
+      this.G = this.facts.groups;
+      this.groups = Array.from({ length: this.G }, (_, g) => arrays["group" + g]);
+      this.plan = { ...this.facts.plan, blockers };
+      this.states = [];
+      this.lux = [];
+    }
+
+    // The fisheye of the view and a scan of it, made when first needed
+    get scan() {
+      if (!this.ownScan) {
+        const { pixels, blind } = this.arrays;
+        this.ownScan = new cfs.Scan(new cfs.Fisheye(this.facts.view, pixels, blind));
+      }
+      return this.ownScan;
+    }
+
+    // The state that holds in an hour of the year, for a choice of state (-1: as operated)
+    stateOf(choice, hour) { return choice < 0 ? this.arrays.operated[hour] : choice; }
+
+    pictures(state) {
+      const file = this.models[state];
+      this.states[state] ||= cfs.PictureYear.load(this.scan.eye, this.arrays, file);
+      return this.states[state];
+    }
+
+    // Illuminance [S] of the sensors in a lit hour [lx]
+    async illuminance(state, l) {
+      this.lux[state] ||= cfs.load(this.luxFiles[state]).then(cfs.arrayOf);
+      const codes = await this.lux[state], count = codes.length / this.L, found = new Float32Array(count);
+      for (let s = 0; s < count; s++) found[s] = Math.expm1(codes[s * this.L + l] * LUX_STEP);
+      return found;
+    }
+
+    // Window groups with what their glass passes of the sun's beam in a lit hour
+    beams(state, l) {
+      return this.groups.map((triangles, g) => ({ triangles, through: this.arrays.through[(state * this.G + g) * this.L + l] }));
+    }
+
+    // Luminance picture and glare of a lit hour; times in milliseconds
+    async rated(state, l) {
+      const pictures = await this.pictures(state), begun = performance.now();
+      const picture = await pictures.picture(l), start = performance.now();
+      const glare = this.scan.rate(picture.values, picture.disc);
+      const end = performance.now();
+      return { ...picture, glare, glareMilliseconds: end - start, wholeMilliseconds: end - begun };
+    }
+  }
+  cfs.Room = Room;
+})();

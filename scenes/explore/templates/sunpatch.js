@@ -1,0 +1,64 @@
+// Where the sun shines on a level plane of the room, to its true edges: what it reaches through a
+// window group, less the shadow of everything opaque that stands above the plane.
+(() => {
+  "use strict";
+  const ABOVE = 0.002; // [m] over the plane: what lies in it casts no shadow on it
+
+  // The part of a triangle above z, as its projection along the sun onto z: a polygon, seen from
+  // above always counter-clockwise, so that a path of many has no seams; null where nothing is
+  function shadow(triangles, at, sun, z) {
+    const low = z + ABOVE, points = [];
+    for (let k = 0; k < 3; k++) {
+      const a = at + 3 * k, b = at + 3 * ((k + 1) % 3);
+      const za = triangles[a + 2], zb = triangles[b + 2];
+      if (za >= low) points.push([triangles[a], triangles[a + 1], za]);
+      if ((za >= low) !== (zb >= low)) {
+        const t = (low - za) / (zb - za);
+        points.push([triangles[a] + t * (triangles[b] - triangles[a]), triangles[a + 1] + t * (triangles[b + 1] - triangles[a + 1]), low]);
+      }
+    }
+    if (points.length < 3) return null;
+    const flat = points.map(([x, y, height]) => {
+      const along = (height - z) / sun[2];
+      return [x - along * sun[0], y - along * sun[1]];
+    });
+    let area = 0;
+    flat.forEach(([x, y], i) => { const [u, v] = flat[(i + 1) % flat.length]; area += x * v - u * y; });
+    if (Math.abs(area) < 1e-9) return null;
+    return area < 0 ? flat.reverse() : flat;
+  }
+
+  // A path of the shadows of all triangles [n * 9], `to` takes metres to the canvas
+  function shadows(triangles, sun, z, to) {
+    const path = new Path2D();
+    for (let at = 0; at < triangles.length; at += 9) {
+      const polygon = shadow(triangles, at, sun, z);
+      if (!polygon) continue;
+      polygon.forEach(([x, y], i) => (i ? path.lineTo(...to(x, y)) : path.moveTo(...to(x, y))));
+      path.closePath();
+    }
+    return path;
+  }
+
+  // Paint what the sun reaches of the room's outline on the plane z; groups: [{triangles, through}]
+  function sunPatch(canvas, room, sun, z, to, colour) {
+    const pen = canvas.getContext("2d");
+    pen.clearRect(0, 0, canvas.width, canvas.height);
+    if (sun[2] <= 0.01) return;
+    const blocked = shadows(room.blockers, sun, z, to);
+    for (const group of room.groups) {
+      if (!(group.through > 0)) continue;
+      pen.save();
+      pen.globalCompositeOperation = "source-over";
+      pen.clip(room.outlinePath(to), "evenodd");
+      pen.fillStyle = colour;
+      pen.fill(shadows(group.triangles, sun, z, to), "nonzero");
+      pen.restore();
+    }
+    pen.globalCompositeOperation = "destination-out";
+    pen.fillStyle = "#000";
+    pen.fill(blocked, "nonzero");
+    pen.globalCompositeOperation = "source-over";
+  }
+  Object.assign(cfs, { sunPatch, shadow });
+})();

@@ -1,0 +1,110 @@
+"""A Radiance scene as the building of a command: its room, windows, furniture and errors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bim.building_file import ReadOptions, check_building_file, held_states, read_building_file
+from bim.sensors import sensor_grid, view_point
+from bim.shell import enclosed_volume
+from mitsuba_cfs.errors import DataError
+
+OFFICE = Path(__file__).parents[2] / "docs/tutorials/office.rad"
+DESK = "\n!genbox plaster desk 1.6 0.8 0.04 | xform -t 1.2 2.6 0.78\n"
+CUPBOARD = "!genbox plaster cupboard 1 0.5 2 | xform -t 0.2 5.4 0.01\n"
+# a wall behind the west wall with 10 cm between them, open to the room by a slit of 1 cm
+LINING = (
+    "carpet polygon lining\n0\n0\n12  0.1 0.01 0  0.1 6 0  0.1 6 3  0.1 0.01 3\n"
+    "void glass screen\n0\n0\n3 .9 .9 .9\n"
+)
+
+
+def read(folder: Path, text: str, *apertures: str):
+    path = folder / "scene.rad"
+    path.write_text(OFFICE.read_text() + text)
+    return read_building_file(path, ReadOptions(apertures=apertures))
+
+
+def names(parts) -> set[str]:
+    return {part.name.partition(".")[0] for part in parts}
+
+
+@pytest.fixture(scope="module")
+def office(tmp_path_factory):
+    return read(tmp_path_factory.mktemp("furnished"), DESK + CUPBOARD)
+
+
+def test_the_room_is_what_the_windows_light(office):
+    (room,) = office.spaces
+    assert room.floor_area == pytest.approx(24) and room.floor_level == 0
+    assert room.volume == pytest.approx(72)
+    assert names(room.faces) == {"floor", "ceiling", "north", "south", "west", "east"}
+    assert {face.kind for face in room.faces} == {"floor", "ceiling", "wall"}
+    for face in room.faces:
+        assert face.normal @ (face.triangles.mean(axis=(0, 1)) - [2, 3, 1.5]) > 0, face.name
+    assert [face.name for face in room.faces if face.adjacency == "outside"] == ["south"]
+    assert [window.normal.round(6).tolist() for window in room.windows] == [[0, -1, 0]]
+
+
+def test_furniture_stands_in_the_room_and_the_street_outside(office):
+    (room,) = office.spaces
+    assert names(room.furniture) == {"desk", "cupboard"}
+    assert {"house", "trunk", "ground", "south"} <= names(office.elements)
+    assert not {"desk", "cupboard"} & names(office.elements)
+    desk = np.concatenate([e.triangles for e in room.furniture if e.name.startswith("desk")])
+    assert enclosed_volume(desk) == pytest.approx(1.6 * 0.8 * 0.04)  # normals out of the body
+    points, _ = sensor_grid(room, 0.25, 0.8)
+    on_desk = np.all((points[:, :2] > [1.2, 2.6]) & (points[:, :2] < [2.8, 3.4]), axis=1)
+    in_cupboard = np.all((points[:, :2] > [0.2, 5.4]) & (points[:, :2] < [1.2, 5.9]), axis=1)
+    assert len(points) > 150 and not on_desk.any() and not in_cupboard.any()
+    eye, direction = view_point(room)
+    assert eye == pytest.approx([2, 3, 1.2], abs=0.1) and direction[1] < -0.99  # a taller cupboard
+
+
+def test_what_lies_in_a_cavity_does_not_bound_the_room(tmp_path):
+    """Light gets there by a slit, so it stays in the light; the plan is that of the lining."""
+    (room,) = read(tmp_path, LINING).spaces
+    assert "west" not in names(room.faces) and "lining" in names(room.faces)
+    assert "west" in names(room.furniture)
+    points, _ = sensor_grid(room, 0.1, 0.8, 0.05)
+    assert points[:, 0].min() > 0.1
+
+
+def test_a_pane_passes_what_radiance_says(office):
+    import bim
+
+    (state,) = held_states(office.windows, office.file)[office.windows[0].guid]
+    scene = bim.read_radiance(OFFICE)
+    passed, mirrored = bim.glass_shares(scene.of_modifiers(["glazing"])[0].material)
+    angles = np.arccos(np.linspace(0, 1, len(passed)))
+    assert state.angular.transmitted(angles) == pytest.approx(passed, abs=1e-3)
+    assert state.angular.reflected("back", angles) == pytest.approx(mirrored, abs=1e-3)
+    assert state.bands["Visible"].direct_hemispherical(state.bands["Visible"].transmission_front)[
+        0
+    ] == pytest.approx(passed[-1], rel=0.01)
+
+
+def test_windows_are_of_the_named_material(tmp_path):
+    paper = "void plastic paper\n0\n0\n5 .8 .8 .8 0 0\n"
+    with pytest.raises(DataError, match="no surface has it; there are carpet"):
+        read(tmp_path, "", "pane")
+    pane = "paper polygon sheet\n0\n0\n12  0.6 6 0.9  0.6 6 2.5  3.4 6 2.5  3.4 6 0.9\n"
+    building = read(tmp_path, "\n" + paper + pane, "glazing")
+    assert len(building.windows) == 1 and "sheet" in names(building.elements)
+    without = OFFICE.read_text().replace("void glass glazing", "void plastic glazing")
+    path = tmp_path / "solid.rad"
+    path.write_text(without.replace("3 .87 .87 .87", "5 .87 .87 .87 0 0"))
+    with pytest.raises(DataError, match="has no glass and no BSDF: name the windows' material"):
+        read_building_file(path)
+
+
+def test_options_of_other_formats_are_refused(tmp_path):
+    with pytest.raises(DataError, match="not for Radiance files"):
+        read_building_file(OFFICE, ReadOptions(join=("A + B",)))
+    with pytest.raises(DataError, match="not for IFC files"):
+        read_building_file("house.ifc", ReadOptions(apertures=("glass",)))
+    with pytest.raises(DataError, match="no such file"):
+        check_building_file(tmp_path / "missing.rad")

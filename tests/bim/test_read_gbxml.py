@@ -1,0 +1,195 @@
+"""gbXML files as buildings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bim_fuzz import mutations
+
+from bim.building_file import read_building_file
+from bim.gbxml.building import read_gbxml
+from bim.shell import open_edges
+from mitsuba_cfs.errors import DataError
+
+MATERIALS = """
+<Construction id="wall"><Name>Wall</Name><LayerId layerIdRef="l1"/>
+ <Reflectance type="IntVis" unit="Fraction">0.6</Reflectance>
+ <Reflectance type="ExtVis" unit="Fraction">0.25</Reflectance>
+ <Absorptance type="IntSolar" unit="Fraction">0.35</Absorptance></Construction>
+<Layer id="l1"><MaterialId materialIdRef="brick"/><MaterialId materialIdRef="wool"/></Layer>
+<Material id="brick"><Name>Brick</Name><Thickness unit="Meters">0.2</Thickness>
+ <Conductivity unit="WPerMeterK">0.9</Conductivity><Density unit="KgPerCubicM">1900</Density>
+ <SpecificHeat unit="JPerKgK">800</SpecificHeat></Material>
+<Material id="wool"><Name>Wool</Name><R-value unit="SquareMeterKPerW">3</R-value></Material>
+<WindowType id="unit"><Name>Unit</Name><U-value unit="WPerSquareMeterK">1.1</U-value>
+ <SolarHeatGainCoeff unit="Fraction">0.5</SolarHeatGainCoeff>
+ <Transmittance type="Visible" unit="Fraction">0.7</Transmittance></WindowType>
+"""
+
+
+def loop(points) -> str:
+    def point(corner):
+        numbers = "".join(f"<Coordinate>{x}</Coordinate>" for x in corner)
+        return f"<CartesianPoint>{numbers}</CartesianPoint>"
+
+    return f"<PlanarGeometry><PolyLoop>{''.join(map(point, points))}</PolyLoop></PlanarGeometry>"
+
+
+def surface(name, kind, points, spaces, inner="", construction="") -> str:
+    refers = f' constructionIdRef="{construction}"' if construction else ""
+    beside = "".join(f'<AdjacentSpaceId spaceIdRef="{s}"/>' for s in spaces)
+    return (
+        f'<Surface id="{name}" surfaceType="{kind}"{refers}>{beside}{loop(points)}{inner}</Surface>'
+    )
+
+
+def two_rooms(azimuth=0.0) -> str:
+    """Office 5 x 8 x 3 m and, east of it, hall 4 x 8 x 3 m; a window south, a door between."""
+
+    def box(x0, x1):
+        return {
+            "south": [(x0, 0, 0), (x1, 0, 0), (x1, 0, 3), (x0, 0, 3)],
+            "east": [(x1, 0, 0), (x1, 8, 0), (x1, 8, 3), (x1, 0, 3)],
+            "north": [(x1, 8, 0), (x0, 8, 0), (x0, 8, 3), (x1, 8, 3)],
+            "west": [(x0, 8, 0), (x0, 0, 0), (x0, 0, 3), (x0, 8, 3)],
+            "floor": [(x0, 8, 0), (x1, 8, 0), (x1, 0, 0), (x0, 0, 0)],
+            "roof": [(x0, 0, 3), (x1, 0, 3), (x1, 8, 3), (x0, 8, 3)],
+        }  # fmt: skip
+
+    office, hall = box(0, 5), box(5, 9)
+    office["north"] = [(5, 8, 0), (0, 8, 0), (0, 8, 3), (5, 8, 3)]
+    window = [(1, 0, 0.9), (4, 0, 0.9), (4, 0, 2.4), (1, 0, 2.4)]
+    door = [(5, 2, 0), (5, 3, 0), (5, 3, 2), (5, 2, 2)]
+    opening = (
+        f'<Opening id="window" openingType="FixedWindow" windowTypeIdRef="unit">'
+        f"<Name>Window</Name>{loop(window)}</Opening>"
+    )
+    leaf = f'<Opening id="door" openingType="NonSlidingDoor">{loop(door)}</Opening>'
+    types = {"floor": "SlabOnGrade", "roof": "Roof"}
+    surfaces = []
+    for room, faces in (("Office", office), ("Hall", hall)):
+        for side, points in faces.items():
+            if (room, side) == ("Hall", "west"):
+                continue  # drawn once, by the office
+            inner = opening if (room, side) == ("Office", "south") else ""
+            spaces, kind = [room], types.get(side, "ExteriorWall")
+            if (room, side) == ("Office", "east"):
+                spaces, kind, inner = ["Office", "Hall"], "InteriorWall", leaf
+            surfaces.append(surface(f"{room}-{side}", kind, points, spaces, inner, "wall"))
+    shade = surface("Overhang", "Shade", [(1, 0, 2.5), (4, 0, 2.5), (4, -1, 2.5), (1, -1, 2.5)], [])
+    space = '<Space id="{0}" buildingStoreyIdRef="g"><Name>{0}</Name><Area>{1}</Area></Space>'
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?><gbXML xmlns="http://www.gbxml.org/schema" '
+        'lengthUnit="Meters" areaUnit="SquareMeters" volumeUnit="CubicMeters" version="6.01">'
+        f'<Campus id="c"><Name>Two rooms</Name><Location><Latitude>50</Latitude>'
+        f"<Longitude>8.5</Longitude><CADModelAzimuth>{azimuth}</CADModelAzimuth></Location>"
+        f'<Building id="b"><BuildingStorey id="g"><Name>Ground</Name></BuildingStorey>'
+        f"{space.format('Office', 40)}{space.format('Hall', 30)}</Building>"
+        f"{''.join(surfaces)}{shade}</Campus>{MATERIALS}</gbXML>"
+    )
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "two.gbxml"
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture
+def building(tmp_path):
+    return read_gbxml(written(tmp_path, two_rooms()))
+
+
+def test_rooms_have_their_areas_and_volumes(building):
+    office, hall = building.spaces
+    assert (office.floor_area, hall.floor_area) == pytest.approx((40, 32), rel=1e-9)
+    assert (office.volume, hall.volume) == pytest.approx((120, 96), rel=1e-9)
+    assert not open_edges(office.shell) and not open_edges(hall.shell)
+    assert (office.storey, building.latitude_deg, building.longitude_deg) == ("Ground", 50, 8.5)
+
+
+def test_what_a_space_states_otherwise_is_said(building):
+    (said,) = [p for p in building.problems if "states" in p.what]
+    assert "Hall: states 30.00 m2 floor area, drawn 32.00 m2" in said.what
+
+
+def test_the_window_looks_out_and_states_its_type(building):
+    (window,) = building.windows
+    assert window.area == pytest.approx(4.5)
+    np.testing.assert_allclose(window.normal, [0, -1, 0], atol=1e-12)
+    assert (window.u_value, window.g_value, window.visible_transmittance) == (1.1, 0.5, 0.7)
+
+
+def test_a_wall_between_rooms_is_seen_from_both(building):
+    office, hall = building.spaces
+    here = next(f for f in office.faces if f.neighbour == "Hall" and f.kind == "wall")
+    there = next(f for f in hall.faces if f.neighbour == "Office" and f.kind == "wall")
+    np.testing.assert_allclose(here.normal, -there.normal)
+    assert here.area == there.area == pytest.approx(24 - 2)
+    assert [layer.name for layer in here.construction.layers] == ["Brick", "Wool"]
+    assert [layer.name for layer in there.construction.layers] == ["Wool", "Brick"]
+    assert (here.reflectance_visible, there.reflectance_visible) == (0.6, 0.25)
+    assert here.reflectance_solar == pytest.approx(0.65)
+    assert sum(f.kind == "door" for space in building.spaces for f in space.faces) == 2
+
+
+def test_north_is_turned(tmp_path):
+    """The model's y axis points east, so that what is drawn south looks west."""
+    (window,) = read_gbxml(written(tmp_path, two_rooms(azimuth=90))).windows
+    np.testing.assert_allclose(window.normal, [-1, 0, 0], atol=1e-12)
+
+
+def test_feet_are_metres(tmp_path):
+    text = two_rooms().replace('lengthUnit="Meters"', 'lengthUnit="Feet"')
+    assert read_gbxml(written(tmp_path, text)).spaces[0].volume == pytest.approx(120 * 0.3048**3)
+
+
+def test_air_between_rooms_is_joined(tmp_path):
+    text = two_rooms().replace("InteriorWall", "Air")
+    (one,) = read_gbxml(written(tmp_path, text), join=["Office + Hall"]).spaces
+    assert (one.floor_area, one.volume) == pytest.approx((72, 216))
+    # a box of 9 x 8 x 3 m less the window: nothing is left of what was between
+    assert sum(face.area for face in one.faces) == pytest.approx(2 * 72 + 2 * 3 * 17 - 4.5)
+    assert not open_edges(one.shell)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("<Coordinate>0.9</Coordinate>", "<Coordinate>low</Coordinate>",
+         "Opening window: Coordinate: expected a number, got 'low'"),
+        ('spaceIdRef="Hall"', 'spaceIdRef="Attic"', ": AdjacentSpaceId: no Space 'Attic'"),
+        ('materialIdRef="wool"', 'materialIdRef="straw"', "Layer l1: no Material 'straw'"),
+        ('unit="WPerMeterK"', 'unit="x"', "Material brick: Conductivity: unit 'x'"),
+        ('lengthUnit="Meters"', 'lengthUnit="Ells"', "gbXML: lengthUnit: 'Ells'"),
+        ("gbXML", "cityXML", "expected gbXML, got cityXML"),
+        ("</Campus>", "", "is no XML: mismatched tag"),
+        ('<gbXML', '<!DOCTYPE x [<!ENTITY a "b">]><gbXML', "declares entities"),
+        ('<gbXML', '<!DOCTYPE x [<!ENTITY a SYSTEM "/etc/passwd">]><gbXML', "declares entities"),
+    ],
+)  # fmt: skip
+def test_faults_are_one_line_with_element_and_field(tmp_path, old, new, said):
+    path = written(tmp_path, two_rooms().replace(old, new))
+    with pytest.raises(DataError) as caught:
+        read_gbxml(path)
+    assert str(caught.value).startswith(str(path)) and said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_suffix_leads_to_it(tmp_path):
+    assert len(read_building_file(written(tmp_path, two_rooms())).spaces) == 2
+
+
+def test_random_bytes_give_one_line(tmp_path):
+    path = tmp_path / "spoilt.gbxml"
+    refused = 0
+    for content in mutations(two_rooms().encode(), 60):
+        path.write_bytes(content)
+        try:
+            read_gbxml(path)
+        except DataError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert refused > 20

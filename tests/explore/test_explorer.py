@@ -1,0 +1,113 @@
+"""The explorer's folder: complete, within itself, joined from several, served to this machine."""
+
+from __future__ import annotations
+
+import re
+import threading
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from mitsuba_cfs.errors import DataError
+from scenes.cli import cfs
+from scenes.explore.folder import explorer_of, join_explorers, write_explorer
+from scenes.explore.packing import packed, read_data
+from scenes.explore.serve import server
+from tests.explore.synthetic import explored_run
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory) -> Path:
+    """A folder of results with an explorer of 400 hours."""
+    folder = tmp_path_factory.mktemp("results")
+    write_explorer(explored_run(), folder / "explore")
+    return folder
+
+
+def test_the_page_names_no_address_outside(results) -> None:
+    files = [f for f in (results / "explore").rglob("*") if f.suffix in (".html", ".js", ".css")]
+    assert len(files) > 12
+    for file in files:
+        assert not re.findall(r"(?:https?:)?//[a-z][\w.-]+\.[a-z]{2,}", file.read_text()), file.name
+
+
+def test_every_file_that_the_case_names_is_there(results) -> None:
+    folder = results / "explore"
+    (entry,) = read_data(folder / "case.js")["rooms"]
+    assert entry["states"] == ["clear glass", "blind <down>"]
+    for name in (entry["file"], *entry["models"], *entry["lux"]):
+        assert (folder / f"{name}.js").is_file()
+    for name in entry["models"]:
+        for number, file in enumerate(read_data(folder / f"{name}.js")["facts"]["codes"]):
+            assert (folder / f"{name}_{number}.js").is_file()
+            assert file["sizes"]
+
+
+def test_a_markup_in_a_name_ends_no_script(results) -> None:
+    """Names go into the page as text; in the data files nothing can end the script."""
+    assert "innerHTML" not in "".join(f.read_text() for f in (results / "explore").glob("*.js"))
+
+
+def test_packed_arrays_are_planes_of_bytes() -> None:
+    import base64
+    import zlib
+
+    data = packed([1, 258, -2], "i2")
+    raw = zlib.decompress(base64.b64decode(data["data"]), -15)
+    assert list(raw) == [1, 2, 254, 0, 1, 255] and data["length"] == 3
+
+
+def test_several_are_joined(results, tmp_path) -> None:
+    other = tmp_path / "other"
+    write_explorer(explored_run(step=40, size=32), other / "explore")
+    target = tmp_path / "both"
+    target.mkdir()
+    join_explorers([results, other], target)
+    first, second = read_data(target / "case.js")["rooms"]
+    assert second["name"].startswith("other: ") and second["models"][1].startswith("1/data/")
+    for entry in (first, second):
+        for name in (entry["file"], *entry["models"], *entry["lux"]):
+            assert (target / f"{name}.js").is_file()
+
+
+def test_results_without_an_explorer_say_so(tmp_path) -> None:
+    with pytest.raises(DataError, match="holds no explorer: compute it again with `cfs run --expl"):
+        explorer_of(tmp_path)
+    done = CliRunner().invoke(cfs, ["explore", str(tmp_path)])
+    assert done.exit_code and isinstance(done.exception, DataError)
+
+
+def test_the_command_writes_one_folder(results, tmp_path) -> None:
+    done = CliRunner().invoke(cfs, ["explore", str(results), "--out", str(tmp_path / "one")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "one" / "index.html").is_file()
+    assert (tmp_path / "one" / "0" / "data" / "room0.js").is_file()
+    assert (tmp_path / "one" / "cfs-results.json").is_file()
+
+
+def test_the_server_answers_this_machine_alone(results) -> None:
+    running = server(results / "explore")
+    thread = threading.Thread(target=running.serve_forever, daemon=True)
+    thread.start()
+    try:
+        assert running.server_address[0] == "127.0.0.1"
+        address = f"http://127.0.0.1:{running.server_port}/index.html"
+        assert b"Explorer" in urllib.request.urlopen(address).read()
+        foreign = urllib.request.Request(address, headers={"Host": "evil.example"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(foreign)
+    finally:
+        running.shutdown()
+        running.server_close()
+        thread.join()
+
+
+def test_point_in_time_has_no_explorer(tmp_path) -> None:
+    from scenes.demo import OFFICE, WEATHER
+
+    command = ["run", str(OFFICE), "--weather", str(WEATHER), "--out", str(tmp_path / "x")]
+    done = CliRunner().invoke(cfs, [*command, "--method", "point-in-time", "--explore"])
+    assert done.exit_code == 2 and "--explore needs --method" in done.output

@@ -1,0 +1,186 @@
+"""ISO 13370: printed U-values, a half-space solved on its own, the room that stands on it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.thermal.rooms import CONCRETE, box, climate
+from thermal.balance import BalanceOptions, simulate
+from thermal.climate import no_sun
+from thermal.emitters import IdealLoads
+from thermal.ground import (
+    R_SE,
+    R_SI_DOWN,
+    SOILS,
+    YEAR,
+    Footprint,
+    Soil,
+    basement,
+    edge_transmittance,
+    harmonic,
+    over_unheated_basement,
+    slab_on_ground,
+    slab_u,
+    suspended_floor,
+)
+from thermal.zone import Layer, OpaqueSurface, Zone
+
+HOUSE = Footprint(100.0, 40.0, 0.3, SOILS["clay"])
+
+
+@pytest.mark.parametrize(
+    ("ratio", "u"),
+    [(0.05, 0.13), (0.1, 0.22), (0.2, 0.37), (0.3, 0.49), (0.5, 0.70), (0.7, 0.86), (1.0, 1.05)],
+)
+def test_uninsulated_slab_on_clay_as_cibse_prints_it(ratio, u):
+    """CIBSE Guide A (2006), table 3.15: walls of 0.3 m, to its two digits (quoted from memory)."""
+    place = Footprint(100.0, 100.0 * ratio, 0.3, SOILS["clay"])
+    assert slab_on_ground(place, 0.0).u_value == pytest.approx(u, abs=0.0051)
+
+
+def half_space_flow(side: float, edge: float, cells: int = 400) -> float:
+    """Flow [W per W/(m K) and K] through a square slab into a half-space, outdoors at zero.
+
+    Between slab and outdoors the surface's temperature falls linearly over the wall's width.
+    Source of heat at the surface: q = k/(2 pi) times the integral of (T(x) - T(x'))/r^3 over the
+    surface; that over the slab is closed, sum of +- sqrt(a^2 + b^2)/(a b) over its corners.
+    """
+    half = side / 2
+    far = half * np.geomspace(1.0, 2000.0, cells)  # outside the slab, by distance along one axis
+    near = half + edge * np.linspace(0.0, 1.0, cells + 1) ** 2
+    lines = np.unique(np.concatenate([near, far[far > near[-1]]]))
+    inner = half * np.sin(np.linspace(0.0, np.pi / 2, cells + 1))
+    lines = np.concatenate([inner[:-1], lines])
+    middle, width = 0.5 * (lines[1:] + lines[:-1]), np.diff(lines)
+    x, y = np.meshgrid(middle, middle, indexing="ij")
+    area = np.outer(width, width)
+    beyond = np.maximum(np.maximum(x, y) - half, 0.0)
+    outside = np.maximum(x, y) > half
+    temperature = np.clip(1.0 - beyond / edge, 0.0, 1.0)
+    kernel = np.zeros_like(x)
+    for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        a, b = x + sx * half, y + sy * half
+        kernel += sx * sy * np.sqrt(a * a + b * b) / (a * b)
+    kernel = np.where(outside, -kernel, 0.0)
+    return 4 * float((kernel * (1.0 - temperature) * area)[outside].sum()) / (2 * np.pi)
+
+
+def test_bare_slab_meets_the_half_space():
+    """IEA BESTEST GC10a's slab (12 m, 0.24 m, 1.9 W/(m K), 20 K): ISO's formula is 3 % above.
+
+    The half-space itself gives 2433 W there, as Delsante's closed form.
+    """
+    flow = 1.9 * 20.0 * half_space_flow(12.0, 0.24)
+    assert flow == pytest.approx(2433.0, rel=0.005)
+    place = Footprint(144.0, 48.0, 0.24, Soil(1.9, 2.4e6))
+    assert slab_u(place, 0.24) * 144.0 * 20.0 == pytest.approx(flow, rel=0.04)
+
+
+def test_edge_insulation_saves_and_more_saves_more():
+    bare = slab_on_ground(HOUSE, 0.5)
+    some = slab_on_ground(HOUSE, 0.5, edge=(0.5, 1.0))
+    deep = slab_on_ground(HOUSE, 0.5, edge=(1.0, 1.0))
+    flat = slab_on_ground(HOUSE, 0.5, edge=(1.0, 1.0), vertical=False)
+    assert bare.u_value > some.u_value > deep.u_value
+    assert bare.swing > flat.swing > deep.swing > 0  # vertical reaches twice as far
+    d = HOUSE.equivalent_thickness(0.5)
+    assert edge_transmittance(HOUSE, d, 1.0, 0.0, vertical=True) == 0.0
+
+
+def test_limits_of_basement_and_crawl_space():
+    """A basement of no depth is a slab; a crawl space without ground is its floor and its air."""
+    floor, wall = basement(HOUSE, 0.5, 1.0, 0.05)
+    slab = slab_on_ground(HOUSE, 0.5)
+    assert floor.u_value == pytest.approx(slab.u_value, rel=0.02)
+    assert floor.swing == pytest.approx(slab.swing, rel=0.03)
+    # a shallow wall: 2/pi (1 + 1/2) of its own U, the formula's limit
+    own = 1.0 / (0.13 + 1.0 + R_SE)
+    assert wall.u_value == pytest.approx(3.0 / np.pi * own, rel=0.03)
+    windy = suspended_floor(HOUSE, 1.0, height=0.5, wall_u=1.0, vents=0.5, wind=50.0)
+    own_floor = 1.0 / (2 * R_SI_DOWN + 1.0)
+    assert windy.u_value == pytest.approx(own_floor, rel=0.01)
+    assert windy.swing == pytest.approx(own_floor, rel=0.01)
+    calm = suspended_floor(HOUSE, 1.0, height=0.5, wall_u=1.0, vents=0.0015, wind=3.0)
+    assert slab_on_ground(HOUSE, 1.0).u_value * 0.8 < calm.u_value < own_floor
+    cellar = over_unheated_basement(HOUSE, 1.0, depth=2.0, height=0.5, wall_u=1.0)
+    assert 0.2 < cellar.u_value < own_floor
+
+
+def test_penetration_depths_of_the_three_soils():
+    """ISO 13370, table H.1: 2.2, 3.2 and 4.2 m."""
+    found = [SOILS[name].penetration for name in ("clay", "sand", "rock")]
+    np.testing.assert_allclose(found, [2.2, 3.2, 4.2], atol=0.05)
+
+
+def test_harmonic_finds_mean_swing_and_coldest_hour():
+    hours = np.arange(8760) + 0.5
+    outdoor = 8.0 - 11.0 * np.cos(2 * np.pi * (hours - 400.0) / YEAR) + np.sin(hours / 24 * 6.283)
+    mean, swing, coldest = harmonic(outdoor, hours)
+    assert (mean, swing) == pytest.approx((8.0, 11.0), abs=0.01)
+    assert coldest == pytest.approx(400.0, abs=1.0)
+
+
+def test_room_on_its_slab_loses_what_iso_says():
+    """A heated room's flow to the ground in the transient balance: mean, swing and lag of C.3.
+
+    The half metre of soil and the concrete (1.5 MJ/(m2 K) behind some 1.5 m2 K/W) delay the
+    flow that the room feels once more, by RC = 26 days at the most, and damp it by a tenth.
+    """
+    hours = np.arange(2 * 8760) + 1.0  # the second year counts: the first begins in January's soil
+    outdoor = 10.0 - 10.0 * np.cos(2 * np.pi * (hours - 500.0) / YEAR)
+    element = slab_on_ground(HOUSE, CONCRETE.resistance)
+    year = harmonic(outdoor, hours)
+    beyond = element.temperature(20.0, *year, hours)
+    room = box(loads=IdealLoads(20.0, 20.0), infiltration_ach=0.0)
+    up = 1.0 / R_SI_DOWN
+    floor = OpaqueSurface(
+        "slab", 20.0, element.layers((CONCRETE,)), np.array([0, 0, -1.0]), "known",
+        emissivity_in=0.0, beyond_c=beyond,
+    )  # fmt: skip
+    other = OpaqueSurface(
+        "roof", 20.0, (Layer(0.1, 0.1, 0.0, 0.0),), np.array([0, 0, 1.0]), "adiabatic",
+        emissivity_in=0.0,
+    )  # fmt: skip
+    room = Zone("on the ground", 60.0, (floor, other), infiltration_ach=0.0, loads=room.loads)
+    options = BalanceOptions(inside_convection="constant", warm_tolerance=1e-4)
+    result = simulate(room, climate(2 * 8760, outdoor=outdoor), no_sun(2 * 8760, 2, 0),
+                      step_s=3600.0, options=options)  # fmt: skip
+    film, beyond = (result.heating - result.cooling)[8760:], beyond[8760:]
+    assert np.abs(result.residual).max() < 1e-6
+    # the film of the balance is not R_si: compare at equal total resistance
+    shown = 1.0 / element.u_value - R_SI_DOWN
+    h = film.mean() / 20.0 / (20.0 - result.surface_in_c[8760:, 0].mean())
+    assert h < up
+    u = 1.0 / (shown + 1.0 / h)
+    assert film.mean() / 20.0 == pytest.approx(u * (20.0 - beyond.mean()), rel=2e-3)
+    assert beyond.mean() == pytest.approx(10.0, abs=0.01)
+    found, said = harmonic(film / 20.0, hours[8760:]), harmonic(u * (20.0 - beyond), hours[8760:])
+    assert 0.9 < found[1] / said[1] < 1.0
+    later = np.mod(found[2] - said[2] + YEAR / 2, YEAR) - YEAR / 2
+    assert 0.0 < later < 26 * 24.0
+    # the formula's own greatest flow: a month after the coldest hour (half a year off the least)
+    lag = np.mod(said[2] - YEAR / 2 - 500.0, YEAR)
+    assert lag == pytest.approx(YEAR / 12, abs=1.0)
+    assert said[1] / u == pytest.approx(10.0 * element.swing / element.u_value, rel=1e-3)
+
+
+def test_neighbour_at_a_known_temperature_has_its_u():
+    """U A (T_i - T_n) in the steady state, films 0.13 beyond and the balance's own inside."""
+    wall = Layer(0.1, 0.5, 0.0, 0.0)
+    film = Layer(1.0, 1.0 / 0.13, 0.0, 0.0)
+    surface = OpaqueSurface(
+        "party", 12.0, (film, wall), np.array([1.0, 0, 0]), "known",
+        emissivity_in=0.0, beyond_c=np.full(24, 12.0),
+    )  # fmt: skip
+    other = OpaqueSurface(
+        "rest", 20.0, (wall,), np.array([-1.0, 0, 0]), "adiabatic", emissivity_in=0.0
+    )
+    room = Zone("room", 30.0, (surface, other), infiltration_ach=0.0,
+                loads=IdealLoads(22.0, 22.0), bridges=1.5)  # fmt: skip
+    options = BalanceOptions(inside_convection="constant", warm_tolerance=1e-9, tolerance=1e-9)
+    found = simulate(room, climate(24, outdoor=2.0), no_sun(24, 2, 0), options=options)
+    u = 1.0 / (0.13 + wall.resistance + 1 / 3.076)
+    np.testing.assert_allclose(found.heat_flow["ground and neighbours"], -12 * u * 10, rtol=1e-6)
+    np.testing.assert_allclose(found.heat_flow["thermal bridges"], -1.5 * 20.0, rtol=1e-9)
+    np.testing.assert_allclose(found.heating, 12 * u * 10 + 1.5 * 20.0, rtol=1e-6)

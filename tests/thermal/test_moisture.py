@@ -1,0 +1,83 @@
+"""Moisture of the air: printed saturation pressures, closed forms, limits held."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from thermal.moisture import (
+    EVAPORATION,
+    VAPOUR_HEAT,
+    MoistZone,
+    humidity_ratio,
+    relative_humidity,
+    saturation_pressure,
+    zone_humidity,
+)
+
+HOURS = 48
+FLOW, VOLUME, SOURCE = 0.02, 60.0, 1e-4
+P, OUT_C, OUT_W = np.full(HOURS, 101325.0), np.full(HOURS, 5.0), np.full(HOURS, 0.004)
+DENSITY = 101325.0 / (287.055 * 278.15)
+
+
+def zone(**changes) -> MoistZone:
+    given = {
+        "volume": VOLUME,
+        "air_c": np.full(HOURS, 21.0),
+        "outdoor_air": np.full(HOURS, FLOW),
+        "vapour": np.full(HOURS, SOURCE),
+    }
+    return MoistZone(**given | changes)
+
+
+def test_saturation_pressure_as_printed():
+    """ASHRAE Handbook of Fundamentals, Psychrometrics, table 3 [Pa]."""
+    found = saturation_pressure([-20.0, -10.0, 0.0, 20.0, 30.0])
+    np.testing.assert_allclose(found, [103.24, 259.9, 611.2, 2338.8, 4246.0], rtol=5e-4)
+    w = humidity_ratio(0.5, 25.0, 101325.0)
+    assert w == pytest.approx(0.00988, abs=2e-5)
+    assert relative_humidity(w, 25.0, 101325.0) == pytest.approx(0.5)
+
+
+def test_ventilated_room_goes_exponentially_to_its_steady_state():
+    (found,) = zone_humidity([zone()], OUT_W, OUT_C, P)
+    steady = 0.004 + SOURCE / (DENSITY * FLOW)
+    k = FLOW * 3600.0 / VOLUME
+    h = np.arange(HOURS)
+    expected = steady + (0.004 - steady) * np.exp(-k * h) * -np.expm1(-k) / k
+    np.testing.assert_allclose(found.ratio, expected, rtol=1e-12)
+    assert (found.humidify == 0).all() and (found.dehumidify == 0).all()
+
+
+def test_limits_are_held_and_their_latent_loads_are_the_difference():
+    (dry,) = zone_humidity([zone(dehumidify_to=0.35)], OUT_W, OUT_C, P)
+    high = humidity_ratio(0.35, 21.0, 101325.0)
+    assert dry.ratio[-1] == pytest.approx(high, rel=1e-9)
+    taken = DENSITY * FLOW * 0.004 + SOURCE - DENSITY * FLOW * high
+    heat = EVAPORATION + VAPOUR_HEAT * 21.0
+    assert taken > 0
+    assert dry.dehumidify[-1] == pytest.approx(taken * heat, rel=1e-9)
+    (moist,) = zone_humidity([zone(humidify_to=0.5, vapour=np.zeros(HOURS))], OUT_W, OUT_C, P)
+    low = humidity_ratio(0.5, 21.0, 101325.0)
+    assert moist.relative[-1] == pytest.approx(0.5, rel=1e-9)
+    assert moist.humidify[-1] == pytest.approx(DENSITY * FLOW * (low - 0.004) * heat, rel=1e-9)
+
+
+def test_closed_room_gathers_its_vapour_and_condenses_at_saturation():
+    (found,) = zone_humidity([zone(outdoor_air=np.zeros(HOURS))], OUT_W, OUT_C, P)
+    rise = SOURCE * 3600.0 / (DENSITY * VOLUME)
+    np.testing.assert_allclose(np.diff(found.ratio[:2]), rise, rtol=1e-6)
+    assert found.relative.max() <= 1.0 + 1e-8
+    assert found.relative[-1] == pytest.approx(1.0)
+
+
+def test_air_from_the_next_room_brings_its_vapour():
+    """b takes only a's air: in the end it has a's ratio and its own source's more."""
+    between = np.zeros((2, 2))
+    between[1, 0] = FLOW
+    rooms = [zone(), zone(outdoor_air=np.zeros(HOURS))]
+    a, b = zone_humidity(rooms, OUT_W, OUT_C, P, between)
+    assert b.ratio[-1] == pytest.approx(a.ratio[-1] + SOURCE / (DENSITY * FLOW), rel=1e-6)
+    turned = zone_humidity(rooms, OUT_W, OUT_C, P, between.T)
+    assert turned[1].relative[-1] == pytest.approx(1.0)  # nothing flows into b then

@@ -1,0 +1,187 @@
+"""Outdoor air by wind, temperature, fans and windows; one-way air: closed forms of steady rooms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.thermal.rooms import PLASTER, box, climate, sun
+from thermal.balance import BalanceOptions, simulate, simulate_zones
+from thermal.blackbox import Fenestration
+from thermal.climate import no_sun
+from thermal.convection import local_wind_factor
+from thermal.emitters import HeatedSlab, IdealLoads
+from thermal.records import AIR_HEAT
+from thermal.ventilation import (
+    DOE2,
+    AirTransfer,
+    Leakage,
+    SupplyAir,
+    WindowAiring,
+    aim2,
+    cross_flow,
+    sherman_grimsrud,
+    single_sided,
+    stack_height,
+)
+from thermal.zone import Gains, OpaqueSurface, Zone
+
+OPTIONS = BalanceOptions(warm_tolerance=1e-9, warm_days=2000, tolerance=1e-9, iterations=20)
+VOLUME, WIND, OUT = 50.0, 3.0, 2.0
+HEAT = 101325.0 / (287.055 * (OUT + 273.15)) * AIR_HEAT  # of outdoor air [J/(m3 K)]
+
+
+def sealed(name: str = "room", **changes) -> Zone:
+    """A room whose walls pass no heat: in a steady state only its air and its plant count."""
+    wall = OpaqueSurface("wall", 20.0, (PLASTER,), np.array([0.0, 1.0, 0.0]), "adiabatic")
+    other = OpaqueSurface("other", 20.0, (PLASTER,), np.array([0.0, -1.0, 0.0]), "adiabatic")
+    return Zone(name, VOLUME, (wall, other), **{"infiltration_ach": 0.0} | changes)
+
+
+def load(zone: Zone, out: float = OUT) -> float:
+    """Steady load of a room in constant weather [W], heating positive."""
+    result = simulate(zone, climate(24, outdoor=out, wind=WIND), no_sun(24, 2, 0), options=OPTIONS)
+    assert np.abs(result.residual).max() < 1e-6
+    return float((result.heating - result.cooling)[-1])
+
+
+KEPT = IdealLoads(20.0, 20.0)
+V = WIND * local_wind_factor(1.5, "suburbs")  # no face outdoors: the height of a seated person
+
+
+@pytest.mark.parametrize(
+    ("leakage", "flow"),
+    [
+        (Leakage(), VOLUME / 3600.0),
+        (Leakage(DOE2), VOLUME / 3600.0 * 0.224 * V),
+        (Leakage((0.606, 0.03636, 0.1177, 0.01)),
+         VOLUME / 3600 * (0.606 + 0.03636 * 18 + 0.1177 * V + 0.01 * V**2)),
+        (replace(sherman_grimsrud(500.0, stack=0.000145, wind=0.000174), factors=(0, 0, 0, 0)),
+         0.5 * np.sqrt(0.000145 * 18 + 0.000174 * V**2)),
+        (replace(aim2(0.05, 0.67, stack=0.054, wind=0.156, shelter=0.5), factors=(0, 0, 0, 0)),
+         0.05 * np.hypot(0.054 * 18**0.67, 0.156 * (0.5 * V) ** 1.34)),
+    ],
+)  # fmt: skip
+def test_leaks_by_their_formulas(leakage, flow):
+    zone = sealed(loads=KEPT, infiltration_ach=1.0, leakage=leakage)
+    assert load(zone) == pytest.approx(HEAT * flow * 18.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("fan", "expected"),
+    [
+        (SupplyAir(2.0), 18.0),
+        (SupplyAir(2.0, recovery=0.75), 4.5),
+        (SupplyAir(2.0, 16.0), 4.0),
+        (SupplyAir(2.0, recovery=0.5, least_c=18.0), 2.0),  # recovered to 11, heated to 18
+        (SupplyAir(2.0, recovery=0.75, bypass_above_c=19.0), 18.0),
+        (SupplyAir(2.0, recovery=0.75, bypass_above_c=21.0), 4.5),
+    ],
+)
+def test_supply_air_by_its_temperature(fan, expected):
+    zone = sealed(loads=KEPT, supply=fan)
+    assert load(zone) == pytest.approx(HEAT * 2.0 * VOLUME / 3600.0 * expected, rel=1e-9)
+    result = simulate(zone, climate(24, outdoor=OUT), no_sun(24, 2, 0), options=OPTIONS)
+    np.testing.assert_allclose(result.fan_air, 2.0 * VOLUME / 3600.0)
+    heated = 7.0 if fan.least_c > 0 else 0.0
+    np.testing.assert_allclose(result.coil, HEAT * 2.0 * VOLUME / 3600 * heated, rtol=1e-9)
+
+
+def test_windows_flow_as_en_16798_7_says():
+    """Single-sided by the greater, cross by both; their air has outdoor density's share."""
+    site = WIND * local_wind_factor(10.0, "suburbs")
+    density = 1.204 * 287.055 * (OUT + 273.15) / 101325.0
+    wind, stack = single_sided(1.5, 1.2)
+    zone = sealed(loads=KEPT, airing=WindowAiring(wind, stack, share=0.5))
+    q = 0.75 * np.sqrt(max(0.001 * site**2, 0.0035 * 1.2 * 18.0))
+    assert load(zone) == pytest.approx(HEAT * 0.5 * q * density * 18.0, rel=1e-9)
+    wind, stack = cross_flow([1.0, 1.0], [180.0, 0.0], 1.2)
+    # at 0 degrees one side each: 0.25 (1/sqrt 2) twice; at 45 the same
+    across = 0.5 / np.sqrt(2)
+    q = np.hypot(0.67 * across * site * np.sqrt(0.75), np.sqrt(0.0035 * 1.2 * 18.0))
+    zone = sealed(loads=KEPT, airing=WindowAiring(wind, stack, both=True))
+    assert load(zone) == pytest.approx(HEAT * q * density * 18.0, rel=1e-9)
+    assert cross_flow([1.0, 1.0], [180.0, 180.0], 1.2)[0] == 0.0  # one facade: no wind through
+    assert stack_height([0.9, 2.0], [2.1, 2.5]) == pytest.approx(1.6)
+
+
+def test_windows_open_and_close_by_temperature_wind_and_outdoors():
+    hours = 48
+    room = sealed(gains=Gains(400.0, 0.0), airing=WindowAiring(
+        0.01, 0.01, open_above_c=24.0, close_below_c=22.0))  # fmt: skip
+    result = simulate(room, climate(hours, outdoor=10.0), no_sun(hours, 2, 0), step_s=60.0)
+    assert 22.0 - 1.0 < result.air_c.min() and result.air_c.max() < 24.0 + 1.0
+    assert (result.outdoor_air > 0).any()
+    still = BalanceOptions(warm_days=0, start_c=26.0)
+    for shut in (
+        {"greatest_wind": 1.0}, {"least_outdoor_c": 12.0}, {"least_difference": 500.0},
+        {"share": 0.0},
+    ):  # fmt: skip
+        zone = replace(room, airing=replace(room.airing, **shut))
+        closed = simulate(zone, climate(hours, outdoor=10.0), no_sun(hours, 2, 0), options=still)
+        assert (closed.outdoor_air == 0.0).all()
+        assert closed.air_c.max() > 30.0
+
+
+def test_one_way_air_from_room_to_room():
+    """Outdoor air is supplied to a, flows on to b: b takes its air at a's temperature."""
+    flow = 2.0 * VOLUME / 3600.0
+    first = sealed("a", supply=SupplyAir(2.0), loads=IdealLoads(20.0, 20.0))
+    second = sealed("b", loads=IdealLoads(23.0, 23.0))
+    dark = [no_sun(24, 2, 0)] * 2
+    a, b = simulate_zones(
+        [first, second], climate(24, outdoor=OUT), dark,
+        transfers=[AirTransfer("a", "b", flow)], options=OPTIONS,
+    )  # fmt: skip
+    np.testing.assert_allclose(a.heating, HEAT * flow * 18.0, rtol=1e-9)
+    np.testing.assert_allclose(b.heating, HEAT * flow * 3.0, rtol=1e-9)
+    free = replace(second, loads=IdealLoads())
+    _, b = simulate_zones(
+        [first, free], climate(24, outdoor=OUT), dark,
+        transfers=[AirTransfer("a", "b", np.full(24, flow))], options=OPTIONS,
+    )  # fmt: skip
+    np.testing.assert_allclose(b.air_c, 20.0, atol=1e-6)
+
+
+def test_radiant_share_of_an_ideal_plant():
+    """Air held exactly; the surfaces get their share; a limit holds for the whole."""
+    hours = 96
+    outdoor = 5.0 + 8.0 * np.sin(np.arange(hours) / 24 * 2 * np.pi)
+    before = -np.inf
+    for share in (0.0, 0.4, 0.8, 1.0):
+        loads = IdealLoads(20.0, 26.0, heating_radiant=share)
+        room = box(window=Fenestration("glass", 2.5), loads=loads, outside="adiabatic")
+        result = simulate(room, climate(hours, outdoor=outdoor), sun(hours, room, strength=0.2))
+        held = result.heating > 1.0
+        assert held.any()
+        np.testing.assert_allclose(result.air_c[held & np.roll(held, 1) & np.roll(held, -1)], 20.0,
+                                   atol=1e-6)  # fmt: skip
+        assert np.abs(result.residual).max() < 1e-6 * np.abs(result.heating).max()
+        warmer = result.mrt_c[held].mean()
+        assert warmer > before
+        before = warmer
+    tight = replace(loads, heating_limit=50.0)
+    weak = simulate(replace(room, loads=tight), climate(hours, outdoor=outdoor),
+                    sun(hours, room, strength=0.2))  # fmt: skip
+    assert weak.heating.max() == pytest.approx(50.0)
+    assert weak.air_c.min() < 20.0
+
+
+def test_heated_slab_gives_in_proportion_and_keeps_the_account():
+    hours = 24 * 30
+    room = box(outside="adiabatic", loads=IdealLoads())
+    slab = HeatedSlab("floor", 0.05, heating_c=21.0, heating_limit=1200.0, band=2.0)
+    heated = replace(room, slab=slab)
+    result = simulate(heated, climate(hours, outdoor=-5.0), no_sun(hours, len(room.surfaces), 0))
+    assert np.abs(result.residual).max() < 1e-6 * result.slab.max()
+    # steady: the power of the band at this air temperature, and the floor warmer than the air
+    last = result.air_c[-1]
+    assert 20.0 < last < 22.0
+    assert result.slab[-1] == pytest.approx(1200.0 * (21.0 - last + 1.0) / 2.0, rel=1e-3)
+    floor = result.surface_in_c[-1, room.index_of("floor")]
+    assert floor > last + 0.5
+    assert result.heat_flow["heated slab"][-1] == pytest.approx(result.slab[-1])
+    lost = -(result.heat_flow["facade"] + result.heat_flow["air exchange"])[-1]
+    assert lost == pytest.approx(result.slab[-1], rel=2e-2)

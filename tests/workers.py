@@ -1,0 +1,23 @@
+"""What tests share a machine by: one thread for algebra a worker, garbage collected rarely.
+
+Two workers on two cores, each with two threads of OpenBLAS that wait by spinning, and collections
+that go through all modules and tests over and over took a fifth of the processor's time.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+if "PYTEST_XDIST_WORKER" in os.environ:  # before NumPy is imported, which reads them once
+    for name in ONE_THREAD:
+        os.environ.setdefault(name, "1")
+gc.set_threshold(100_000, 50, 100)
+
+
+def pytest_collection_finish() -> None:
+    """pytest's hook: what is imported and collected stays, and need not be looked through."""
+    gc.collect()
+    gc.freeze()

@@ -1,0 +1,157 @@
+"""What acts on zones in every hour or step, checked and laid out for the compiled loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal import records
+from thermal.climate import Climate, Solar, to_steps
+from thermal.emitters import HeatedSlab
+from thermal.errors import require
+from thermal.network import framed, known_surfaces
+from thermal.ventilation import AirTransfer, SupplyAir
+from thermal.zone import Zone
+
+FloatArray = NDArray[np.float64]
+
+
+def drive_of(
+    zones: Sequence[Zone],
+    climate: Climate,
+    solar: Sequence[Solar],
+    steps: int,
+    transfers: Sequence[AirTransfer] = (),
+) -> tuple[records.Drive, int]:
+    """The drive of zones, and the steps for which one row of sun holds."""
+    rows, hours = len(solar[0].inside), climate.hours
+    fits = rows in (hours, hours * steps)
+    require(fits, "solar", f"expected {hours} or {hours * steps} rows, got {rows}")
+    inner, outer, states = [], [], []
+    for zone, sun in zip(zones, solar, strict=True):
+        zone_inner, zone_outer = _zone_sun(zone, sun, rows)
+        inner.append(zone_inner)
+        outer.append(zone_outer)
+        states.append(_states(zone, sun, hours))
+    fans = [zone.supply or SupplyAir(0.0) for zone in zones]
+    slabs = [zone.slab or HeatedSlab("", 1.0) for zone in zones]
+    drive = records.Drive(
+        inner=np.ascontiguousarray(np.concatenate(inner, axis=1)),
+        outer=np.ascontiguousarray(np.concatenate(outer, axis=1)),
+        state=np.ascontiguousarray(np.concatenate(states, axis=1)),
+        convective=_hourly([z.gains.convective for z in zones], hours, "convective gains"),
+        radiant=_hourly([z.gains.radiant for z in zones], hours, "radiant gains"),
+        beyond=_beyond(zones, climate, steps),
+        leaks=_flows([z.infiltration_ach for z in zones], zones, hours, "infiltration"),
+        airflow=_flows([z.other_air_ach for z in zones], zones, hours, "outdoor air"),
+        supply=_flows([f.ach for f in fans], zones, hours, "supply air"),
+        supply_c=_set_points([_supplied(f) for f in fans], hours, steps, missing=True),
+        airing=_hourly([z.airing.share if z.airing else 0.0 for z in zones], hours, "windows"),
+        transfer=_hourly([one.flow for one in transfers], hours, "air between zones"),
+        heating_c=_set_points([z.loads.heating_c for z in zones], hours, steps),
+        cooling_c=_set_points([z.loads.cooling_c for z in zones], hours, steps),
+        limit=np.array([[z.loads.heating_limit, z.loads.cooling_limit] for z in zones]),
+        slab_c=np.stack(
+            [
+                _set_points([getattr(slab, key) for slab in slabs], hours, steps)
+                for key in ("heating_c", "cooling_c")
+            ],
+            axis=2,
+        ),
+    )
+    return drive, steps if rows == hours else 1
+
+
+def _zone_sun(zone: Zone, sun: Solar, rows: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sun at the inside [W] and the outside [W/m2] of the zone's faces [R, N]."""
+    walls, windows = len(zone.surfaces), len(zone.windows)
+    item = f"solar of zone {zone.name}"
+    for name, width in (
+        ("inside", walls),
+        ("facade", walls),
+        ("absorbed_outer", windows),
+        ("absorbed_inner", windows),
+    ):
+        got = getattr(sun, name).shape
+        require(got == (rows, width), item, f"{name}: expected {(rows, width)}, got {got}")
+    area = np.array([w.area for w in zone.windows])
+    glass_inside = sun.absorbed_inner
+    if sun.window_inside is not None:
+        glass_inside = glass_inside + np.asarray(sun.window_inside, dtype=float)
+    absorptance = np.array([s.absorptance_out for s in zone.surfaces])
+    outdoor = np.array([s.outside == "outdoor" for s in zone.surfaces])
+    frames = framed(zone)
+    at_frames = np.zeros((rows, len(frames)))
+    if frames and sun.window_facade is not None:
+        columns = [zone.windows.index(w) for w in frames]
+        at_frames = np.asarray(sun.window_facade)[:, columns]
+        at_frames = at_frames * np.array([w.frame_absorptance for w in frames])
+    inner = [sun.inside, glass_inside * area, np.zeros((rows, len(frames)))]
+    outer = [sun.facade * (absorptance * outdoor), sun.absorbed_outer, at_frames]
+    return np.concatenate(inner, axis=1), np.concatenate(outer, axis=1)
+
+
+def _states(zone: Zone, sun: Solar, hours: int) -> NDArray[np.int64]:
+    windows = len(zone.windows)
+    if sun.state is None:
+        return np.zeros((hours, windows), dtype=np.int64)
+    state = np.asarray(sun.state, dtype=np.int64)
+    item = f"shading state of zone {zone.name}"
+    require(state.shape == (hours, windows), item, f"expected {(hours, windows)}")
+    count = np.array([len(w.states) for w in zone.windows])
+    require(bool(np.all((state >= 0) & (state < count))), item, "a state that no window has")
+    return state
+
+
+def _flows(values: Sequence[ArrayLike], zones: Sequence[Zone], hours: int, item: str) -> FloatArray:
+    """Flows [H, Z] [m3/s] from air changes."""
+    volume = np.array([zone.volume for zone in zones])
+    return np.ascontiguousarray(_hourly(values, hours, item) * volume / 3600.0)
+
+
+def _supplied(fan: SupplyAir) -> ArrayLike:
+    return np.nan if fan.temperature_c is None else fan.temperature_c
+
+
+def _beyond(zones: Sequence[Zone], climate: Climate, steps: int) -> FloatArray:
+    """Temperatures [T, B] of the ground and of the known outer faces at the steps' ends."""
+    columns = [to_steps(climate.ground_c, steps)]
+    for surface in known_surfaces([e for zone in zones for e in zone.surfaces]):
+        value = np.asarray(surface.beyond_c, dtype=float)
+        fits = value.shape in ((), (climate.hours,), (climate.hours * steps,))
+        item = f"temperature beyond surface {surface.name}"
+        require(fits, item, f"expected one value, {climate.hours}, or one for every step")
+        require(bool(np.all(np.isfinite(value))), item, "missing values")
+        if value.shape == (climate.hours,) and steps > 1:
+            value = to_steps(value, steps)
+        columns.append(np.broadcast_to(value, (climate.hours * steps,)))
+    return np.ascontiguousarray(np.stack(columns, axis=1))
+
+
+def _hourly(
+    values: Sequence[ArrayLike], hours: int, item: str, *, missing: bool = False
+) -> NDArray[np.float64]:
+    columns = []
+    if not values:
+        return np.zeros((hours, 0))
+    for value in values:
+        array = np.asarray(value, dtype=float)
+        require(array.shape in ((), (hours,)), item, f"expected one value or {hours}")
+        require(missing or not bool(np.any(np.isnan(array))), item, "missing values")
+        columns.append(np.broadcast_to(array, (hours,)))
+    return np.ascontiguousarray(np.stack(columns, axis=1))
+
+
+def _set_points(
+    values: Sequence[ArrayLike], hours: int, steps: int, *, missing: bool = False
+) -> NDArray[np.float64]:
+    """Set points of every step [T, Z], from one value, hourly values, or values of every step."""
+    columns = []
+    for value in values:
+        array = np.asarray(value, dtype=float)
+        if array.shape == (hours,):
+            array = np.repeat(array, steps)
+        columns.append(array)
+    return _hourly(columns, hours * steps, "set point", missing=missing)

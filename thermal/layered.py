@@ -1,0 +1,45 @@
+"""U and g of a system from its layers by ISO 15099, as the Blackbox takes them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from thermal.glazing_unit import GlazingUnit
+from thermal.gvalue import ThermalData, inward_share
+from thermal.iso15099 import iso15099_data, yearly_g_values
+
+
+def layered_thermal_data(
+    unit: GlazingUnit,
+    transmittance: ArrayLike,
+    reflectance: ArrayLike,
+    absorbed: ArrayLike,
+    *,
+    u_value: float | None = None,
+    g_normal: float | None = None,
+    item: str = "fenestration",
+) -> ThermalData:
+    """U and g [K] of a system by ISO 15099 from its layers; see `gvalue.thermal_data`.
+
+    Args:
+        transmittance, reflectance: [K] of the whole system, direction to hemisphere, solar.
+        absorbed: [K, N] solar absorptance of every layer.
+
+    A g that is given at normal incidence (the first direction) scales what goes inwards.
+    """
+    tau = np.asarray(transmittance, dtype=float)
+    notes = []
+    if u_value is None:
+        u_value = iso15099_data(unit).u_value
+        notes.append(f"{item}: U {u_value:.3g} W/(m2 K) by ISO 15099 from its layers.")
+    g = yearly_g_values(unit, tau, np.asarray(absorbed, dtype=float))
+    if g_normal is None:
+        notes.append(f"{item}: g {g[0]:.3g} at normal incidence by ISO 15099 from its layers.")
+        return ThermalData(u_value, g, tuple(notes))
+    rho = np.asarray(reflectance, dtype=float)
+    share = inward_share(float(tau[0]), float(rho[0]), g_normal, item=item)
+    total = np.maximum(1.0 - tau - rho, 0.0)
+    computed = (g[0] - tau[0]) / max(float(total[0]), 1e-9)
+    scaled = np.minimum((g - tau) * share / max(computed, 1e-9), total)
+    return ThermalData(u_value, tau + scaled, tuple(notes))
