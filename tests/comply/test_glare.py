@@ -59,8 +59,6 @@ def test_seats_and_blinds(variant):
     dim = seat_glare(room, closed, grid=None, **chosen)
     lit = one.dgp[0] > 0.3
     assert lit.any() and (dim.dgp[0][lit] < one.dgp[0][lit]).all() and dim.operated
-    seats = seat_glare(room, None, grid=2.0, **chosen)
-    worst = seats.dgp.max(axis=1)
-    assert (
-        len(worst) > 1 and worst[np.argmin(seats.eyes[:, 1])] > worst[np.argmax(seats.eyes[:, 1])]
-    )
+    seats = seat_glare(room, None, grid=1.0, **chosen)
+    mean, y = seats.dgp.mean(axis=1), seats.eyes[:, 1]  # the window is at y = 0
+    assert np.ptp(y) > 1.5 and mean[y == y.min()].mean() > mean[y == y.max()].mean()
