@@ -68,29 +68,26 @@ def three_phase(
 
 
 def sun_beams(
-    transmission: Sequence[ArrayLike],
-    through: ArrayLike,
+    beams: Sequence[ArrayLike],
     through_sun: ArrayLike,
     direct_daylight: ArrayLike,
     sun: ArrayLike,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The sun's straight beam on window patches, two ways [G, K, H].
 
-        diag(tau) D_d s_d        as T D s has it, with one transmittance in a whole patch
+        T_b D_d s_d              as T D s has it, with one transmittance in a whole patch
         diag(tau(sun)) D_d s_d   at the sun's own angle, as C_ds has it
 
     V T D s + (V - V_d) times the difference gives the beam that the room reflects its own angle
     too.  It takes away no more than V T D s - V_d T D_d s_d holds.
 
     Args:
-        transmission: for each group its T [K, K].
-        through: [G, K] tau, what of T's diagonal goes straight on,
-            `mitsuba_cfs.trace.direct_sun.patch_beams`.
+        beams: for each group what of its T goes straight on, T_b [K, K],
+            `mitsuba_cfs.bsdf.klems_peak.held_beams`.
         through_sun: [G, H] tau(sun), `mitsuba_cfs.trace.direct_sun.through_beams`.
         direct_daylight: D_d [G, K, P].
         sun: s_d [P, H], the sun alone on the sky's patches.
     """
     window = times_sky(direct_daylight, sun)
-    diagonal = np.stack([np.diag(np.asarray(T)) for T in transmission])
-    patches = np.minimum(np.asarray(through), diagonal)
-    return window * patches[:, :, None], window * np.asarray(through_sun)[:, None]
+    by_patch = np.stack([np.asarray(T) @ lit for T, lit in zip(beams, window, strict=True)])
+    return by_patch, window * np.asarray(through_sun)[:, None]

@@ -15,6 +15,7 @@ FLOAT_GLASS = (0.89, 0.08)  # transmittance and reflectance of the pane whose fa
 SPECULAR = 0.95  # share of what passes, that the beam of a specular system has at least
 EVEN = 0.02  # relative spread of the beam round a ring, of a system that all azimuths are alike to
 STEEPEST = 12.0  # exponent
+ASTRAY = np.radians(25)  # from straight on, that T's patches put a beam at the most
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,3 +105,24 @@ def neighbours(basis: KlemsBasis) -> list[NDArray[np.int64]]:
             near |= {starts[other] + step % m for step in range(first, last)}
         result.append(np.array(sorted(near), dtype=np.int64))
     return result
+
+
+def held_beams(
+    transmission: NDArray[np.float64], beams: NDArray[np.float64], basis: KlemsBasis
+) -> NDArray[np.float64]:
+    """What of a matrix T [K out, K in] (`KlemsBsdf.transmission_matrix`) goes straight on.
+
+    Of each column as much as its beam [K in] carries, from the diagonal first and then from the
+    directions nearest to it, no more than `ASTRAY` away: the cells of a tensor tree lie across
+    patches, and so does what T has of its beam.
+    """
+    omega, ways = basis.projected_solid_angles(), basis.outgoing_directions()
+    near = ways @ ways.T  # [K out, K in]: light straight on leaves by the patch of its number
+    order = np.argsort(-near, axis=0, kind="stable")
+    share = np.where(near >= np.cos(ASTRAY), transmission, 0.0) * omega[:, None] / omega
+    share = np.take_along_axis(share, order, axis=0)
+    taken = np.minimum(np.cumsum(share, axis=0), beams)
+    taken = np.diff(taken, axis=0, prepend=0.0)
+    held = np.empty_like(taken)
+    np.put_along_axis(held, order, taken, axis=0)
+    return held * omega / omega[:, None]

@@ -24,4 +24,4 @@ class SensorLight:
 
     diffuse: NDArray[np.float64]  # [S, L] V T D s - V_d T D_d s_d + the reflected beam's own angle
     sun: NDArray[np.float64] | None  # [S, L] C_ds s_sun
-    sun_error: NDArray[np.float64] | float  # [S] standard error of its sum over the hours
+    sun_error: NDArray[np.float64] | float  # [S] of the hours' sum of it and of the reflected sun

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.systems import (
     AngularScattering,
     lit_system,

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.methods.group_light import SensorLight, WindowLight
 from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
+from mitsuba_cfs.methods.phase_error import matrix_variance
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
 from mitsuba_cfs.methods.straight_views import StraightViews
-from mitsuba_cfs.methods.subdivision import coarse_sky
 from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -139,13 +140,13 @@ class PhaseLight:
         if not patches.any():
             return None, None
         at_sun = through_beams(self._traced.parts.groups[q : q + 1], ways, sky.direction)
-        traced, T = self._traced, [optics.transmission]
+        traced, T = self._traced, [held_beams(optics.transmission, patches[0], KLEMS_FULL)]
         daylight = traced.straight_daylight[q : q + 1]
-        by_patch, by_angle = phases.sun_beams(T, patches, at_sun, daylight, sky.sun)
+        by_patch, by_angle = phases.sun_beams(T, at_sun, daylight, sky.sun)
         if traced.straight_daylight is not traced.direct_daylight:  # out of a mirror, by patches
             daylight = traced.direct_daylight[q : q + 1]
             straight = by_patch
-            by_patch, _ = phases.sun_beams(T, patches, at_sun, daylight, sky.sun)
+            by_patch, _ = phases.sun_beams(T, at_sun, daylight, sky.sun)
             by_angle = by_angle + (by_patch - straight)
         return by_patch[0].astype(np.float32), by_angle[0].astype(np.float32)
 
@@ -181,46 +182,21 @@ class PhaseLight:
     def relative_error(self, state: State | None = None) -> NDArray[np.float64]:
         """Standard error of each sensor's mean over the hours [S], from the tracing.
 
-        The errors of the parts of the window groups are taken as independent.  What D as a mean
-        over a part leaves is among them (`mitsuba_cfs.methods.subdivision`).
+        That of V, D, B, C_ds and the reflected sun; those of different groups are taken as
+        independent.  What D as a mean over a part leaves is among them
+        (`mitsuba_cfs.methods.subdivision`).
         """
-        state, variance = self._state(state), 0.0
-        luminance = self._window_luminance("whole", state)
-        for q, part in enumerate(luminance):
-            variance = (
-                variance + self._traced.sensors.part(np.s_[:, q]).error_of(part.mean(-1)) ** 2
-            )
+        state = self._state(state)
+        variance = matrix_variance(
+            self._traced, self.filled.straight, self.sky, state, self._reflected_sun
+        )
         for g, row in enumerate(state):
-            variance = variance + self._subdivision_error(g, row) ** 2
             share = np.bincount(row, minlength=len(self.sensors[g])) / len(row)
             sun = sum(w * s.sun_error for w, s in zip(share, self.sensors[g], strict=True))
             variance = variance + (sun / len(row)) ** 2
         mean = self._of_all(state).mean(axis=1)
         error = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
         return error[: len(self._traced.scene.points)]
-
-    def _subdivision_error(self, g: int, row: NDArray[np.int64]) -> NDArray[np.float64]:
-        """What means over a group's parts change in each sensor's mean [S], and the error of B."""
-        points, normals = self._traced.scene.sensors()
-        found, straight = np.zeros(len(points)), 0.0
-        for j, optics in enumerate(self.filled.systems[g]):
-            sky = self._diffuse_sky[:, row == j].sum(axis=1, keepdims=True) / len(row)
-            if not sky.any():
-                continue
-            through, seen = optics.transmission, self.filled.straight.matrix(g, j)
-            if seen is not None:
-                through = through - np.diag(self.filled.straight.beam(g, j))
-                mean = self.sky.whole[:, row == j].sum(axis=1) / len(row)
-                straight = straight + seen.error_of(mean) ** 2
-            if self._traced.parts.cells:
-                found += self._traced.parts.cells[g].error(points, normals, through, sky)[:, 0]
-        return np.sqrt(found**2 + straight)
-
-    @cached_property
-    def _diffuse_sky(self) -> NDArray[np.float64]:
-        """The skies that D passes straight to the sensors, on Reinhart's sky of MF 1 [P, L]."""
-        sky = self.sky.without_sun() if self._traced.five_phase else self.sky.whole
-        return coarse_sky(sky, self._traced.sampling.subdivision)
 
     def pictures(
         self, hours: NDArray[np.int64], state: Sequence[int], *, direct: bool = False
@@ -262,7 +238,7 @@ class PhaseLight:
     def _reflected_sun(self) -> ReflectedSunLight | None:
         """The sun that diffuse surfaces reflect; None where some mirror it: then by patches."""
         scene = self._traced.scene
-        if scene.interior.glossy or scene.exterior.glossy:
+        if not self._traced.five_phase or scene.interior.glossy or scene.exterior.glossy:
             return None
         return self.filled.reflected_sun.light(self.sky)
 
@@ -271,16 +247,18 @@ class PhaseLight:
         diffuse = diffuse + self.filled.straight.light(g, j, self.sky)
         if not self._traced.five_phase:
             return SensorLight(diffuse, None, 0.0)
+        error = 0.0
         if self._reflected_sun is not None:
             beams = (self.windows[q][j].beam is not None for q in self._traced.parts.of(g))
-            diffuse += self._reflected_sun.sensors(g, j, beam=any(beams))
+            more = self._reflected_sun.sensors(g, j, beam=any(beams))
+            diffuse, error = diffuse + more.values, more.sum_error
         sun, shining = np.zeros_like(diffuse), self._shining()
         if exact[j] is None:
-            return SensorLight(diffuse, sun, 0.0)
+            return SensorLight(diffuse, sun, error)
         luminance = self.sky.illuminance[shining] / SUN_SOLID_ANGLE
         found = exact[j].part(np.s_[g])
         sun[:, shining] = found.values * luminance
-        return SensorLight(diffuse, sun, found.error_of(luminance))
+        return SensorLight(diffuse, sun, np.hypot(error, found.error_of(luminance)))
 
     def _diffuse_light(self, q: int, g: int, j: int) -> NDArray[np.float64]:
         """What a part of a group gives to the sensors [S, L] but for the sun straight."""
@@ -294,8 +272,6 @@ class PhaseLight:
         more, beam = self._reflected_sun, window.beam
         if beam is not None:
             three_phase += reflected @ (window.beam_at_sun - beam if more is None else -beam)
-        if more is not None and more.windows is not None:
-            three_phase += view @ (self.filled.systems[g][j].transmission @ more.windows[q])
         return three_phase
 
     def _exact_sun(self) -> list[Estimate | None]:

@@ -8,33 +8,38 @@ place, and of a window's paths few meet the patch of the sun after a reflection.
     (V - V_d) diag(tau) D_d s_d    the sun's beam that the room reflects
 
 five phases take the same light from places that stand for the surfaces
-(`mitsuba_cfs.trace.reflected_sun`).
+(`mitsuba_cfs.trace.reflected_sun`) and from cells of the room (`mitsuba_cfs.trace.room_beam`).  All
+of it is found in independent batches, of which its standard error is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.optics import States, in_state
+from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.reflected_sun import (
     SunShares,
     outdoor_light,
     view_shares,
     window_shares,
 )
-from mitsuba_cfs.trace.room_beam import RoomCells, room_cells, room_light
-from mitsuba_cfs.trace.scene import TracedScene, traced_scene
+from mitsuba_cfs.trace.room_beam import RoomCells, room_cells, room_light, room_shares
+from mitsuba_cfs.trace.scene import TracedScene, kept_scene
 
+BATCHES = 4  # each with its own paths, places and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
 SENSOR_SHARE = 4  # paths of a sensor for V, for each that looks for them
+ROOM_SHARE = 2  # paths of a sensor for V, for each that looks for the room's cells
 Array = NDArray[np.floating]
 
 
@@ -46,7 +51,9 @@ class ReflectedSun:
     ) -> None:
         """From the states of each window group [G]; nothing is traced yet."""
         self.traced, self.systems, self.straight = traced, systems, straight
-        self._views: dict[tuple[int, int], SunShares] = {}
+        self._windows: dict[int, SunShares] = {}
+        self._rooms: dict[int, NDArray[np.float64]] = {}
+        self._views: dict[tuple[int, int, int], SunShares] = {}
 
     @property
     def outdoors_reflects(self) -> bool:
@@ -61,42 +68,58 @@ class ReflectedSun:
     @cached_property
     def inside(self) -> TracedScene:
         """The room."""
-        return traced_scene(self.traced.scene.interior, self.traced.scene.groups)
+        return kept_scene(self.traced.scene.interior, self.traced.scene.groups)
 
     @cached_property
     def outside(self) -> TracedScene:
-        """What stands before the parts of the window groups."""
-        return traced_scene(self.traced.scene.exterior, self.traced.parts.groups)
+        """What stands before the parts of the window groups, in the room's coordinates."""
+        parts, centre = self.traced.parts.groups, self.inside.centre
+        return kept_scene(self.traced.scene.exterior, parts, centre=centre)
 
     @cached_property
-    def windows(self) -> SunShares:
+    def cells(self) -> RoomCells:
+        """The room's surfaces."""
+        return room_cells(self.inside, self.traced.scene.interior)
+
+    def seed(self, batch: int) -> int:
+        """That of a batch."""
+        return self.traced.sampling.seed * BATCHES + batch
+
+    def windows(self, batch: int) -> SunShares:
         """Rows [Q * K]."""
-        chosen, parts = self.traced.sampling, len(self.traced.parts.groups)
-        samples = chosen.patch_samples * len(self.traced.scene.groups) // parts // WINDOW_SHARE
-        return window_shares(self.outside, samples=max(samples, 8), seed=chosen.seed)
+        if batch not in self._windows:
+            traced = self.traced
+            paths = traced.sampling.patch_samples // WINDOW_SHARE // BATCHES
+            samples = paths * len(traced.scene.groups) // len(traced.parts.groups)
+            self._windows[batch] = window_shares(
+                self.outside, samples=max(samples, 4), seed=self.seed(batch)
+            )
+        return self._windows[batch]
 
-    @cached_property
-    def room(self) -> RoomCells:
-        """The room's surfaces as the sensors see them."""
-        scene, chosen = self.traced.scene, self.traced.sampling
-        return room_cells(
-            self.inside, scene.interior, scene.sensors(), samples=self._samples, seed=chosen.seed
-        )
+    def room(self, batch: int) -> NDArray[np.float64]:
+        """What sensors have of the room's cells [S, c]."""
+        if batch not in self._rooms:
+            scene = self.traced.scene
+            self._rooms[batch] = room_shares(
+                self.cells, self.inside, scene.interior, scene.sensors(),
+                samples=self._samples(ROOM_SHARE), seed=self.seed(batch),
+            )  # fmt: skip
+        return self._rooms[batch]
 
-    def view(self, g: int, j: int) -> SunShares | None:
+    def view(self, g: int, j: int, batch: int) -> SunShares | None:
         """Rows [S], through the beam of a cut group in a state; None where it has none."""
         if self.straight.matrix(g, j) is None:
             return None
-        if (g, j) not in self._views:
-            self._views[g, j] = view_shares(
+        if (g, j, batch) not in self._views:
+            self._views[g, j, batch] = view_shares(
                 self.inside, self.outside, g, self.systems[g][j].scattering,
-                self.traced.scene.sensors(), samples=self._samples, seed=self.traced.sampling.seed,
+                self.traced.scene.sensors(), samples=self._samples(SENSOR_SHARE),
+                seed=self.seed(batch),
             )  # fmt: skip
-        return self._views[g, j]
+        return self._views[g, j, batch]
 
-    @property
-    def _samples(self) -> int:
-        return max(self.traced.sampling.sensor_samples // SENSOR_SHARE, 8)
+    def _samples(self, share: int) -> int:
+        return max(self.traced.sampling.sensor_samples // share // BATCHES, 4)
 
     def light(self, sky: AnnualSky) -> ReflectedSunLight:
         """What is reflected in the sky's hours."""
@@ -111,53 +134,80 @@ class ReflectedSunLight:
         self._found, self._sky = found, sky
         self._shining = np.flatnonzero((sky.illuminance > 0) & (sky.direction[:, 2] > 0))
         self._suns = sky.direction[self._shining], sky.illuminance[self._shining]
-        self._rooms: dict[int, NDArray[np.float32]] = {}
+        self._before: dict[int, NDArray[np.float32]] = {}
 
-    @cached_property
-    def windows(self) -> Array | None:
-        """What is to be added to the luminance before the windows [Q, K, L]; None: nothing."""
-        if not self._found.outdoors_reflects:
-            return None
-        traced, shares = self._found.traced, self._found.windows
-        by_patches = times_sky(traced.daylight.values - traced.direct_daylight, self._sky.sun)
-        return self._outdoors(shares).reshape(by_patches.shape) - by_patches
-
-    def sensors(self, g: int, j: int, *, beam: bool) -> Array | float:
+    def sensors(self, g: int, j: int, *, beam: bool) -> Estimate:
         """What is to be added to the sensors' light through a group in a state [S, L].
 
         Args: beam: whether the sun's beam passes the group.
         """
-        return self.straight(g, j) + (
-            self.room(g, j) if beam and self._found.room_reflects else 0.0
+        beam = beam and self._found.room_reflects
+        found = accumulate(
+            lambda number: self._batch(number, g, j, beam=beam), stopping=Stopping(BATCHES)
+        )
+        return replace(
+            found,
+            values=self._all_hours(found.values) - self._by_patches(g, j),
+            standard_error=self._all_hours(found.standard_error),
         )
 
-    def straight(self, g: int, j: int) -> Array | float:
-        """What is to be added to the straight view of a group in a state [S, L]."""
-        shares = self._found.view(g, j) if self._found.outdoors_reflects else None
-        if shares is None:
-            return 0.0
-        traced, straight = self._found.traced, self._found.straight
-        whole, direct = straight.matrix(g, j), straight.matrix(g, j, direct=True)
-        found = self._outdoors(shares) - times_sky(whole.values - direct.values, self._sky.sun)
-        beam = straight.beam(g, j)
-        for q in traced.parts.of(g):
-            found -= (traced.direct_sensors[:, q] * beam) @ self.windows[q]
-        return found
+    def replaced(self, hours: NDArray[np.bool_]) -> Array:
+        """Luminance before the windows, the sum over some hours, by shadow rays less by patches.
 
-    def room(self, g: int, j: int) -> Array:
-        """The beam through a group in a state that the room reflects to the sensors [S, L]."""
+        Args: hours: [L] which; returns [Q, K].
+        """
+        if not self._found.outdoors_reflects:
+            return np.zeros(self._shape)
+        some = hours[self._shining]
+        mean = sum(self._windows(b)[..., some].sum(axis=-1) for b in range(BATCHES)) / BATCHES
+        return mean - self._reflected_daylight() @ self._sky.sun[:, hours].sum(axis=1)
+
+    def _batch(self, number: int, g: int, j: int, *, beam: bool) -> Array:
+        """The light of the sensors in the hours with sun [S, h]."""
         found = self._found
-        if j not in self._rooms:
-            ways = [o.scattering for o in in_state(found.systems, [j] * len(found.systems))]
-            scenes = found.inside, found.outside
-            self._rooms[j] = self._all_hours(room_light(found.room, scenes, ways, *self._suns))
-        return self._rooms[j][g]
+        light = np.zeros((len(found.traced.scene.sensors()[0]), len(self._shining)))
+        if found.outdoors_reflects:
+            for q in found.traced.parts.of(g):
+                light += found.straight.rest(g, j, q) @ self._windows(number)[q]
+            seen = found.view(g, j, number)
+            if seen is not None:
+                light += outdoor_light(seen, found.outside, *self._suns)
+        if beam:
+            light += room_light(
+                found.cells, found.room(number), (found.inside, found.outside), g,
+                found.systems[g][j].scattering, self._suns, seed=found.seed(number),
+            )  # fmt: skip
+        return light
 
-    def _outdoors(self, shares: SunShares) -> Array:
-        return self._all_hours(outdoor_light(shares, self._found.outside, *self._suns))
+    def _by_patches(self, g: int, j: int) -> Array | float:
+        """What V T D s has of the sun that the outdoors reflect, in the sensors [S, L]."""
+        if not self._found.outdoors_reflects:
+            return 0.0
+        traced, straight, sun = self._found.traced, self._found.straight, self._sky.sun
+        daylight = self._reflected_daylight()
+        parts = traced.parts.of(g)
+        light = sum(straight.rest(g, j, q) @ times_sky(daylight[q], sun) for q in parts)
+        whole, direct = straight.matrix(g, j), straight.matrix(g, j, direct=True)
+        return light if whole is None else light + times_sky(whole.values - direct.values, sun)
+
+    def _reflected_daylight(self) -> Array:
+        """D - D_d [Q, K, P]."""
+        return self._found.traced.daylight.values - self._found.traced.direct_daylight
+
+    def _windows(self, batch: int) -> NDArray[np.float32]:
+        """Luminance before the windows in the hours with sun [Q, K, h]."""
+        if batch not in self._before:
+            shares, outside = self._found.windows(batch), self._found.outside
+            light = outdoor_light(shares, outside, *self._suns)
+            self._before[batch] = light.reshape(*self._shape, -1)
+        return self._before[batch]
+
+    @property
+    def _shape(self) -> tuple[int, ...]:
+        return self._found.traced.daylight.values.shape[:2]
 
     def _all_hours(self, values: Array) -> Array:
         """Values [..., h] of the hours with sun as values [..., L] of all."""
-        found = np.zeros((*values.shape[:-1], len(self._sky.illuminance)), dtype=np.float32)
+        found = np.zeros((*values.shape[:-1], len(self._sky.illuminance)))
         found[..., self._shining] = values
         return found

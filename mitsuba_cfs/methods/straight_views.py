@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_scene import OUTDOOR_DEPTH, PhaseScene
 from mitsuba_cfs.phases import times_sky
@@ -48,6 +49,15 @@ class StraightViews:
         held = np.minimum(through, np.diag(optics.transmission))
         return held if omega @ held >= HELD * (omega @ through) else np.zeros_like(held)
 
+    def held(self, g: int, j: int) -> NDArray[np.float64]:
+        """What of T goes straight on, of a group in a state [K, K]."""
+        beams = patch_beams([self._systems[g][j].scattering], KLEMS_FULL)[0]
+        return held_beams(self.transmission(g, j), beams, KLEMS_FULL)
+
+    def transmission(self, g: int, j: int) -> NDArray[np.float64]:
+        """T of a group in a state [K, K]."""
+        return self._systems[g][j].transmission
+
     def matrix(self, g: int, j: int, *, direct: bool = False) -> Estimate | None:
         """B of a group in a state [S, P]; None where there is nothing of it.
 
@@ -71,6 +81,16 @@ class StraightViews:
             )  # fmt: skip
             self._found[g, j, direct] = found.part(np.s_[g])
         return self._found[g, j, direct]
+
+    def rest(self, g: int, j: int, q: int) -> NDArray[np.float64]:
+        """What the sensors have of the luminance before a part of a group but for B [S, K].
+
+        V T - V_d diag(tau)
+        """
+        found = self._traced.sensors.values[:, q] @ self.transmission(g, j)
+        if self.matrix(g, j) is None:
+            return found
+        return found - self._traced.direct_sensors[:, q] * self.beam(g, j)
 
     def coefficients(self, g: int, j: int) -> NDArray[np.float64] | float:
         """B - V_d diag(tau) D [S, P]."""

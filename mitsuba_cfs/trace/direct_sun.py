@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -15,32 +15,17 @@ from mitsuba_cfs.bsdf.klems import KlemsBasis
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.lit_room import PatchBeam
-from mitsuba_cfs.trace.sampling import lattice, lattice_2d, opaque, vectors
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
-from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
+from mitsuba_cfs.trace.sampling import lattice_2d, opaque, vectors
+from mitsuba_cfs.trace.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.sun_discs import Scattering, SunDiscs, SunScene, on_disc, pairs
+from mitsuba_cfs.trace.sun_ways import sun_ways
 
 BEAM_PLACES = 16  # polar angles in a patch, for the mean of a beam; a quarter as many azimuths
-DISC_STRATA = 16  # directions on the disc for each pair of sensor and sun, in each batch
-
-
-class Scattering(Protocol):
-    """How a window group passes the sun, in its local frame (z outdoors), inside a kernel.
-
-    `key` is what its values follow from, for `mitsuba_cfs.matrices.cache.digest`.
-    """
-
-    key: object
-
-    def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
-        """BSDF [1/sr] without its through peak, for light from `sun` that leaves to -`outward`."""
-
-    def through(self, sun: mi.Vector3f) -> mi.Float:
-        """Transmittance of light that goes straight on."""
 
 
 class KlemsScattering:
@@ -101,17 +86,6 @@ class PluginScattering:
 
 
 @dataclass(frozen=True)
-class _SunScene:
-    """The room, the way outdoors to the suns, the sensors and where the suns' light comes from."""
-
-    inside: TracedScene
-    way: SunWay
-    place: mi.Point3f  # [S]
-    normal: mi.Vector3f  # [S]
-    towards: mi.Vector3f  # [Q]
-
-
-@dataclass(frozen=True)
 class _Points:
     """Points on one group's windows shared by all sensors and suns of a batch."""
 
@@ -165,29 +139,33 @@ def direct_sun_matrix(
     suns = normalize(np.atleast_2d(np.asarray(suns, dtype=float)))
     if cache is not None and any(way is not None and way.key is None for way in scattering):
         raise ValueError("a BSDF plugin needs a `key` before its matrix can be kept in a cache")
-    inside = traced_scene(interior, groups)
-    outside = traced_scene(exterior, groups, windows_block=False)
+    inside = kept_scene(interior, groups)
+    outside = kept_scene(exterior, groups, windows_block=False)
     place = vectors(points - inside.centre, mi.Point3f)
     normal = vectors(directions)
     ways = [
-        _SunScene(inside, way, place, normal, vectors(way.turned(suns)))
-        for way in sun_ways(outside)
+        SunScene(inside, way, place, normal, vectors(way.turned(suns))) for way in sun_ways(outside)
     ]
+
+    @functools.cache
+    def discs() -> list[SunDiscs]:
+        return [SunDiscs(around, scattering, seed) for around in ways]
 
     def batch(number: int) -> NDArray[np.float64]:
         key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
-        found = [dr.zeros(mi.Float, len(points) * len(suns)) for _ in groups]
-        for around in ways:
-            found = [a + b for a, b in zip(found, _through(around, scattering, key), strict=True)]
+        found = [np.zeros(len(points) * len(suns), dtype=np.float32) for _ in groups]
+        for around, straight in zip(ways, discs(), strict=True):
+            found = [a + b for a, b in zip(found, straight.light(key), strict=True)]
             for g, system in enumerate(scattering):
                 if system is None:
                     continue
                 shared = _window_points(around, g, window_points, key)
-                found[g] += _scattered(inside, g, system, shared, around.towards, len(points))
+                rest = _scattered(inside, g, system, shared, around.towards, len(points))
+                found[g] = found[g] + rest.numpy()
         if not by_group:
             found = [sum(found)]
-        values = np.stack([mi.Float(part * SUN_SOLID_ANGLE).numpy() for part in found])
-        values = values.astype(float).reshape(len(found), len(points), len(suns))
+        values = np.stack(found).astype(float) * SUN_SOLID_ANGLE
+        values = values.reshape(len(found), len(points), len(suns))
         return values if by_group else values[0]
 
     keys = [None if system is None else system.key for system in scattering]
@@ -240,7 +218,7 @@ def _beam_of_patches(way: Scattering | None, basis: KlemsBasis) -> NDArray[np.fl
     return np.broadcast_to(beam, theta.size).reshape(theta.shape).mean(axis=1).astype(float)
 
 
-def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) -> _Points:
+def _window_points(around: SunScene, group: int, count: int, key: mi.UInt32) -> _Points:
     """Points on a group, what each sensor sees of them, and which suns reach them."""
     inside, place, towards = around.inside, around.place, around.towards
     j = dr.arange(mi.UInt32, count)
@@ -249,7 +227,7 @@ def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) ->
     share = opaque(inside.groups[group].area / count)  # of the area, of each point
 
     S, Q = dr.width(place), dr.width(towards)
-    sensor, point = _pairs(S, count)
+    sensor, point = pairs(S, count)
     start = dr.gather(mi.Point3f, place, sensor)
     to_point = dr.gather(mi.Point3f, position, point) - start
     distance2 = dr.squared_norm(to_point)
@@ -262,7 +240,7 @@ def _window_points(around: _SunScene, group: int, count: int, key: mi.UInt32) ->
     seen &= ~inside.scene.ray_test(shadow, coherent=False, active=seen)
     weight = dr.select(seen, cosine * outward.z / distance2 * share, 0.0)
 
-    point, sun = _pairs(count, Q)
+    point, sun = pairs(count, Q)
     ray = mi.Ray3f(
         dr.gather(mi.Point3f, position, point),
         on_disc(dr.gather(mi.Vector3f, towards, sun), point, stream),
@@ -285,7 +263,7 @@ def _scattered(
     """Sum over the points of f cos(sun) G, for each sensor and sun [S * Q]."""
     count = dr.opaque(mi.UInt32, dr.width(points.position))
     suns = dr.opaque(mi.UInt32, dr.width(towards))
-    sensor, sun = _pairs(sensors, dr.width(towards))
+    sensor, sun = pairs(sensors, dr.width(towards))
     to_sun = dr.gather(mi.Vector3f, towards, sun)
     local = inside.to_local(opaque(group, mi.Int32), to_sun, mi.Bool(True))
     weights, outwards, sunlit = points.weight, points.outward, points.sunlit
@@ -299,50 +277,3 @@ def _scattered(
             total += weight * scattering.scattered(local, outward)
         j += 1
     return total * dr.maximum(local.z, 0)
-
-
-def _through(
-    around: _SunScene, scattering: Sequence[Scattering | None], key: mi.UInt32
-) -> list[mi.Float]:
-    """Mean over the visible disc of cos(sensor) tau(sun) through each group [S * Q]."""
-    inside, place, towards = around.inside, around.place, around.towards
-    total = [dr.zeros(mi.Float, dr.width(place) * dr.width(towards)) for _ in scattering]
-    sensor, sun = _pairs(dr.width(place), dr.width(towards))
-    start = dr.gather(mi.Point3f, place, sensor)
-    stream = mi.sample_tea_32(sensor, key)[0]
-    for stratum in range(DISC_STRATA):
-        direction = on_disc(dr.gather(mi.Vector3f, towards, sun), mi.UInt32(stratum), stream)
-        cosine = dr.dot(dr.gather(mi.Vector3f, around.normal, sensor), direction)
-        ray = mi.Ray3f(start, direction)
-        hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=cosine > 0)
-        active = (cosine > 0) & hit.is_valid()
-        group = dr.gather(mi.Int32, inside.group, hit.prim_index, active)
-        active &= group != OPAQUE
-        beyond = mi.Ray3f(mi.Point3f(start + direction * hit.t), direction)
-        cosine *= around.way.reaching(beyond, active)
-        local = inside.to_local(group, direction, active)
-        active &= local.z > 0
-        for g, system in enumerate(scattering):
-            if system is not None:
-                tau = system.through(local)
-                total[g] += dr.select(active & (group == g), cosine * tau, 0.0)
-        dr.eval(*total)
-    return [part / DISC_STRATA for part in total]
-
-
-def _pairs(first: int, second: int) -> tuple[mi.UInt32, mi.UInt32]:
-    """Indices of all pairs [first * second], the second running fastest."""
-    index = dr.arange(mi.UInt32, first * second)
-    size = dr.opaque(mi.UInt32, second)
-    row = index // size
-    return row, index - row * size
-
-
-def on_disc(centre: mi.Vector3f, sample: mi.UInt32, stream: mi.UInt32) -> mi.Vector3f:
-    """A direction uniform on the sun's disc."""
-    u = mi.Point2f(lattice(sample, stream, 2), lattice(sample, stream, 3))
-    cosine = 1 - u.x * float(1 - np.cos(SUN_RADIUS))
-    sine = dr.safe_sqrt(1 - cosine * cosine)
-    phi = dr.two_pi * u.y
-    frame = mi.Frame3f(centre)
-    return frame.to_world(mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), cosine))

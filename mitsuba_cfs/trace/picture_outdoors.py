@@ -21,7 +21,6 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, RoughSun, mirrored
 from mitsuba_cfs.trace.outdoor_sun import OutdoorSun, ShownFaces
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
@@ -36,7 +35,8 @@ from mitsuba_cfs.trace.sampling import (
     tables,
     vectors,
 )
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import Places, face_places
 
 BLOCK_BYTES = 128 * 2**20
@@ -81,8 +81,8 @@ def outdoors(
         tile: pixels across of the squares that share what varies slowly over a face, by default
             as of `tile_size`.
     """
-    inside = traced_scene(interior, groups)
-    outside = traced_scene(exterior, groups)
+    inside = kept_scene(interior, groups)
+    outside = kept_scene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     faces = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])

@@ -23,10 +23,10 @@ from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.bins import DirectionBins
-from mitsuba_cfs.trace.direct_sun import Scattering
-from mitsuba_cfs.trace.sampling import lattice_2d, opaque
+from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, tables, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.straight_view import straight_rays
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import (
     Places,
     face_places,
@@ -35,7 +35,7 @@ from mitsuba_cfs.trace.sun_paths import (
 )
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
-PLACES = 2048  # that stand for all that paths meet, at most
+PLACES = 1024  # that stand for all that paths meet, at most
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
 LANES = 2**22  # shadow rays at once
@@ -76,8 +76,8 @@ def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunSh
 
     Args: samples: paths of each patch.
     """
-    bins, met = DirectionBins(KLEMS_FULL), []
-    K = bins.size
+    bins, starts = DirectionBins(KLEMS_FULL), []
+    K, count = bins.size, len(outside.groups) * bins.size
     for q in range(len(outside.groups)):
         path = dr.arange(mi.UInt32, K * samples)
         patch = path // dr.opaque(mi.UInt32, samples)
@@ -86,18 +86,13 @@ def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunSh
         stream = mi.sample_tea_32(patch, key)[0]
         way = outside.to_world(q, bins.sample(patch, lattice_2d(sample, stream, 0)))
         position = outside.sample_group(q, lattice_2d(sample, stream, 2))
-        weight = opaque(1.0 / samples) + dr.zeros(mi.Float, K * samples)
-        met.append(
-            _met(
-                outside,
-                opaque(q * K, mi.UInt32) + patch,
-                weight,
-                position,
-                way,
-                seed * 1_000_003 + q,
-            )
-        )
-    return SunShares.of(met, len(outside.groups) * K, seed)
+        starts.append(tables(position, way))
+    # the paths of all parts at once: each bounce is a launch
+    position, way = (np.concatenate(part) for part in zip(*starts, strict=True))
+    row = column(np.repeat(np.arange(count), samples), mi.UInt32)
+    weight = opaque(1.0 / samples) + dr.zeros(mi.Float, count * samples)
+    met = _met(outside, row, weight, vectors(position, mi.Point3f), vectors(way), seed)
+    return SunShares.of([met], count, seed)
 
 
 def view_shares(

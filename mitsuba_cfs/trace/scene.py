@@ -6,6 +6,7 @@ import atexit
 from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -291,26 +292,26 @@ class TracedScene:
         return x * v.x + y * v.y + z * v.z
 
 
-def traced_scene(
+def kept_scene(
     surfaces: Surfaces,
     groups: Sequence[WindowGroup] = (),
     *,
     windows_block: bool = True,
     window_reflectance: ArrayLike | None = None,
+    centre: ArrayLike | None = None,
 ) -> TracedScene:
     """A `TracedScene` of its arguments; that of the same objects is found again among the last.
 
     A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
     of thousands of triangles.
     """
-    reflectance = None if window_reflectance is None else np.asarray(window_reflectance, float)
+    given = {"window_reflectance": window_reflectance, "centre": centre}
+    values = {name: v if v is None else np.asarray(v, float) for name, v in given.items()}
     inputs = (surfaces, *groups)
-    key = (
-        variants.activate(), windows_block, None if reflectance is None else reflectance.tobytes(),
-        *map(id, inputs),
-    )  # fmt: skip
+    known = (v if v is None else v.tobytes() for v in values.values())
+    key = (variants.activate(), windows_block, *known, *map(id, inputs))
     if key not in _last_scenes:
-        options = {"windows_block": windows_block, "window_reflectance": reflectance}
+        options: dict[str, Any] = {"windows_block": windows_block, **values}
         _last_scenes[key] = inputs, TracedScene(surfaces, groups, **options)
     _last_scenes.move_to_end(key)
     while len(_last_scenes) > KEPT:

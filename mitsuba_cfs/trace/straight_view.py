@@ -19,7 +19,6 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import (
@@ -30,7 +29,8 @@ from mitsuba_cfs.trace.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.scene import TracedScene, traced_scene
+from mitsuba_cfs.trace.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.sun_discs import Scattering
 
 
 def straight_view_matrix(
@@ -62,7 +62,7 @@ def straight_view_matrix(
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
-    inside, outside = traced_scene(interior, groups), traced_scene(exterior, groups)
+    inside, outside = kept_scene(interior, groups), kept_scene(exterior, groups)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:

@@ -155,8 +155,12 @@ def sunlight(
     """Cosine of the sun at places outdoors where it shines, also out of mirrors, else 0 [m, h]."""
     light = mi.Float(0)
     for way in sun_ways(outside):
-        point, normal, to_sun = place_and_hour(places, way.turned(suns))
-        cosine = dr.dot(normal, to_sun)
-        share = way.reaching(mi.Ray3f(point, to_sun), cosine > 0)
+        turned = way.turned(suns)
+        point, normal, to_sun = place_and_hour(places, turned)
+        # the disc's own mean where all of it is above the place's horizon: one direction has noise
+        middle = column((places.normal @ turned.T).ravel())
+        slant = dr.dot(normal, to_sun)
+        cosine = dr.select(middle > SUN_RADIUS, middle, slant)
+        share = way.reaching(mi.Ray3f(point, to_sun), slant > 0)
         light += dr.select(cosine > 0, cosine * share, 0.0)
     return light.numpy().reshape(places.size, len(suns))

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.direct_sun import on_disc
 from mitsuba_cfs.trace.sampling import lattice, vectors
 from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.sun_discs import on_disc
 
 RAYS = 2**24  # at once
 

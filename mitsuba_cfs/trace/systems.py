@@ -17,8 +17,9 @@ from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
-from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering, Scattering
+from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering
 from mitsuba_cfs.trace.lit_room import AngularBeam, PatchBeam, PathOptics
+from mitsuba_cfs.trace.sun_discs import Scattering
 
 WINDOW_UP = (0, 1, 0)  # of a plugin that is asked in the window's own frame
 

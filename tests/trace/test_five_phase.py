@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -246,16 +249,16 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     view, direct_view = matrices.sensors.values, matrices.direct_sensors
     expected = phases.three_phase(view, t, matrices.daylight.values, sky.whole)
     expected -= phases.three_phase(direct_view, t, matrices.direct_daylight, sky.sun)
-    by_patch, _ = phases.sun_beams(
-        t, patch_beams(ways, KLEMS_FULL),
-        through_beams(scene.groups, ways, sky.direction), matrices.direct_daylight, sky.sun,
-    )  # fmt: skip
+    beams = patch_beams(ways, KLEMS_FULL)
+    held = [held_beams(one, beam, KLEMS_FULL) for one, beam in zip(t, beams, strict=True)]
+    assert np.array_equal(held[0], t[0])  # glass is a beam and nothing else
+    at_sun = through_beams(scene.groups, ways, sky.direction)
+    by_patch, _ = phases.sun_beams(held, at_sun, matrices.direct_daylight, sky.sun)
     filled = PhaseSystems(matrices, [[one] for one in chosen])
     straight, more = filled.straight, filled.reflected_sun.light(sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
-    expected += more.room(0, 0)
-    expected += sum(view[:, g] @ (t[g] @ more.windows[g]) for g in range(2))
-    expected += straight.light(0, 0, sky) + more.straight(0, 0)
+    expected += more.sensors(0, 0, beam=True).values + more.sensors(1, 0, beam=False).values
+    expected += straight.light(0, 0, sky)
     assert straight.matrix(1, 0) is None  # the diffuser has no beam
     expected += exact.values * sky.illuminance / SUN_SOLID_ANGLE
     assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision
@@ -271,6 +274,39 @@ def test_a_beam_that_lies_beside_the_diagonal_too_is_not_counted_twice(corner):
     beside = GivenOptics(spread, clear.scattering)
     found = [PhaseSystems(matrices, [[one], [diffuser(0.2)]]).straight for one in (clear, beside)]
     assert found[0].beam(0, 0).any() and not found[1].beam(0, 0).any()
+
+
+def test_what_t_has_of_a_beam_beside_the_diagonal_is_taken_with_it():
+    clear = glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
+    scattered = np.full((K, K), 0.05 / np.pi) * OMEGA
+    near = KLEMS_FULL.outgoing_directions() @ KLEMS_FULL.outgoing_directions().T
+    beside = np.argsort(-near, axis=0)[1]  # the patch next to each
+    T, beam = scattered.copy(), 0.9 * clear
+    T[np.arange(K), np.arange(K)] += 0.7 * beam
+    T[beside, np.arange(K)] += 0.3 * beam * OMEGA / OMEGA[beside]
+    held = held_beams(T, beam, KLEMS_FULL)
+    assert OMEGA @ held / OMEGA == pytest.approx(beam, rel=1e-9)  # all of its light
+    assert np.all(held <= T + 1e-12) and np.all(held >= 0)
+    assert held[near < np.cos(np.radians(40))].max() == 0
+    diagonal = held_beams(scattered + np.diag(beam), beam, KLEMS_FULL)
+    assert diagonal == pytest.approx(np.diag(beam), abs=1e-12)
+
+
+def test_the_room_has_a_beam_once_wherever_t_has_it(corner):
+    """T of a tensor tree has a part of its beam beside the diagonal: the room reflects it once."""
+    from mitsuba_cfs.methods.optics import GivenOptics
+
+    clear, sky = glass(), replace(corner[1], whole=corner[1].sun)
+    room, groups = rooms.test_room()
+    scene = traced(room, rooms.NOTHING, groups, POINTS, subdivision=1)
+    ways = KLEMS_FULL.outgoing_directions()
+    beside = np.argsort(-(ways @ ways.T), axis=0)[1]
+    spread = 0.6 * clear.transmission
+    spread[beside, np.arange(K)] += 0.4 * np.diag(clear.transmission) * OMEGA / OMEGA[beside]
+    tree = GivenOptics(spread, clear.scattering)
+    found, expected = (lit(scene, [[one]], sky) for one in (tree, clear))
+    assert expected[:, [0, 2]].min() > 500  # the second sun is behind the facade
+    assert found == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_suns_light_by_group_adds_up_to_that_of_the_room(corner):

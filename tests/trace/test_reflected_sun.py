@@ -100,6 +100,19 @@ def test_each_place_stands_for_those_of_its_own_face():
     assert dark.max() < 1e-3 * sunlit.mean()  # the wall's own thousandth of it
 
 
+def test_what_stands_before_the_sun_leaves_a_floor_dark():
+    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
+    from mitsuba_cfs.trace.scene import TracedScene
+
+    floor = rooms.quad((-40, -40, 0), (40, -40, 0), (40, 0, 0), (-40, 0, 0))
+    roof = rooms.quad((-60, -60, 30), (60, -60, 30), (60, 60, 30), (-60, 60, 30))
+    outside = TracedScene(rooms.surfaces([(floor, 0.5), (roof, 0.0)]), rooms.test_room()[1])
+    suns = np.array([[0.0, 0.0, 1.0], towards(1, 0)])  # the second shines in below the roof
+    shares = window_shares(outside, samples=16)
+    found = outdoor_light(shares, outside, suns, np.full(2, LUX))
+    assert np.all(found[:, 0] == 0) and found[:, 1].max() > 100
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("sun", [towards(45, 10), towards(30, 50)], ids=["high", "aside"])
 def test_the_sun_reflected_below_an_overhang_is_that_of_paths(sun):
@@ -107,9 +120,79 @@ def test_the_sun_reflected_below_an_overhang_is_that_of_paths(sun):
     agrees(found, expected, error)
 
 
+def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
+    """A closed room of one reflectance: rho / (1 - rho) of the flux over its area, on average."""
+    from mitsuba_cfs.methods.optics import BsdfOptics
+    from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
+    from mitsuba_cfs.trace.room_beam import room_cells, room_light, room_shares
+    from mitsuba_cfs.trace.scene import TracedScene
+
+    def square(k: int, at: float):
+        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float) * 3
+        return rooms.quad(*np.insert(corners, k, at, axis=1))
+
+    room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
+    hole = rooms.quad((1, 1e-3, 1), (2, 1e-3, 1), (2, 1e-3, 2), (1, 1e-3, 2))
+    group = WindowGroup("south", (WindowSurface("hole", hole),))
+    inside, outside = TracedScene(room, [group]), TracedScene(rooms.NOTHING, [group])
+    cells, rng = room_cells(inside, room), np.random.default_rng(1)
+    assert np.diff(cells.first).sum() == cells.points.size
+    # sensors evenly over the surfaces, facing inwards: their mean is the room's
+    n = 128
+    places = rng.random((6 * n, 3)) * 2.99 + 0.005
+    side, normals = np.repeat(np.arange(6), n), np.zeros((6 * n, 3))
+    places[np.arange(6 * n), side // 2] = np.where(side % 2, 2.995, 0.005)
+    normals[np.arange(6 * n), side // 2] = np.where(side % 2, -1.0, 1.0)
+    share = room_shares(cells, inside, room, (places, normals), samples=256)
+    sun = towards(40, 20)[None]
+    way = BsdfOptics(clear_glass()).scattering
+    lux = room_light(cells, share, (inside, outside), 0, way, (sun, np.array([LUX])))
+    flux = 0.8 * LUX * -sun[0, 1] * 1.0
+    wall = TracedScene(rooms.surfaces([(9 * square(1, 0.0) - 12, 0.0)]), [group])
+    hidden = room_light(cells, share, (inside, wall), 0, way, (sun, np.array([LUX])))
+    assert np.all(hidden == 0)
+    # light that the black hole of 1 m2 in 54 takes: twice, as it hides the wall behind it
+    assert lux.mean() == pytest.approx(0.6 / (1 - 0.6 * (1 - 1 / 54)) * flux / 54, rel=0.03)
+
+
 def test_the_beam_that_the_room_reflects_is_that_of_paths():
     found, expected, error = both(rooms.NOTHING, sun_alone(towards(30, 50)))
     agrees(found, expected, error)
+
+
+def reflected(exterior: Surfaces, sky: AnnualSky, **sampling):
+    """Light of the test room behind clear glass by five phases, without the direct sun [S, L]."""
+    from mitsuba_cfs.methods.optics import BsdfOptics
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+
+    few = {"sensor_samples": 4096, "patch_samples": 512, "subdivision": 1} | sampling
+    traced = PhaseScene(scene(exterior), Sampling(**few))
+    light = PhaseSystems(traced, [[BsdfOptics(clear_glass())]]).light(sky)
+    return light.illuminance() - light.direct_sun(), light.relative_error()
+
+
+def test_a_cut_window_lets_as_much_sun_into_the_room_as_a_whole_one():
+    """The parts' scene had another origin than the room's: a fifth of the beam was lost."""
+    black = rooms.surfaces([(overhang(2.0).triangles, 0.0)])
+    sky = sun_alone(towards(30, 50))
+    few = {"sensor_samples": 512, "patch_samples": 64}
+    whole, parts = (reflected(black, sky, window_parts=n, **few)[0] for n in (1, 3))
+    assert whole.min() > 5
+    assert parts == pytest.approx(whole, rel=0.02)  # the same rays but for what parts hide
+
+
+@pytest.mark.slow
+def test_the_stated_error_is_the_spread_over_seeds_of_the_reflected_sun():
+    sky = sun_alone(towards(30, 50))
+    runs = [reflected(overhang(2.0), sky, seed=seed) for seed in range(8)]
+    values, said = np.stack([r[0][:, 0] for r in runs]), np.stack([r[1] for r in runs])
+    spread = (values.std(axis=0, ddof=1) / values.mean(axis=0)) ** 2
+    quotient = np.sqrt((said**2).mean(axis=0).sum() / spread.sum())
+    # of seven degrees of freedom and three sensors that share paths: a factor of two
+    assert 0.5 < quotient < 2.0
+    assert spread.max() > 0.003**2
 
 
 @pytest.mark.slow

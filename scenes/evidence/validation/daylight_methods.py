@@ -37,10 +37,10 @@ from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.direct_sun import Scattering
 from mitsuba_cfs.trace.estimate import Stopping
 from mitsuba_cfs.trace.lit_room import LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.point_in_time import point_in_time
+from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.systems import lit_system, sun_scattering
 from mitsuba_cfs.trace.view_matrix import view_matrix
 from scenes.evidence.validation.blind_room import (

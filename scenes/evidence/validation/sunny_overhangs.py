@@ -37,7 +37,7 @@ from scenes.evidence.validation.cut_groups import (
 )
 
 SUNS = ((20, 0), (45, 10), (62, -25), (30, 50))  # altitude, azimuth from south to east [degrees]
-SEEDS = 3
+SEEDS = 2
 
 
 def sunny() -> AnnualSky:

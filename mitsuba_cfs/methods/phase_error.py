@@ -1,0 +1,92 @@
+"""The standard error of sensors' light by the matrices of the phase methods."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.reflected_sun import ReflectedSunLight
+from mitsuba_cfs.methods.straight_views import StraightViews
+from mitsuba_cfs.methods.subdivision import coarse_sky
+from mitsuba_cfs.sky.annual import AnnualSky
+
+
+def matrix_variance(
+    traced: PhaseScene,
+    straight: StraightViews,
+    sky: AnnualSky,
+    state: NDArray[np.int64],
+    reflected: ReflectedSunLight | None,
+) -> NDArray[np.float64]:
+    """Variance of each sensor's mean over the hours by V, D and B [S], with what D's means leave.
+
+    Args:
+        state: [G, L] of each window group in each hour.
+        reflected: the sun that is taken by shadow rays; of it the matrices have no part.
+    """
+    found = np.zeros(len(traced.scene.sensors()[0]))
+    hours = len(sky.lit)
+    lit = sky.whole if reflected is None else sky.without_sun()
+    for g, row in enumerate(state):
+        left = np.zeros(len(found))
+        for j in np.unique(row):
+            some = row == j
+            mean, sun = lit[:, some].sum(axis=1) / hours, None
+            if reflected is not None:
+                sun = sky.sun[:, some].sum(axis=1) / hours, reflected.replaced(some) / hours
+            for q in traced.parts.of(g):
+                found += _part_variance(traced, straight, (g, j, q), mean, sun)
+            seen = straight.matrix(g, j)
+            if seen is not None:
+                found += seen.error_of(mean) ** 2
+            left += _left_by_means(traced, straight, (g, j), sky, some)
+        found += left**2
+    return found
+
+
+def _part_variance(
+    traced: PhaseScene,
+    straight: StraightViews,
+    which: tuple[int, int, int],
+    sky: NDArray[np.float64],
+    sun: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+) -> NDArray[np.float64]:
+    """Variance of the sensors [S] by V and D of a part of a group in a state.
+
+    Args: sky: [P] mean luminance; sun: the sun's on its patches [P], and what the outdoors send
+        of it to the windows' patches less what D has of that [Q, K].
+    """
+    g, j, q = which
+    transmission, before = straight.transmission(g, j), traced.daylight.values[q] @ sky
+    if sun is not None:
+        on_patches, replaced = sun
+        before = before + traced.daylight.values[q] @ on_patches + replaced[q]
+        direct = traced.direct_daylight[q] @ on_patches
+        through = transmission @ before - straight.held(g, j) @ direct
+    else:
+        through = transmission @ before
+    by_view = traced.sensors.part(np.s_[:, q]).error_of(np.maximum(through, 0.0))
+    by_daylight = straight.rest(g, j, q) ** 2 @ traced.daylight.part(np.s_[q]).error_of(sky) ** 2
+    return by_view**2 + by_daylight
+
+
+def _left_by_means(
+    traced: PhaseScene,
+    straight: StraightViews,
+    which: tuple[int, int],
+    sky: AnnualSky,
+    some: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """What means over a group's parts change in the sensors' mean [S] in some of the hours."""
+    g, j = which
+    points, normals = traced.scene.sensors()
+    passed = sky.without_sun() if traced.five_phase else sky.whole
+    mean = coarse_sky(passed[:, some], traced.sampling.subdivision).sum(axis=1, keepdims=True)
+    if not traced.parts.cells or not mean.any():
+        return np.zeros(len(points))
+    through = straight.transmission(g, j)
+    if straight.matrix(g, j) is not None:
+        through = through - np.diag(straight.beam(g, j))
+    error = traced.parts.cells[g].error(points, normals, through, mean / len(some))
+    return error[:, 0]
