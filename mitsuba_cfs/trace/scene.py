@@ -6,7 +6,6 @@ import atexit
 from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -305,13 +304,18 @@ def kept_scene(
     A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
     of thousands of triangles.
     """
-    given = {"window_reflectance": window_reflectance, "centre": centre}
-    values = {name: v if v is None else np.asarray(v, float) for name, v in given.items()}
+    values = (window_reflectance, centre)
+    arrays = [None if value is None else np.asarray(value, float) for value in values]
     inputs = (surfaces, *groups)
-    known = (v if v is None else v.tobytes() for v in values.values())
-    key = (variants.activate(), windows_block, *known, *map(id, inputs))
+    key = (
+        variants.activate(), windows_block, *(None if a is None else a.tobytes() for a in arrays),
+        *map(id, inputs),
+    )  # fmt: skip
     if key not in _last_scenes:
-        options: dict[str, Any] = {"windows_block": windows_block, **values}
+        reflectance, middle = arrays
+        options = {
+            "windows_block": windows_block, "window_reflectance": reflectance, "centre": middle,
+        }  # fmt: skip
         _last_scenes[key] = inputs, TracedScene(surfaces, groups, **options)
     _last_scenes.move_to_end(key)
     while len(_last_scenes) > KEPT:
