@@ -236,9 +236,8 @@ class PhaseLight:
 
     @cached_property
     def _reflected_sun(self) -> ReflectedSunLight | None:
-        """The sun that diffuse surfaces reflect; None where some mirror it: then by patches."""
-        scene = self._traced.scene
-        if not self._traced.five_phase or scene.interior.glossy or scene.exterior.glossy:
+        """The sun that surfaces reflect; None where the room's mirror it: then by patches."""
+        if not self._traced.five_phase or self._traced.scene.interior.glossy:
             return None
         return self.filled.reflected_sun.light(self.sky)
 

@@ -186,6 +186,18 @@ class TracedScene:
         gloss = self.gloss.specular(triangle, cosine, active)
         return self.diffuse(triangle, cosine, active) + gloss
 
+    def without_mirrors(
+        self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.Float:
+        """The same without what a smooth mirror reflects."""
+        if self.gloss is None:
+            return self.whole(triangle, direction, active)
+        normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
+        cosine = dr.abs(dr.dot(normal, direction))
+        rough = self.gloss.roughness(triangle, active) > 0
+        gloss = dr.select(rough, self.gloss.specular(triangle, cosine, active), 0.0)
+        return self.diffuse(triangle, cosine, active) + gloss
+
     def bounce(
         self,
         hit: mi.PreliminaryIntersection3f,
