@@ -303,7 +303,7 @@ class TracedScene:
         return x * v.x + y * v.y + z * v.z
 
 
-def traced_scene(
+def kept_scene(
     surfaces: Surfaces,
     groups: Sequence[WindowGroup] = (),
     *,

@@ -97,18 +97,18 @@ def test_second_room_compiles_nothing(traced):
 
 
 def test_scene_of_the_same_objects_is_found_again_and_no_other():
-    from mitsuba_cfs.trace.scene import KEPT, traced_scene
+    from mitsuba_cfs.trace.scene import KEPT, kept_scene
 
     interior, groups = rooms.test_room()
-    first = traced_scene(interior, groups)
-    assert traced_scene(interior, list(groups)) is first
+    first = kept_scene(interior, groups)
+    assert kept_scene(interior, list(groups)) is first
     others = [
-        traced_scene(interior, groups, windows_block=False),
-        traced_scene(interior, groups, window_reflectance=[0.2]),
-        traced_scene(interior, groups, window_reflectance=[0.4]),
-        traced_scene(rooms.test_room()[0], groups),
+        kept_scene(interior, groups, windows_block=False),
+        kept_scene(interior, groups, window_reflectance=[0.2]),
+        kept_scene(interior, groups, window_reflectance=[0.4]),
+        kept_scene(rooms.test_room()[0], groups),
     ]
     assert len({id(scene) for scene in (first, *others)}) == 5
     for _ in range(KEPT):
-        traced_scene(rooms.test_room()[0], groups)
-    assert traced_scene(interior, groups) is not first
+        kept_scene(rooms.test_room()[0], groups)
+    assert kept_scene(interior, groups) is not first
