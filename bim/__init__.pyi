@@ -1,9 +1,13 @@
 """The names of `import bim`, and the modules that they come from."""
 
 from .account import Account as Account
+from .context.surroundings import with_surroundings as with_surroundings
 from .fenestration import ShadingState as ShadingState
 from .gbxml.building import read_gbxml as read_gbxml
+from .gbxml.write import write_gbxml as write_gbxml
+from .georeference import Georeference as Georeference
 from .honeybee.building import read_honeybee as read_honeybee
+from .honeybee.write import write_honeybee as write_honeybee
 from .ifc.building import read_ifc as read_ifc
 from .ifc.corrections import Corrections as Corrections, read_corrections as read_corrections
 from .ifc.fenestration_read import read_fenestration as read_fenestration

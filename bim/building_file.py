@@ -28,6 +28,8 @@ class ReadOptions:
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     furniture: bool = False  # whether what stands in the rooms is in their light and views
     apertures: tuple[str, ...] = ()  # materials of the surfaces that are windows
+    surroundings: tuple[Path, ...] = ()  # files of what stands around, with any format
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,12 @@ def read_building_file(
     for field, value in (("join", options.join), ("apertures", options.apertures)):
         if value and field not in kind.has:
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
-    return kind.read(path, options, progress or (lambda stage, fraction: None))
+    building = kind.read(path, options, progress or (lambda stage, fraction: None))
+    if not options.surroundings:
+        return building
+    from bim.context.surroundings import with_surroundings
+
+    return with_surroundings(building, options.surroundings, options.surroundings_offset)
 
 
 def check_building_file(path: str | PathLike[str]) -> None:

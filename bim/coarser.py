@@ -7,6 +7,7 @@ bounds a room.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,12 +39,15 @@ def coarser(elements: list[Element]) -> tuple[list[Element], list[Problem]]:
 
 
 def coarser_mesh(
-    triangles: NDArray[np.float64], most: int = FINE
+    triangles: NDArray[np.float64], most: int = FINE, steps: Sequence[float] = STEPS
 ) -> tuple[NDArray[np.float64], float]:
-    """Triangles [M, 3, 3], at most `most` where that can be, and how far a vertex moved [m]."""
+    """Triangles [M, 3, 3], at most `most` where that can be, and how far a vertex moved [m].
+
+    Args: steps: rising sizes of the grids' cells [m], tried in turn.
+    """
     best, error = triangles, 0.0
     area = _area(triangles)
-    for step in STEPS:
+    for step in steps:
         if len(best) <= most:
             break
         merged, moved = _merged(triangles, step)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bim.account import Account
 from bim.fenestration import ShadingState
+from bim.georeference import Georeference
 from bim.names import found_by_name, label_of
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import Gloss
@@ -234,6 +235,7 @@ class Building:
     elevation: float = 0.0  # above the sea [m]
     file: Path | None = None  # that it was read from
     account: Account | None = None  # what of the file came through; None where there is no file
+    georeference: Georeference | None = None  # where it lies on a map, as its file states it
 
     @property
     def windows(self) -> tuple[Window, ...]:

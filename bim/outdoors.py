@@ -36,7 +36,7 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
     """Elements with holes cut, or left out, where they lie on the glass of a window."""
     elements = list(elements)
     problems: list[Problem] = []
-    for _ in range(3):  # a second element may lie behind the first
+    for _ in range(3 if elements else 0):  # a second element may lie behind the first
         mesh = ray_mesh(np.concatenate([e.triangles for e in elements] or [np.empty((0, 3, 3))]))
         owner = np.repeat(np.arange(len(elements)), [len(e.triangles) for e in elements])
         covers: dict[int, list[Window]] = {}

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Building, Element, Face, Space
+from bim.radiance_script import run_script
 from bim.sensors import sensor_grid, view_point
+from bim.surface_sensors import surface_sensors
 from bim.to_tracer import window_groups
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
@@ -55,6 +57,8 @@ class RadianceFiles:
     sky: Path  # ground and sky as rfluxmtx receivers
     sensors: Path  # x y z dx dy dz on each line
     view: Path  # fisheye view file
+    surfaces: Path  # as the sensors: on every face of the room, looking into it
+    script: Path  # illuminance by Radiance alone
 
 
 def write_radiance(
@@ -71,6 +75,7 @@ def write_radiance(
 ) -> RadianceFiles:
     """Write the room, what stands outdoors, its window groups, sensors and a view into a folder.
 
+    `run.sh` there computes the sensors' illuminance with Radiance alone.
     The view matrix of a group is
     `rfluxmtx -I+ -faa - windows_<group>.rad -i room.oct < sensors.pts`, its daylight matrix
     `rfluxmtx windows_<group>.rad sky.rad -i outdoors.oct`, with room.oct made of materials and room
@@ -109,7 +114,18 @@ def write_radiance(
         f"rvu -vta -vp {_numbers(position)} -vd {_numbers(direction)} -vu 0 0 1 -vh 180 -vv 180"
     )
     view = _write(folder / "view.vf", [fisheye + "\n"])
-    return RadianceFiles(written, room, scene, windows, bsdfs, sky, sensors, view)
+    surfaces = _write(folder / "surfaces.pts", _surface_lines(space, spacing))
+    files = {identifier(name): bsdfs.get(name) for name in windows}
+    script = _write(folder / "run.sh", [run_script(files, sky_division)])
+    script.chmod(0o755)
+    return RadianceFiles(written, room, scene, windows, bsdfs, sky, sensors, view, surfaces, script)
+
+
+def _surface_lines(space: Space, spacing: float) -> Iterable[str]:
+    """Sensors on the faces of a room, in their order, those that a grid point lies on."""
+    for face in space.faces:
+        points, directions = surface_sensors(face, (spacing, spacing, spacing))
+        yield from (_numbers(row) + "\n" for row in np.concatenate([points, directions], axis=1))
 
 
 def identifier(name: str) -> str:

@@ -17,6 +17,7 @@ from thermal.network import Network, network
 from thermal.ventilation import AirTransfer
 from thermal.zone import Zone
 
+HOUR = 3600.0  # [s]
 AIR_GAS_CONSTANT = 287.055  # [J/(kg K)]
 
 
@@ -75,10 +76,12 @@ def simulate(
     solar: Solar,
     *,
     step_s: float = 600.0,
+    row_s: float = HOUR,
     options: BalanceOptions | None = None,
 ) -> ZoneResult:
     """The year of one zone; see `simulate_zones`."""
-    return simulate_zones([zone], climate, [solar], step_s=step_s, options=options)[0]
+    (found,) = simulate_zones([zone], climate, [solar], step_s=step_s, row_s=row_s, options=options)
+    return found
 
 
 def simulate_zones(
@@ -87,6 +90,7 @@ def simulate_zones(
     solar: Sequence[Solar],
     *,
     step_s: float = 600.0,
+    row_s: float = HOUR,
     options: BalanceOptions | None = None,
     air_links: ArrayLike | None = None,
     transfers: Sequence[AirTransfer] = (),
@@ -96,7 +100,8 @@ def simulate_zones(
 
     Args:
         zones, solar: one entry per zone, windows and surfaces in the zone's order.
-        step_s: a whole fraction of an hour [s]; backward Euler, so any length is stable.
+        step_s: a whole fraction of a row [s]; backward Euler: any length is stable.
+        row_s: length [s] of the climate's rows, which everywhere else are said to be hours.
         air_links: [Z, Z] air exchanged between zones through openings [m3/s], symmetric.
         transfers: air that flows one way from zone to zone.
         progress: called with 0 and 1.
@@ -107,7 +112,7 @@ def simulate_zones(
     """
     options = BalanceOptions() if options is None else options
     require(len(zones) == len(solar) > 0, "solar", f"expected one entry for each of {len(zones)}")
-    steps = _steps_per_hour(step_s)
+    steps = _steps_per_row(step_s, row_s)
     if progress:
         progress(0.0)
     link = _links(air_links, len(zones))
@@ -131,7 +136,8 @@ def simulate_zones(
     weather = _weather(climate, steps)
     state = _start(net, len(zones), options.start_c)
     work = _work(net, len(zones))
-    days = kernel.warm_up(net, state, work, weather, drive, method)
+    rows = min(round(24 * HOUR / row_s), climate.hours)
+    days = kernel.warm_up(net, state, work, weather, drive, method, rows=rows)
     means = kernel.hourly_means(climate.hours, state)
     kernel.advance(net, state, work, weather, drive, method, climate.hours, means)
     terms = means.terms / steps
@@ -147,10 +153,11 @@ def _choice(item: str, value: str, known: Sequence[str]) -> None:
     require(value in known, item, f"{value!r} is not of {', '.join(known)}")
 
 
-def _steps_per_hour(step_s: float) -> int:
-    steps = round(3600.0 / step_s) if step_s > 0 else 0
-    fits = steps >= 1 and abs(steps * step_s - 3600.0) < 1e-6
-    require(fits, "time step", f"{step_s} s is not a whole fraction of an hour")
+def _steps_per_row(step_s: float, row_s: float) -> int:
+    steps = round(row_s / step_s) if step_s > 0 else 0
+    fits = steps >= 1 and abs(steps * step_s - row_s) < 1e-6
+    whole = "an hour" if row_s == HOUR else f"{row_s:g} s"
+    require(fits, "time step", f"{step_s} s is not a whole fraction of {whole}")
     return steps
 
 

@@ -65,38 +65,43 @@ def operative_from_films(
     return (h_r * np.asarray(mrt_c) + h_c * np.asarray(air_c)) / (h_r + h_c)
 
 
-def running_mean(outdoor_c: ArrayLike, *, alpha: float = 0.7, days: int = 7) -> NDArray[np.float64]:
+def running_mean(
+    outdoor_c: ArrayLike, *, alpha: float = 0.7, days: int = 7, per_day: int = 24
+) -> NDArray[np.float64]:
     """Running mean outdoor temperature [H] [degC] of the days before, the year taken as cyclic.
 
     (1 - a) sum_k a^(k-1) t_(d-k) / (1 - a^n): the division, missing in the dissertation, makes the
     weights sum to 1.  EN 16798-1: alpha 0.8.
     """
-    daily = _daily_means(outdoor_c)
+    daily = _daily_means(outdoor_c, per_day)
     require(0.0 < alpha < 1.0, "running mean", f"alpha must lie between 0 and 1, got {alpha}")
     weights = alpha ** np.arange(days)
-    return _days_before(daily, weights / weights.sum())
+    return _days_before(daily, weights / weights.sum(), per_day)
 
 
-def running_mean_en16798(outdoor_c: ArrayLike) -> NDArray[np.float64]:
+def running_mean_en16798(outdoor_c: ArrayLike, *, per_day: int = 24) -> NDArray[np.float64]:
     """Running mean [H] [degC] of seven days with the weights of EN 16798-1, eq. (B.2)."""
     weights = np.array([1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2])
-    return _days_before(_daily_means(outdoor_c), weights / 3.8)
+    return _days_before(_daily_means(outdoor_c, per_day), weights / 3.8, per_day)
 
 
 def prevailing_mean(outdoor_c: ArrayLike, *, days: int = 30) -> NDArray[np.float64]:
     """Plain mean [H] [degC] of the days before (ASHRAE 55 allows 7 to 30; EnergyPlus uses 30)."""
-    return _days_before(_daily_means(outdoor_c), np.full(days, 1.0 / days))
+    return _days_before(_daily_means(outdoor_c, 24), np.full(days, 1.0 / days), 24)
 
 
-def _daily_means(outdoor_c: ArrayLike) -> NDArray[np.float64]:
+def _daily_means(outdoor_c: ArrayLike, per_day: int) -> NDArray[np.float64]:
     outdoor = np.asarray(outdoor_c, dtype=float)
-    require(len(outdoor) % 24 == 0, "outdoor temperature", "expected whole days of 24 hours")
-    return outdoor.reshape(-1, 24).mean(axis=1)
+    whole = f"expected whole days of {per_day} values"
+    require(len(outdoor) % per_day == 0, "outdoor temperature", whole)
+    return outdoor.reshape(-1, per_day).mean(axis=1)
 
 
-def _days_before(daily: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def _days_before(
+    daily: NDArray[np.float64], weights: NDArray[np.float64], per_day: int
+) -> NDArray[np.float64]:
     mean = sum(w * np.roll(daily, k + 1) for k, w in enumerate(weights))
-    return np.repeat(mean, 24)
+    return np.repeat(mean, per_day)
 
 
 @dataclass(frozen=True, slots=True)

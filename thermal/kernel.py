@@ -143,12 +143,14 @@ def warm_up(
     weather: OutdoorConditions,
     drive: Drive,
     method: Method,
+    *,
+    rows: int = 24,
 ) -> int:
-    """Repeat the first day until it ends as it began; returns the number of days."""
+    """Repeat the first day, of so many rows, until it ends as it began; how many days that took."""
     for day in range(method.warm_days):
         before = np.concatenate([state.node, state.inner])
-        unused = hourly_means(24, state)
-        advance(net, state, work, weather, drive, method, 24, unused)
+        unused = hourly_means(rows, state)
+        advance(net, state, work, weather, drive, method, rows, unused)
         change = np.abs(np.concatenate([state.node, state.inner]) - before).max()
         if change < method.warm_tolerance:
             return day + 1

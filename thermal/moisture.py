@@ -83,11 +83,13 @@ def zone_humidity(
     outdoor_c: FloatArray,
     pressure: FloatArray,
     between: FloatArray | None = None,
+    *,
+    row_s: float = 3600.0,
 ) -> tuple[Humidity, ...]:
     """The humidity of zones [Z] over the hours H.
 
     Args: outdoor_ratio: [H] [kg/kg]; between: [Z, Z] or [H, Z, Z] air that a zone (row) takes from
-        another (column) [m3/s].
+        another (column) [m3/s]; row_s: length of the hours, where they are not [s].
     """
     hours, count = len(outdoor_ratio), len(zones)
     density = pressure / (AIR_GAS * (outdoor_c + 273.15))
@@ -108,7 +110,7 @@ def zone_humidity(
         taken = density[h] * links[h]
         total = flow[h] + taken.sum(axis=1)
         inflow = flow[h] * outdoor_ratio[h] + taken @ mean + source[h]
-        w, mean, added[h] = _hour(w, total, inflow, mass[h], low[h], high[h])
+        w, mean, added[h] = _hour(w, total, inflow, mass[h] / row_s, low[h], high[h])
         means[h] = mean
     latent = added * (EVAPORATION + VAPOUR_HEAT * air)
     relative = relative_humidity(means, air, pressure[:, None])
@@ -124,13 +126,16 @@ def _hour(
     w: FloatArray, total: FloatArray, inflow: FloatArray, mass: FloatArray, low: FloatArray,
     high: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
-    """Ratio at the hour's end, its mean, and the vapour added (or taken: negative) [kg/s]."""
-    k = np.maximum(total * 3600.0 / mass, 1e-9)
-    steady = inflow / np.maximum(total, 1e-9 * mass / 3600.0)
+    """Ratio at the hour's end, its mean, and the vapour added (or taken: negative) [kg/s].
+
+    mass: of the air, per length of the hour [kg/s].
+    """
+    k = np.maximum(total / mass, 1e-9)
+    steady = inflow / np.maximum(total, 1e-9 * mass)
     gone = -np.expm1(-k)  # of the difference, at the hour's end
     kept = np.where(k < 1e-4, k / 2 - k**2 / 6, 1.0 - gone / k)  # gone of it in the hour's mean
     end, mean = w + (steady - w) * gone, w + (steady - w) * kept
     held = np.clip(end, low, high)
-    given = (held - end) * mass / 3600.0 * k / gone  # evenly over the hour
+    given = (held - end) * mass * k / gone  # evenly over the hour
     mean = mean + (held - end) / gone * kept
     return held, mean, given

@@ -1,1 +1,1 @@
-"""gbXML in."""
+"""gbXML in and out."""

@@ -13,7 +13,6 @@ NO_MASS_CONDUCTIVITY = (
     0.04  # of a layer that states its resistance alone: an insulation's [W/(m K)]
 )
 NO_MASS = (20.0, 1450.0)  # its density, heat capacity: bim.defaults.EPS
-AIR = ("Air", "Argon", "Krypton")
 
 
 class Constructions:
@@ -113,7 +112,7 @@ class Constructions:
     def _share(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
         """A share of 1 of that kind; near normal incidence where there are several."""
         for one in owner.iterfind(what):
-            if one.get("type") == kind and float(one.get("incidentAngle") or 0.0) == 0.0:
+            if one.get("type") == kind and one.get("incidentAngle", "0") in ("0", "0.0", ""):
                 value = self.document.number(one, least=0.0, most=100.0)
                 value = value / 100.0 if one.get("unit") == "Percent" else value
                 if value > 1:

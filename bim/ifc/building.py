@@ -23,6 +23,7 @@ from bim.ifc.found_rooms import found_rooms
 from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms
 from bim.ifc.joining import joined_rooms
+from bim.ifc.map_conversion import map_georeference
 from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
@@ -110,6 +111,7 @@ def read_ifc(
         account_of(
             source, rooms.read, spaces, glass, problems, repeated=[r.guid for r in rooms.repeated]
         ),
+        map_georeference(source.model, source.placed),
     )  # fmt: skip
 
 

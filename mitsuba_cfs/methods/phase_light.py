@@ -27,7 +27,7 @@ from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients, outdoors
 from mitsuba_cfs.trace.picture_sun import PictureSun
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import traced_scene
 from mitsuba_cfs.trace.sun_ways import shining
 
 SUN_BATCHES = 4  # of C_ds
@@ -236,9 +236,8 @@ class PhaseLight:
 
     @cached_property
     def _reflected_sun(self) -> ReflectedSunLight | None:
-        """The sun that diffuse surfaces reflect; None where some mirror it: then by patches."""
-        scene = self._traced.scene
-        if not self._traced.five_phase or scene.interior.glossy or scene.exterior.glossy:
+        """The sun that surfaces reflect; None where the room's mirror it: then by patches."""
+        if not self._traced.five_phase or self._traced.scene.interior.glossy:
             return None
         return self.filled.reflected_sun.light(self.sky)
 
@@ -301,7 +300,7 @@ class PhaseLight:
         scene, lit = self._traced.scene, self.sky.illuminance > 0
         facing = np.stack([g.frame[2] for g in scene.groups])
         if scene.exterior.glossy:
-            outside = TracedScene(scene.exterior, scene.groups)
+            outside = traced_scene(scene.exterior, scene.groups)
             return np.flatnonzero(shining(outside, facing, self.sky.direction) & lit)
         return np.flatnonzero(np.any(self.sky.direction @ facing.T > 0, axis=1) & lit)
 

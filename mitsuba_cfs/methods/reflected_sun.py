@@ -34,7 +34,7 @@ from mitsuba_cfs.trace.reflected_sun import (
     window_shares,
 )
 from mitsuba_cfs.trace.room_beam import RoomCells, room_cells, room_light, room_shares
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 
 BATCHES = 4  # each with its own paths, places and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
@@ -68,13 +68,13 @@ class ReflectedSun:
     @cached_property
     def inside(self) -> TracedScene:
         """The room."""
-        return TracedScene(self.traced.scene.interior, self.traced.scene.groups)
+        return traced_scene(self.traced.scene.interior, self.traced.scene.groups)
 
     @cached_property
     def outside(self) -> TracedScene:
         """What stands before the parts of the window groups, in the room's coordinates."""
         parts, centre = self.traced.parts.groups, self.inside.centre
-        return TracedScene(self.traced.scene.exterior, parts, centre=centre)
+        return traced_scene(self.traced.scene.exterior, parts, centre=centre)
 
     @cached_property
     def cells(self) -> RoomCells:

@@ -17,7 +17,7 @@ from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import opaque
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 
@@ -84,7 +84,7 @@ def absorption_matrix(
     """
     reflectance = np.zeros(len(groups)) if window_reflectance is None else window_reflectance
     reflectance = np.asarray(reflectance, dtype=float)
-    tracer = TracedScene(surfaces, groups, window_reflectance=reflectance)
+    tracer = traced_scene(surfaces, groups, window_reflectance=reflectance)
     bins = DirectionBins(basis)
     n = int(samples)
     width = tracer.surface_count + len(groups)

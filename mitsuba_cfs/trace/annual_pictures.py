@@ -34,7 +34,7 @@ from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, ti
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
 from mitsuba_cfs.trace.sampling import tables, vectors
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
 NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
@@ -96,7 +96,7 @@ def view_matrices(
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
         options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
-    tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
+    tracer = traced_scene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
     pixels, row, group, keys = _tiles(tracer, view, tile)
     m, half = len(keys), 2 * row + _second_half(pixels, view)

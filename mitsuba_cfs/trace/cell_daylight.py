@@ -18,7 +18,7 @@ from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.estimate import Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of, vectors
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import traced_scene
 from mitsuba_cfs.window_parts import Cells
 
 BATCHES = 2
@@ -43,7 +43,7 @@ def cell_daylight(
 
     Args: samples: paths of each cell and patch in each of 2 batches.
     """
-    tracer = TracedScene(surfaces, groups)
+    tracer = traced_scene(surfaces, groups)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     frames = np.concatenate(
         [np.tile(g.frame, (len(c.area), 1, 1)) for g, c in zip(groups, cells, strict=True)]

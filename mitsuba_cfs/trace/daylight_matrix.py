@@ -28,7 +28,7 @@ from mitsuba_cfs.trace.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 
@@ -111,7 +111,7 @@ def daylight_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
     something = len(surfaces.triangles) > 0  # light comes back to the windows
-    tracer = TracedScene(surfaces, groups, windows_block=something)
+    tracer = traced_scene(surfaces, groups, windows_block=something)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     n = int(samples)
 

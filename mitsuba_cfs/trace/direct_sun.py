@@ -21,7 +21,7 @@ from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.lit_room import PatchBeam
 from mitsuba_cfs.trace.sampling import lattice_2d, opaque, vectors
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 from mitsuba_cfs.trace.sun_discs import Scattering, SunDiscs, SunScene, on_disc, pairs
 from mitsuba_cfs.trace.sun_ways import sun_ways
 
@@ -139,8 +139,8 @@ def direct_sun_matrix(
     suns = normalize(np.atleast_2d(np.asarray(suns, dtype=float)))
     if cache is not None and any(way is not None and way.key is None for way in scattering):
         raise ValueError("a BSDF plugin needs a `key` before its matrix can be kept in a cache")
-    inside = TracedScene(interior, groups)
-    outside = TracedScene(exterior, groups, windows_block=False)
+    inside = traced_scene(interior, groups)
+    outside = traced_scene(exterior, groups, windows_block=False)
     place = vectors(points - inside.centre, mi.Point3f)
     normal = vectors(directions)
     ways = [

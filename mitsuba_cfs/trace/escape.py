@@ -18,7 +18,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of, vectors
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 
 SIDES = ("west", "east", "south", "north", "floor", "ceiling")  # of the box round a room
 FIGURES = 4  # share, and share times x, y, z
@@ -60,7 +60,7 @@ def escaped_view(
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
-    tracer = TracedScene(surfaces, groups)
+    tracer = traced_scene(surfaces, groups)
     corners = np.concatenate(
         [surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]
     ).reshape(-1, 3)

@@ -25,7 +25,7 @@ from mitsuba_cfs.trace.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
@@ -95,7 +95,7 @@ def picture_part_blocks(
         samples: paths for each pixel, at as many places within it.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
     """
-    tracer = TracedScene(surfaces, groups, window_reflectance=window_reflectance)
+    tracer = traced_scene(surfaces, groups, window_reflectance=window_reflectance)
     bins = DirectionBins(basis)
     shape = (len(groups), bins.size)
     size = max(256, BLOCK_BYTES // (8 * PARTS * int(np.prod(shape))))

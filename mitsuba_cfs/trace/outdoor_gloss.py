@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.trace.picture_sun import LANES
-from mitsuba_cfs.trace.sampling import path_generator, vectors
+from mitsuba_cfs.trace.sampling import column, path_generator, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, place_and_hour
 
@@ -93,6 +93,25 @@ class RoughFaces:
             Places.joined([p.places for p in parts]),
         )
 
+    def some(self, chosen: NDArray) -> RoughFaces:
+        """Some of them."""
+        return RoughFaces(
+            self.pixel[chosen], self.weight[chosen], self.triangle[chosen], self.way[:, chosen],
+            self.places.some(chosen),
+        )  # fmt: skip
+
+    def lobes(self, outside: TracedScene, suns: NDArray[np.float64]) -> NDArray[np.float32]:
+        """f cos where the sun shines, else 0 [r, h]."""
+        point, normal, to_sun = place_and_hour(self.places, suns)
+        face = dr.arange(mi.UInt32, self.places.size * len(suns)) // dr.opaque(mi.UInt32, len(suns))
+        cosine = dr.dot(normal, to_sun)
+        lit = cosine > 0
+        lit &= ~outside.scene.ray_test(mi.Ray3f(point, to_sun), coherent=False, active=lit)
+        triangle = dr.gather(mi.UInt32, column(self.triangle, mi.UInt32), face)
+        way = dr.gather(mi.Vector3f, vectors(self.way.T), face)
+        value = outside.gloss.lobe(triangle, normal, way, to_sun, lit) * cosine
+        return dr.select(lit, value, 0.0).numpy().reshape(self.places.size, len(suns))
+
 
 class RoughSun:
     """The sun in the lobes of rough surfaces outdoors, hour by hour."""
@@ -103,32 +122,16 @@ class RoughSun:
         pair = faces.pixel * (int(faces.triangle.max(initial=0)) + 1) + faces.triangle
         _, first, place = np.unique(pair, return_index=True, return_inverse=True)
         self._weight = np.bincount(place, faces.weight, minlength=len(first)).astype(np.float32)
-        self._pixel, self._places = faces.pixel[first], faces.places.some(first)
-        self._triangle = mi.UInt32(faces.triangle[first].astype(np.uint32))
-        self._way = vectors(faces.way[:, first].T)
+        self._faces = faces.some(first)
 
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
         """Add the luminance [cd/m2] to the pixels' values [h, n]."""
-        if not self._places.size:
+        if not len(self._weight):
             return
         lit = np.flatnonzero((illuminance > 0) & (suns[:, 2] > 0))
-        step = max(1, LANES // self._places.size)
+        step = max(1, LANES // len(self._weight))
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
-            found = self._lobes(suns[hours]) * self._weight[:, None]
+            found = self._faces.lobes(self._outside, suns[hours]) * self._weight[:, None]
             for hour, light in zip(hours, found.T, strict=True):
-                np.add.at(values[hour], self._pixel, light * illuminance[hour])
-
-    def _lobes(self, suns: NDArray[np.float64]) -> NDArray[np.float32]:
-        """f cos of places where the sun shines, else 0 [m, h]."""
-        point, normal, to_sun = place_and_hour(self._places, suns)
-        place = dr.arange(mi.UInt32, self._places.size * len(suns)) // dr.opaque(
-            mi.UInt32, len(suns)
-        )
-        cosine = dr.dot(normal, to_sun)
-        lit = cosine > 0
-        lit &= ~self._outside.scene.ray_test(mi.Ray3f(point, to_sun), coherent=False, active=lit)
-        triangle = dr.gather(mi.UInt32, self._triangle, place)
-        way = dr.gather(mi.Vector3f, self._way, place)
-        value = self._outside.gloss.lobe(triangle, normal, way, to_sun, lit) * cosine
-        return dr.select(lit, value, 0.0).numpy().reshape(self._places.size, len(suns))
+                np.add.at(values[hour], self._faces.pixel, light * illuminance[hour])

@@ -94,7 +94,7 @@ def _reflecting(
     """Places [q] that reflect the sun to the tiles, and each tile's irradiance by theirs [C, q]."""
     if not shown.places.size:
         return shown.places, sparse.csr_array((count, 0))
-    met = reflecting_places(outside, shown.places, seed)
+    met = reflecting_places(outside, shown.places, seed, mirrored=True)
     tile = shown.tile[met.path]
     chosen, share = _thinned(tile, met.weight, np.random.default_rng(seed))
     share /= np.maximum(np.bincount(shown.tile, minlength=count), 1)[tile[chosen]]

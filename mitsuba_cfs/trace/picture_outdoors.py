@@ -35,7 +35,7 @@ from mitsuba_cfs.trace.sampling import (
     tables,
     vectors,
 )
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, traced_scene
 from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import Places, face_places
 
@@ -81,8 +81,8 @@ def outdoors(
         tile: pixels across of the squares that share what varies slowly over a face, by default
             as of `tile_size`.
     """
-    inside = TracedScene(interior, groups)
-    outside = TracedScene(exterior, groups)
+    inside = traced_scene(interior, groups)
+    outside = traced_scene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     faces = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])

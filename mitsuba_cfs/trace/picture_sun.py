@@ -25,7 +25,7 @@ from mitsuba_cfs.trace.picture_disc import (
 from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.room_sun import SunElements
 from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, opaque_vector, vectors
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
+from mitsuba_cfs.trace.scene import OPAQUE, traced_scene
 from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import on_disc_of, place_and_hour
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
@@ -60,8 +60,8 @@ class PictureSun:
         """
         if len(scattering) != len(groups):
             raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
-        self._inside = TracedScene(interior, groups)
-        self._outside = TracedScene(exterior, groups, windows_block=False)
+        self._inside = traced_scene(interior, groups)
+        self._outside = traced_scene(exterior, groups, windows_block=False)
         self._way = SunWay(self._outside) if way is None else way
         self._free = self._way.free
         around = interior, exterior, groups, scattering, view

@@ -1,6 +1,7 @@
 """The sun that surfaces outdoors reflect to windows, and to sensors straight through them.
 
     L[row] = sum over places m of share[row, m] E_sun[m]
+             + sum over rough faces r that its paths meet, weight[r] f(path, sun) E_sun[r]
 
 Paths find the surfaces that a row has light from; a few thousand of the places they meet stand for
 all, and a shadow ray from each to the sun gives its irradiance hour by hour.  No path has to find
@@ -13,7 +14,7 @@ stand for others near by as the virtual lights of Keller 1997, "Instant radiosit
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -23,6 +24,7 @@ from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, mirrored
 from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, tables, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.straight_view import straight_rays
@@ -38,6 +40,7 @@ BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
 PLACES = 1024  # that stand for all that paths meet, at most
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
+ROUGH = 4096  # rough faces whose lobes a row sees, at most
 LANES = 2**22  # shadow rays at once
 
 
@@ -47,6 +50,7 @@ class SunShares:
 
     places: Places  # [m]
     share: sparse.csr_array  # [rows, m]
+    rough: RoughFaces | None = None  # whose lobes the rows see
 
     @classmethod
     def of(cls, met: Sequence[_Met], rows: int, seed: int) -> SunShares:
@@ -54,12 +58,15 @@ class SunShares:
         places = Places.joined([m.places for m in met])
         row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
         weight = np.concatenate([np.empty(0), *(m.weight for m in met)])
+        rough = None
+        if any(m.rough for m in met):
+            rough = _few(RoughFaces.joined([part for m in met for part in m.rough]))
         if not len(weight):
-            return cls(places, sparse.csr_array((rows, 0)))
+            return cls(places, sparse.csr_array((rows, 0)), rough)
         run, chosen = _runs(places, weight, np.random.default_rng(seed))
         few = places.some(chosen)
         share = sparse.csr_array(sparse.coo_array((weight, (row, run)), shape=(rows, len(chosen))))
-        return cls(few, share)
+        return cls(few, share, rough)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +76,7 @@ class _Met:
     row: NDArray[np.int64]
     weight: NDArray[np.float64]
     places: Places
+    rough: list[RoughFaces]
 
 
 def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunShares:
@@ -131,6 +139,13 @@ def outdoor_light(
     for hours in _blocks(shares.places.size, len(suns)):
         light = sunlight(outside, shares.places, suns[hours])
         found[:, hours] = shares.share @ light * strength[hours]
+    if shares.rough is None:
+        return found
+    count = len(shares.rough.weight)
+    entries = shares.rough.weight, (shares.rough.pixel, np.arange(count))
+    of_row = sparse.csr_array(entries, shape=(len(found), count), dtype=np.float32)
+    for hours in _blocks(count, len(suns)):
+        found[:, hours] += of_row @ shares.rough.lobes(outside, suns[hours]) * strength[hours]
     return found
 
 
@@ -142,21 +157,70 @@ def _met(
     way: mi.Vector3f,
     seed: int,
 ) -> _Met:
-    """The surfaces that paths from windows meet, with what they reflect [1/sr]."""
-    active = mi.Bool(weight > 0)
-    hit, origin = outside.met_outdoors(origin, way, active)
-    found = active & hit.is_valid()
-    rho = dr.gather(mi.Float, outside.reflectance, hit.prim_index, found)
-    value = weight * rho * dr.inv_pi
-    places, found, value, row = face_places(outside, origin, way, hit, found, found, value, row)
-    kept = np.flatnonzero(found & (value > 0))
-    first, value, row = places.some(kept), value[kept].astype(float), row[kept].astype(np.int64)
-    later = reflecting_places(outside, first, seed, BOUNCES)
+    """The surfaces that paths from windows meet, with what they reflect [1/sr].
+
+    By gloss a path goes on to what it mirrors; the sun itself in a mirror is the direct sun's.
+    """
+    start, along, share, of = tables(origin, way, weight, row)
+    some = np.flatnonzero(share > 0)
+    lanes = Lanes(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
+    rows, values, places, rough = [], [], [], []
+    for bounce in range(MOST_MIRRORS + 1):
+        if not len(lanes.row):
+            break
+        direction = vectors(lanes.way.T)
+        last = vectors(lanes.origin.T, mi.Point3f)
+        hit, last = outside.met_outdoors(last, direction, mi.Bool(True))
+        met = hit.is_valid()
+        normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, met)
+        rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(normal, direction)), met)
+        others = met, rho, hit.prim_index, last
+        there, met, rho, prim, begun = face_places(outside, last, direction, hit, met, *others)
+        lanes = replace(lanes, origin=begun.T)
+        value = lanes.weight * rho / np.pi
+        kept = np.flatnonzero(met & (value > 0))
+        rows.append(lanes.row[kept])
+        values.append(value[kept])
+        places.append(there.some(kept))
+        if outside.gloss is not None:
+            rough.append(_rough(outside, lanes, there, np.where(met, prim, 0), met))
+        lanes = mirrored(outside, lanes, hit, bounce)
+    if not rows:
+        return _Met(np.empty(0, dtype=np.int64), np.empty(0), Places.joined([]), [])
+    row_of, value, first = np.concatenate(rows), np.concatenate(values), Places.joined(places)
+    later = reflecting_places(outside, first, seed, BOUNCES, mirrored=True)
     return _Met(
-        np.concatenate([row, row[later.path]]),
+        np.concatenate([row_of, row_of[later.path]]),
         np.concatenate([value, value[later.path] * later.weight]),
         Places.joined([first, later.places]),
+        rough,
     )
+
+
+def _rough(
+    outside: TracedScene,
+    lanes: Lanes,
+    places: Places,
+    triangle: NDArray[np.uint32],
+    met: NDArray[np.bool_],
+) -> RoughFaces:
+    """Those of the faces that rays met whose gloss is rough."""
+    alpha = outside.gloss.roughness(column(triangle, mi.UInt32), column(met, mi.Bool)).numpy()
+    found = np.flatnonzero(alpha > 0)
+    some, faces = lanes.some(found), triangle[found].astype(np.int64)
+    return RoughFaces(some.row, some.weight, faces, some.way, places.some(found))
+
+
+def _few(rough: RoughFaces) -> RoughFaces:
+    """The first `ROUGH` of those of each row, which are spread as evenly as all of them."""
+    order = np.argsort(rough.pixel, kind="stable")
+    row = rough.pixel[order]
+    kept = order[np.arange(len(row)) - np.searchsorted(row, row) < ROUGH]
+    rows = int(rough.pixel.max(initial=0)) + 1
+    of_all = np.bincount(rough.pixel, rough.weight, rows)
+    of_kept = np.bincount(rough.pixel[kept], rough.weight[kept], rows)
+    few = rough.some(kept)
+    return replace(few, weight=few.weight * (of_all / np.maximum(of_kept, 1e-30))[few.pixel])
 
 
 def _runs(

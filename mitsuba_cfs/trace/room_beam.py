@@ -26,6 +26,7 @@ from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, pixel_places,
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import Places, face_places, on_disc_of
+from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
 CELLS = 1024  # into which the surfaces' area is divided, about, on either side
 AREA_POINTS = 2**18  # by which the cells' areas are counted
@@ -138,24 +139,26 @@ class _Beam:
 
     def flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
         """Luminous flux on the cells [c, h], per unit illuminance normal to the sun."""
-        hours = np.arange(len(suns))
-        value, position, to_sun = self._entering(suns, WINDOW_POINTS)
-        lit = value > 0
-        crossed = lit.any(axis=1) & ~lit.all(axis=1)
-        value[crossed] = 0
-        found = self._landed(cells, value, position, to_sun, hours, len(suns))
-        hours = hours[crossed]
-        for start in range(0, len(hours), RAYS // EDGE_POINTS):
-            some = hours[start : start + RAYS // EDGE_POINTS]
-            rays = self._entering(suns[some], EDGE_POINTS)
-            found = found + self._landed(cells, *rays, some, len(suns))
+        found = sparse.csr_array((cells.size, len(suns)))
+        for by in sun_ways(self.scenes[1]):
+            hours = np.arange(len(suns))
+            value, position, to_sun = self._entering(by, suns, WINDOW_POINTS)
+            lit = value > 0
+            crossed = lit.any(axis=1) & ~lit.all(axis=1)
+            value[crossed] = 0
+            found = found + self._landed(cells, value, position, to_sun, hours, len(suns))
+            hours = hours[crossed]
+            for start in range(0, len(hours), RAYS // EDGE_POINTS):
+                some = hours[start : start + RAYS // EDGE_POINTS]
+                rays = self._entering(by, suns[some], EDGE_POINTS)
+                found = found + self._landed(cells, *rays, some, len(suns))
         return found
 
     def _entering(
-        self, suns: NDArray[np.float64], points: int
+        self, by: SunWay, suns: NDArray[np.float64], points: int
     ) -> tuple[NDArray[np.float32], mi.Point3f, mi.Vector3f]:
         """Flux of rays through points of the windows [h, points], the points and ways out."""
-        inside, outside = self.scenes
+        inside = self.scenes[0]
         lane = dr.arange(mi.UInt32, points * len(suns))
         hour = lane // dr.opaque(mi.UInt32, points)
         point = lane - hour * dr.opaque(mi.UInt32, points)
@@ -163,13 +166,11 @@ class _Beam:
         key = dr.opaque(mi.UInt32, self.seed & 0xFFFFFFFF)
         stream = mi.sample_tea_32(opaque(self.group, mi.UInt32), key)[0]
         position = inside.sample_group(self.group, lattice_2d(point, stream, 0))
-        towards = dr.gather(mi.Vector3f, vectors(suns), hour)
-        to_sun = on_disc_of(towards, point)
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.turned(suns)), hour), point)
         local = inside.to_group(self.group, to_sun)
-        active = local.z > 0
         start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
-        active &= ~outside.met_outdoors(start, to_sun, active)[0].is_valid()
-        value = dr.select(active, local.z * self.way.through(local), 0.0)
+        reaching = by.reaching(mi.Ray3f(start, to_sun), local.z > 0)
+        value = dr.select(local.z > 0, local.z * self.way.through(local) * reaching, 0.0)
         value *= opaque(inside.groups[self.group].area / points)
         return value.numpy().reshape(len(suns), points), position, to_sun
 

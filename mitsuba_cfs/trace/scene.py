@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -22,6 +24,7 @@ from mitsuba_cfs.trace.sampling import (
 )
 from mitsuba_cfs.trace.traced_gloss import TracedGloss
 
+KEPT = 6  # scenes that are found again: what one room is traced by, indoors and outdoors
 OPAQUE = -1  # window index of a triangle that is not glazed
 SERIES_GAP = 1.0  # widest between a screen and its panes [m]
 SERIES_PLACES = 256  # on each window group, from which they are looked for
@@ -183,6 +186,18 @@ class TracedScene:
         gloss = self.gloss.specular(triangle, cosine, active)
         return self.diffuse(triangle, cosine, active) + gloss
 
+    def without_mirrors(
+        self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.Float:
+        """The same without what a smooth mirror reflects."""
+        if self.gloss is None:
+            return self.whole(triangle, direction, active)
+        normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
+        cosine = dr.abs(dr.dot(normal, direction))
+        rough = self.gloss.roughness(triangle, active) > 0
+        gloss = dr.select(rough, self.gloss.specular(triangle, cosine, active), 0.0)
+        return self.diffuse(triangle, cosine, active) + gloss
+
     def bounce(
         self,
         hit: mi.PreliminaryIntersection3f,
@@ -286,6 +301,43 @@ class TracedScene:
         """Vector in the frame of one window group to world axes."""
         x, y, z = self._axes[group]
         return x * v.x + y * v.y + z * v.z
+
+
+def traced_scene(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup] = (),
+    *,
+    windows_block: bool = True,
+    window_reflectance: ArrayLike | None = None,
+    centre: ArrayLike | None = None,
+) -> TracedScene:
+    """A `TracedScene` of its arguments; that of the same objects is found again among the last.
+
+    A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
+    of thousands of triangles.
+    """
+    values = (window_reflectance, centre)
+    arrays = [None if value is None else np.asarray(value, float) for value in values]
+    inputs = (surfaces, *groups)
+    key = (
+        variants.activate(), windows_block, *(None if a is None else a.tobytes() for a in arrays),
+        *map(id, inputs),
+    )  # fmt: skip
+    if key not in _last_scenes:
+        reflectance, middle = arrays
+        options = {
+            "windows_block": windows_block, "window_reflectance": reflectance, "centre": middle,
+        }  # fmt: skip
+        _last_scenes[key] = inputs, TracedScene(surfaces, groups, **options)
+    _last_scenes.move_to_end(key)
+    while len(_last_scenes) > KEPT:
+        _last_scenes.popitem(last=False)
+    return _last_scenes[key][1]
+
+
+# with the objects whose ids are in the key, which so stay theirs; empty before Dr.Jit ends
+_last_scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
+atexit.register(_last_scenes.clear)
 
 
 def _mesh(triangles: NDArray[np.float64]) -> mi.Mesh:

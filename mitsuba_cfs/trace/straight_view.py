@@ -29,7 +29,7 @@ from mitsuba_cfs.trace.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 from mitsuba_cfs.trace.sun_discs import Scattering
 
 
@@ -62,7 +62,7 @@ def straight_view_matrix(
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
-    inside, outside = TracedScene(interior, groups), TracedScene(exterior, groups)
+    inside, outside = traced_scene(interior, groups), traced_scene(exterior, groups)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:

@@ -4,7 +4,8 @@ What reaches a place x by reflection is the mean over cosine-sampled paths from 
 
     E(x) = mean of sum over the surfaces y that a path meets, product of rho up to y, E_sun(y)
 
-A gloss counts here as if it were diffuse: no light is lost, its direction is.
+A gloss counts here as if it were diffuse: no light is lost, its direction is.  Where E_sun has the
+sun out of smooth mirrors as well (`sunlight`), what such a mirror itself has of it does not count.
 
 Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun.
 """
@@ -73,9 +74,17 @@ class ReflectingPlaces:
 
 
 def reflecting_places(
-    tracer: TracedScene, start: Places, seed: int, bounces: int = BOUNCES
+    tracer: TracedScene,
+    start: Places,
+    seed: int,
+    bounces: int = BOUNCES,
+    *,
+    mirrored: bool = False,
 ) -> ReflectingPlaces:
-    """The surfaces that one path from each place meets, one after the other."""
+    """The surfaces that one path from each place meets, one after the other.
+
+    Args: mirrored: whether smooth mirrors send the sun on to the places otherwise.
+    """
     path, weight, places = np.arange(start.size), np.ones(start.size), start
     paths, weights, met = [np.empty(0, dtype=np.int64)], [np.empty(0)], []
     key = dr.opaque(mi.UInt32, (seed ^ 0x2545F491) & 0xFFFFFFFF)
@@ -83,11 +92,12 @@ def reflecting_places(
         if not len(path):
             break
         number = column(path * bounces + bounce, mi.UInt32)
-        kept, places, rho, luck = _next(tracer, places, path_generator(number, key))
-        path, weight = path[kept], weight[kept] * rho
-        paths.append(path)
-        weights.append(weight)
-        met.append(places)
+        kept, places, (rho, own), luck = _next(tracer, places, path_generator(number, key))
+        path, before = path[kept], weight[kept]
+        weight, own = before * rho, before * (own if mirrored else rho)
+        paths.append(path[own > 0])
+        weights.append(own[own > 0])
+        met.append(places.some(own > 0))
         survival = np.minimum(weight / ROULETTE, 1.0)
         on = luck < survival
         path, places, weight = path[on], places.some(on), weight[on] / survival[on]
@@ -99,16 +109,21 @@ def reflecting_places(
 def _next(
     tracer: TracedScene, places: Places, generator: mi.PCG32
 ) -> tuple[NDArray[np.bool_], Places, NDArray[np.float32], NDArray[np.float32]]:
-    """Which paths meet a surface that reflects; where, its reflectance, a number for roulette."""
+    """Which paths meet a surface that reflects; where, its reflectances, a number for roulette.
+
+    The reflectances [2, m] are the whole one, and that without smooth mirrors.
+    """
     point, normal = places.points(), places.normals()
     u = mi.Point2f(generator.next_float32(), generator.next_float32())
     way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
     found, luck = hit.is_valid(), generator.next_float32()
     rho = tracer.whole(hit.prim_index, way, found)
-    after, found, rho, luck = face_places(tracer, point, way, hit, found, found, rho, luck)
+    own = tracer.without_mirrors(hit.prim_index, way, found)
+    others = found, rho, own, luck
+    after, found, rho, own, luck = face_places(tracer, point, way, hit, found, *others)
     kept = found & (rho > 0)
-    return kept, after.some(kept), rho[kept], luck[kept]
+    return kept, after.some(kept), np.stack([rho, own])[:, kept], luck[kept]
 
 
 def face_places(

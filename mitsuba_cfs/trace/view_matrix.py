@@ -18,7 +18,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.sampling import column, empty_sums, path_generator, sums_of, vectors
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import TracedScene, traced_scene
 from mitsuba_cfs.trace.shared_hits import MOST_SENSORS, indirect_rows, mirrored_rows, shares
 from mitsuba_cfs.trace.window_integral import add_window_light
 
@@ -66,7 +66,7 @@ def view_matrix(
         raise ValueError(
             f"points {points.shape} and directions {directions.shape}: need [S, 3] each"
         )
-    tracer = TracedScene(surfaces, groups)
+    tracer = traced_scene(surfaces, groups)
     bins = DirectionBins(basis)
     S, n = len(points), int(samples)
     if S * n >= 2**32:

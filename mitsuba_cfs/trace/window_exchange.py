@@ -13,7 +13,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.image import add_picture_paths
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.scene import traced_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 
@@ -39,7 +39,7 @@ def window_exchange(
         surfaces: what the room is made of, in the band of the radiances.
         samples: paths for each patch in each batch.
     """
-    tracer, bins, n = TracedScene(surfaces, groups), DirectionBins(basis), int(samples)
+    tracer, bins, n = traced_scene(surfaces, groups), DirectionBins(basis), int(samples)
     columns = len(groups) * bins.size
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:

@@ -104,7 +104,7 @@ def command(
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.year_of_glare import outputs
+    from scenes.year_of_glare import outputs, page
     from scenes.year_of_glare.year import rate_views, read_year
 
     if options.quick:
@@ -115,6 +115,7 @@ def command(
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)
+            page.write_page(year, table, place / "report.html")
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
         f"{year.room}: {len(table)} view(s), {len(year.sky.lit)} hours with the sun up.  Highest "
@@ -126,6 +127,7 @@ def command(
     for note in year.notes:
         click.echo(f"note: {note}")
     click.echo(f"{out / 'views.csv'}")
+    click.echo(f"report: {out / 'report.html'}")
 
 
 def _error(row) -> str:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bim.model import Building, Space
 
 PATTERNS = {  # of the files that an export writes
-    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml"),
+    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml", "run.sh"),
     "--mitsuba": ("scene.xml", "glass_*.xml", "*.ply"),
 }
 
@@ -151,6 +151,8 @@ def attach(
 )  # fmt: skip
 @click.option("--epjson", type=click.Path(path_type=Path), help="EnergyPlus input file.")
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
+@click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
+@click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
 def export(
     building: Path,
     *,
@@ -161,15 +163,19 @@ def export(
     mitsuba: Path | None,
     epjson: Path | None,
     gltf: Path | None,
+    honeybee: Path | None,
+    gbxml: Path | None,
 ) -> None:
     """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
 
     Windows go with the BSDF, U and g that the file holds or states for them; where they come from,
     and what is not known, is said.
     """
-    if radiance is None and mitsuba is None and epjson is None and gltf is None:
-        raise click.UsageError("nothing to write: give --radiance, --mitsuba, --epjson or --gltf")
-    for field, path in (("--epjson", epjson), ("--gltf", gltf)):
+    files = {"--epjson": epjson, "--gltf": gltf, "--honeybee": honeybee, "--gbxml": gbxml}
+    asked = {"--radiance": radiance, "--mitsuba": mitsuba, **files}
+    if not any(asked.values()):
+        raise click.UsageError(f"nothing to write: give one of {', '.join(asked)}")
+    for field, path in files.items():
         if path is not None:
             check_file(path, field=field, inputs=[building])
     formats: dict[Path, list[str]] = {}
@@ -180,6 +186,8 @@ def export(
         parent: ResultFolder(parent, "ifc export", adding=True, field=options[0])
         for parent, options in formats.items()
     }
+    from bim.gbxml.write import write_gbxml
+    from bim.honeybee.write import write_honeybee
     from bim.ifc.building import read_ifc
     from bim.to_energyplus import write_epjson
     from bim.to_gltf import write_gltf
@@ -216,14 +224,20 @@ def export(
         for name in written:
             click.echo(parent / name)
     assumed: tuple[str, ...] = ()
-    if epjson is not None:
+    states = any(path is not None for path in (epjson, honeybee, gbxml))  # U and g of windows
+    if states:
         u_and_g, assumed = known.u_and_g()
+    for path, write in ((honeybee, write_honeybee), (gbxml, write_gbxml)):
+        if path is not None:
+            write(replace(read, spaces=tuple(chosen)), path, known=u_and_g)
+            click.echo(path)
+    if epjson is not None:
         write_epjson(read, epjson, spaces=chosen, known=u_and_g)
         click.echo(epjson)
     if gltf is not None:
         write_gltf(replace(read, spaces=tuple(chosen)), gltf)
         click.echo(gltf)
-    notes = known.notes() if folders or epjson is not None else ()
+    notes = known.notes() if folders or states else ()
     for note in (*notes, *assumed):
         click.echo(f"note: {note}")
 

@@ -33,6 +33,14 @@ aperture_option = click.option(
     "--aperture", "apertures", multiple=True, metavar="MATERIAL",
     help="Material of the windows of a Radiance scene (.rad); default: all glass and BSDF.",
 )  # fmt: skip
+surroundings_option = click.option(
+    "--surroundings", multiple=True, type=FILE,
+    help="What stands around: OBJ, STL, PLY, glTF, CityJSON, GeoJSON; PVGIS's horizon.",
+)  # fmt: skip
+surroundings_offset_option = click.option(
+    "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
+    help="Added to their coordinates [m] in place of any georeference.",
+)  # fmt: skip
 needed_weather_option = click.option(
     "--weather", required=True, type=FILE, help="EPW file, hourly."
 )

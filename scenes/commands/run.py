@@ -10,7 +10,14 @@ from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
-from scenes.commands.room_options import building_options, method_option, size_option, u_option
+from scenes.commands.room_options import (
+    building_options,
+    method_option,
+    size_option,
+    surroundings_offset_option,
+    surroundings_option,
+    u_option,
+)
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
 
@@ -20,6 +27,8 @@ _DEFAULT = RoomOptions()
 
 @click.command()
 @building_options("all with a window")
+@surroundings_option
+@surroundings_offset_option
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
@@ -60,6 +69,8 @@ def command(
     join: tuple[str, ...],
     furniture: bool,
     apertures: tuple[str, ...],
+    surroundings: tuple[Path, ...],
+    surroundings_offset: tuple[float, float, float] | None,
     operation: Path | None,
     no_cache: bool,
     explore: bool,
@@ -76,7 +87,8 @@ def command(
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore,
-        u_value=u_value, g_value=g_value,
+        u_value=u_value, g_value=g_value, surroundings=surroundings,
+        surroundings_offset=surroundings_offset,
     )  # fmt: skip
     run_to_folder(options, out)
 
@@ -88,6 +100,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     from scenes.run.files import read_files
 
     inputs = (options.building, options.weather, options.system, options.operation)
+    inputs += options.surroundings
     folder = ResultFolder(out, command, inputs=inputs)
     if options.cache:
         default_folder()  # or one line that it cannot be one

@@ -99,11 +99,16 @@ def plan(
     values = np.asarray(values, dtype=float)
     if values.shape != (len(frame.points),):
         raise ValueError(f"{title}: {values.shape} values for {len(frame.points)} sensors")
+    box, body = drawn(frame, _cells(frame, values, scale, digits))
+    return FloorPlan(title, explanation, *box, body, scale)
+
+
+def drawn(frame: PlanFrame, inside: list[str]) -> tuple[tuple[str, float], str]:
+    """View box and width over height of a plan, and its SVG with what is `inside` the room."""
     west, south, east, north = frame.outline.bounds
     x0, y0 = west - MARGIN, -(north + MARGIN)
     width, height = east - west + 2 * MARGIN, north - south + 2 * MARGIN
-    parts = [f'<path class="floor" d="{_rings(frame.outline)}"/>']
-    parts += _cells(frame, values, scale, digits)
+    parts = [f'<path class="floor" d="{_rings(frame.outline)}"/>', *inside]
     parts.append(f'<path class="wall" d="{_rings(frame.outline)}"/>')
     for ends in frame.windows:
         name = "skylight" if len(ends) > 2 else "window"
@@ -111,7 +116,7 @@ def plan(
     if frame.eye is not None:
         parts.append(_eye(*frame.eye))
     view_box = " ".join(f"{UNIT * v:.0f}" for v in (x0, y0, width, height))
-    return FloorPlan(title, explanation, view_box, width / height, "".join(parts), scale)
+    return (view_box, width / height), "".join(parts)
 
 
 def _cells(frame: PlanFrame, values, scale: ColourScale, digits: int) -> list[str]:

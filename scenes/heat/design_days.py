@@ -19,7 +19,6 @@ from thermal.zone import Gains, Zone
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
-DAY = 24  # hours
 COLD = 0.4  # percent of the hours that are colder: ASHRAE's 99.6 % heating design temperature
 CANDIDATES = 3  # hottest days by outdoor mean, as many by the rooms' sun
 
@@ -39,17 +38,18 @@ def design_loads(
 
     Returns: a row a room and case: day, outdoor mean and extreme [degC], peak [W] and its hour.
     """
-    whole, hours = climate(weather), len(weather.times)
+    whole, hours, day_rows = climate(weather), len(weather.times), round(24 / weather.step_h)
     zones = [_unlimited(room.zone) for room in rooms]
-    options = {"step_s": step_s, "air_links": air_links}
+    row_s = 3600.0 * weather.step_h
+    options = {"step_s": min(step_s, row_s), "row_s": row_s, "air_links": air_links}
     cold = float(np.percentile(weather.dry_bulb_c, COLD)) if outdoor_c is None else outdoor_c
-    first = np.arange(DAY)
+    first = np.arange(day_rows)
     calm = [
         replace(of_hours(zone, first, hours), gains=Gains(), loads=_warmest(zone)) for zone in zones
     ]
-    dark = [no_sun(DAY, len(zone.surfaces), len(zone.windows)) for zone in zones]
+    dark = [no_sun(day_rows, len(zone.surfaces), len(zone.windows)) for zone in zones]
     moved = [of_hours(one, first, hours) for one in transfers]
-    results = simulate_zones(calm, _steady(whole, cold), dark, transfers=moved, **options)
+    results = simulate_zones(calm, _steady(whole, cold, day_rows), dark, transfers=moved, **options)
     rows = [
         {"room": r.name, "case": "heating", "day": "", "outdoor_mean_c": cold,
          "outdoor_extreme_c": cold, "peak_w": r.heating.max() + r.slab.max() + r.coil.max(),
@@ -57,8 +57,8 @@ def design_loads(
         for r in results
     ]  # fmt: skip
     best: dict[str, dict] = {}
-    for day in _hot_days(rooms, weather):
-        chosen = DAY * day + first
+    for day in _hot_days(rooms, weather, day_rows):
+        chosen = day_rows * day + first
         suns = [of_hours(per_window(r.solar, r.zone), chosen, hours) for r in rooms]
         results = simulate_zones(
             [of_hours(zone, chosen, hours) for zone in zones], of_hours(whole, chosen, hours), suns,
@@ -72,7 +72,7 @@ def design_loads(
                     "room": r.name, "case": "cooling",
                     "day": weather.midpoints[chosen[0]].strftime("%m-%d"),
                     "outdoor_mean_c": outdoor.mean(), "outdoor_extreme_c": outdoor.max(),
-                    "peak_w": load.max(), "peak_hour": float(np.argmax(load) + 1),
+                    "peak_w": load.max(), "peak_hour": float(np.argmax(load) + 1) * weather.step_h,
                 }  # fmt: skip
     table = pd.DataFrame([*rows, *best.values()])
     area = {room.zone.name: room.space.floor_area for room in rooms}
@@ -91,12 +91,12 @@ def of_hours(value: T, chosen: NDArray[np.int64], hours: int) -> T:
     return value
 
 
-def _hot_days(rooms: Sequence[RoomZone], weather: Weather) -> list[int]:
+def _hot_days(rooms: Sequence[RoomZone], weather: Weather, rows: int) -> list[int]:
     """The days with the warmest means and those with most sun in the rooms."""
-    days = len(weather.times) // DAY
-    warm = weather.dry_bulb_c[: DAY * days].reshape(days, DAY).mean(axis=1)
-    sun = sum(room.solar.inside.sum(axis=1) for room in rooms)[: DAY * days]
-    sunny = sun.reshape(days, DAY).sum(axis=1)
+    days = len(weather.times) // rows
+    warm = weather.dry_bulb_c[: rows * days].reshape(days, rows).mean(axis=1)
+    sun = sum(room.solar.inside.sum(axis=1) for room in rooms)[: rows * days]
+    sunny = sun.reshape(days, rows).sum(axis=1)
     found = [*np.argsort(-warm)[:CANDIDATES], *np.argsort(-sunny)[:CANDIDATES]]
     return sorted({int(day) for day in found})
 
@@ -113,9 +113,9 @@ def _warmest(zone: Zone):
     )
 
 
-def _steady(whole: Climate, outdoor_c: float) -> Climate:
+def _steady(whole: Climate, outdoor_c: float, rows: int) -> Climate:
     """A day of one temperature, overcast, with the year's mean wind."""
-    one = np.ones(DAY)
+    one = np.ones(rows)
     return Climate(
         outdoor_c=outdoor_c * one,
         sky_c=outdoor_c * one,

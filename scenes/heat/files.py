@@ -5,14 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, Given
 from scenes.fenestration.thermal_system import checked_system
+from scenes.heat.measured_weather import read_measured
 from scenes.heat.study_file import StudyFile
 from scenes.room.operation import read_state
 from scenes.room.operation_hours import check_schedules
 from scenes.run.files import check_names
 from scenes.run.inputs import read_weather
+
+YEAR_DAYS = 360  # that make a year
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +40,28 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
         from scenes.heat.box import box_building  # geometry: only where there is one
 
         box_building(study.box)
-    weather = read_weather(study.weather)
+    if study.measured is None:
+        weather = read_weather(study.weather)
+    else:
+        weather = read_measured(study.weather, study.measured)
+        _fits_measured(study, weather, file)
     check_schedules(study, weather, file)
     by = "[[system]] of the study,"
     systems = tuple(read_state(table, table.bsdf, by=by) for table in study.system)
     for one, table in zip(systems, study.system, strict=True):
         checked_system(one, table.bsdf)
     return HeatFiles(weather, systems, Given(systems, ask="a [[system]]"))
+
+
+def _fits_measured(study: StudyFile, weather: Weather, file: Path | None) -> None:
+    """Raise `DataError` where a study asks of weather that is no year what only a year says."""
+    step = 60.0 * weather.step_h
+    if study.step_minutes < step and step % study.step_minutes:
+        message = f"expected a part of the weather's {step:g} minutes, got {study.step_minutes}"
+        raise DataError(message, file=file, field="step_minutes")
+    days = len(weather.times) * weather.step_h / 24.0
+    if days < YEAR_DAYS and any(one.envelope.ground is not None for one in study.variants):
+        raise DataError(
+            f"the ground follows a year of weather, got {days:.0f} days; state a temperature by "
+            "[[envelope.neighbour]]", file=file, field="envelope.ground",
+        )  # fmt: skip

@@ -14,6 +14,7 @@ from mitsuba_cfs.gloss import ROUGHEST
 from mitsuba_cfs.methods import METHODS
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
+from scenes.heat.measured_weather import MeasuredTable
 from scenes.quick import HEAT, picks
 from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
@@ -101,7 +102,8 @@ class DesignTable(TomlTable):
 class StudyFile(OperationTables):
     """A whole study; paths are relative to the file."""
 
-    weather: Path
+    weather: Path  # an EPW file, or with `measured` a CSV file
+    measured: MeasuredTable | None = None
     building: Path | None = None
     spaces: tuple[str, ...] = ()
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"

@@ -50,6 +50,16 @@ def hourly_table(
     return pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
 
 
+def rows_per_day(weather: Weather) -> int:
+    """Time steps of a day."""
+    return round(24.0 / weather.step_h)
+
+
+def _in_hours(counts: NDArray[np.int64], weather: Weather) -> NDArray:
+    """Counts of time steps as hours; whole ones stay whole."""
+    return counts if weather.step_h == 1.0 else counts * weather.step_h
+
+
 def comfort_summary(
     result: ZoneResult, pmv: FloatArray, weather: Weather, occupied: NDArray[np.bool_]
 ) -> dict[str, float]:
@@ -59,7 +69,7 @@ def comfort_summary(
     holds the hours of those before it.
     """
     found = {}
-    mean = running_mean_en16798(weather.dry_bulb_c)
+    mean = running_mean_en16798(weather.dry_bulb_c, per_day=rows_per_day(weather))
     for name in CATEGORIES:
         band = adaptive_comfort(result.operative_c, mean, f"EN 16798-1 {name}")
         found[f"adaptive_{name}_h"] = np.count_nonzero(band.comfortable & occupied)
@@ -71,8 +81,9 @@ def comfort_summary(
     found["above_26_h"] = np.count_nonzero((warm > 0) & occupied)
     found["above_26_kh"] = warm[occupied].sum()
     found["above_26_kh_all_hours"] = warm.sum()
-    found["pmv_mean"] = pmv[occupied].mean() if occupied.any() else pmv.mean()
-    return {key: float(value) for key, value in found.items()}
+    found = {key: float(value) * weather.step_h for key, value in found.items()}
+    mean_vote = pmv[occupied].mean() if occupied.any() else pmv.mean()
+    return found | {"pmv_mean": float(mean_vote)}
 
 
 def year_summary(
@@ -81,24 +92,24 @@ def year_summary(
     """Energy, peaks and comfort of the occupied hours [H], and their discomfort by month."""
     month = weather.midpoints.month.to_numpy()
     found = {
-        "heating_kwh": result.heating.sum() / 1e3,
-        "cooling_kwh": result.cooling.sum() / 1e3,
+        "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
+        "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,
         "peak_heating_w": result.heating.max(),
         "peak_cooling_w": result.cooling.max(),
         "operative_min_c": result.operative_c.min(),
         "operative_max_c": result.operative_c.max(),
     }
     means = {
-        "ASHRAE": running_mean(weather.dry_bulb_c),
-        "EN": running_mean_en16798(weather.dry_bulb_c),
+        "ASHRAE": running_mean(weather.dry_bulb_c, per_day=rows_per_day(weather)),
+        "EN": running_mean_en16798(weather.dry_bulb_c, per_day=rows_per_day(weather)),
     }
     months = {}
     for band in ADAPTIVE_BANDS:
         comfort = adaptive_comfort(result.operative_c, means[band.split()[0]], band)
         counted = summarise(comfort, occupied, month)
-        found[f"comfortable_h {band}"] = counted.comfortable
-        months[f"{band} [h]"] = counted.discomfort_by_month
-        found[f"degree_hours_warm {band}"] = counted.degree_hours_warm
-        found[f"degree_hours_cold {band}"] = counted.degree_hours_cold
+        found[f"comfortable_h {band}"] = counted.comfortable * weather.step_h
+        months[f"{band} [h]"] = _in_hours(counted.discomfort_by_month, weather)
+        found[f"degree_hours_warm {band}"] = counted.degree_hours_warm * weather.step_h
+        found[f"degree_hours_cold {band}"] = counted.degree_hours_cold * weather.step_h
     table = pd.DataFrame(months, index=pd.RangeIndex(1, 13, name="month"))
     return {key: float(value) for key, value in found.items()}, table

@@ -19,6 +19,7 @@ from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words
 from scenes.report.numbers import rounded
 from scenes.report.room import room_page
+from scenes.report.verdict import verdict
 from scenes.results import RunResult
 
 TEMPLATES = files(__package__) / "templates"
@@ -41,6 +42,7 @@ def report_html(result: RunResult) -> str:
     return environment().get_template("report.html.j2").render(
         result=result,
         rooms=rooms,
+        verdict=verdict(result, [room.cards for room in rooms]),
         model=model,
         comparison=comparison(result, rooms),
         summary=summary(result),

@@ -61,8 +61,9 @@ def room_humidity(
         for one in transfers:
             between[:, index[one.target], index[one.source]] += one.flow
     return zone_humidity(
-        zones, outdoor_humidity(weather), weather.dry_bulb_c, weather.pressure_pa, between
-    )
+        zones, outdoor_humidity(weather), weather.dry_bulb_c, weather.pressure_pa, between,
+        row_s=3600.0 * weather.step_h,
+    )  # fmt: skip
 
 
 def felt_by(person: ComfortTable, result: ZoneResult, humidity: Humidity) -> dict[str, FloatArray]:

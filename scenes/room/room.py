@@ -60,7 +60,7 @@ from scenes.room.operation_tables import ComfortTable, OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.solar import RoomSun
-from scenes.room.thermal import fenestration_table, thermal_result
+from scenes.room.thermal import fenestration_table, operated_year, thermal_result
 from scenes.room.windows import room_windows
 from scenes.room.zone import (
     RoomZone,
@@ -395,22 +395,5 @@ class RoomSimulation:
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""
         most = max(self.windows.systems, key=len)
-        hours = pd.DataFrame(
-            {
-                "shading_state": self.state,
-                "heating_w": balance.heating,
-                "cooling_w": balance.cooling,
-                "lighting_w": self.zone.lamps,
-            },
-            index=self.weather.midpoints,
-        ).rename_axis("time")
-        summary = {
-            "heating_kwh": balance.heating.sum() / 1e3,
-            "cooling_kwh": balance.cooling.sum() / 1e3,
-            "lighting_kwh": self.zone.lamps.sum() / 1e3,
-            "peak_heating_w": balance.heating.max(),
-            "peak_cooling_w": balance.cooling.max(),
-        }
         names = tuple(system.name for system in most)
-        summary = {key: float(value) for key, value in summary.items()}
-        return OperationResult(names, hours, summary, self.operation.control.rule)
+        return operated_year(self.zone, balance, self.weather, names, self.operation.control.rule)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
-from scenes.results import ThermalResult
+from scenes.results import OperationResult, ThermalResult
 from scenes.room.windows import RoomWindows
 from scenes.room.zone import RoomZone
 from thermal.balance import ZoneResult
@@ -18,6 +18,33 @@ from thermal.comfort import adaptive_comfort, running_mean, summarise
 from thermal.zone import Zone
 
 BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
+
+
+def operated_year(
+    room: RoomZone, result: ZoneResult, weather: Weather, states: tuple[str, ...], rule: str
+) -> OperationResult:
+    """What control, heating, cooling and lamps of a room did.
+
+    Args: states: names of the shading states; rule: of their control.
+    """
+    hours = pd.DataFrame(
+        {
+            "shading_state": room.state,
+            "heating_w": result.heating,
+            "cooling_w": result.cooling,
+            "lighting_w": room.lamps,
+        },
+        index=weather.midpoints,
+    ).rename_axis("time")
+    summary = {
+        "heating_kwh": result.heating.sum() / 1e3,
+        "cooling_kwh": result.cooling.sum() / 1e3,
+        "lighting_kwh": room.lamps.sum() / 1e3,
+        "peak_heating_w": result.heating.max(),
+        "peak_cooling_w": result.cooling.max(),
+    }
+    summary = {key: float(value) for key, value in summary.items()}
+    return OperationResult(states, hours, summary, rule)
 
 
 def thermal_result(

@@ -78,9 +78,11 @@ def balances(
     if must_compile(advance):
         progress(COMPILING, 0.0)
     zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in rooms]
+    row_s = 3600.0 * weather.step_h
     found = simulate_zones(
-        zones, climate(weather), suns, step_s=step_s, air_links=air_links, transfers=transfers
-    )
+        zones, climate(weather), suns, step_s=min(step_s, row_s), row_s=row_s,
+        air_links=air_links, transfers=transfers,
+    )  # fmt: skip
     return list(found)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
 
 from bim.building_file import STAGES, ReadOptions, read_building_file
 from bim.model import Building
@@ -16,6 +17,8 @@ def read_building(
     join: Sequence[str] = (),
     furniture: bool = False,
     apertures: Sequence[str] = (),
+    surroundings: Sequence[str | PathLike[str]] = (),
+    surroundings_offset: tuple[float, float, float] | None = None,
     progress: Progress = silent,
 ) -> Building:
     """The building of an IFC file, with the corrections kept beside it, or of another format.
@@ -24,10 +27,15 @@ def read_building(
         join: rooms to make one, as "Hall + Living".
         furniture: whether what stands in the rooms is in their light and views.
         apertures: materials of a Radiance scene's surfaces that are windows.
+        surroundings: files of what stands around, see `bim.with_surroundings`.
+        surroundings_offset: added to their coordinates [m] in place of any georeference.
 
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
         `problems`.
     """
     steps = summed(progress, "inputs", STAGES)
-    options = ReadOptions(tuple(join), furniture, tuple(apertures))
+    options = ReadOptions(
+        tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
+        surroundings_offset,
+    )  # fmt: skip
     return read_building_file(path, options, steps)

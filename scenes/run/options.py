@@ -35,6 +35,8 @@ class JobOptions(BuildingOptions):
     """Inputs and choices of a run."""
 
     operation: Path | None = None
+    surroundings: tuple[Path, ...] = ()  # files of what stands around
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     explore: bool = False  # every hour's picture in every shading state, for the explorer
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence

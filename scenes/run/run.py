@@ -144,6 +144,8 @@ def read_inputs(
         join=options.join,
         furniture=options.furniture,
         apertures=options.apertures,
+        surroundings=options.surroundings,
+        surroundings_offset=options.surroundings_offset,
         progress=steps,
     )
     inputs = job_inputs(building, options.spaces, files)
@@ -238,6 +240,7 @@ def _manifest(
     if inputs.operation is not None:
         files["operation"] = inputs.operation.file
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
+    files |= {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
         "quick": options.quick,
@@ -249,7 +252,11 @@ def _manifest(
         "system": ", ".join(dict.fromkeys(system.name for system in used)),
         "fenestration": used_sources(inputs),
         "options": {
-            key: str(value) if isinstance(value, Path) else value
+            key: str(value)
+            if isinstance(value, Path)
+            else [str(file) for file in value]
+            if key == "surroundings"
+            else value
             for key, value in options.named().items()
         },
         "seed": options.room.sampling.seed,

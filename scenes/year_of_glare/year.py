@@ -67,6 +67,7 @@ class GlareYear:
     digest: str  # of all inputs
     notes: tuple[str, ...] = ()  # of systems and weather
     fenestration: Sequence[dict] = ()  # name, source and windows of each system
+    space: Space | None = None  # the room, for its plan
 
 
 def read_year(
@@ -111,7 +112,7 @@ def read_year(
     notes = (*viewed.notes(), *weather.notes)
     return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
-        notes, viewed.sources,
+        notes, viewed.sources, viewed.space,
     )  # fmt: skip
 
 

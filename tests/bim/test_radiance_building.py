@@ -9,6 +9,7 @@ import pytest
 
 from bim.building_file import ReadOptions, check_building_file, held_states, read_building_file
 from bim.sensors import sensor_grid, view_point
+from bim.shell import enclosed_volume
 from mitsuba_cfs.errors import DataError
 
 OFFICE = Path(__file__).parents[2] / "docs/tutorials/office.rad"
@@ -53,6 +54,8 @@ def test_furniture_stands_in_the_room_and_the_street_outside(office):
     assert names(room.furniture) == {"desk", "cupboard"}
     assert {"house", "trunk", "ground", "south"} <= names(office.elements)
     assert not {"desk", "cupboard"} & names(office.elements)
+    desk = np.concatenate([e.triangles for e in room.furniture if e.name.startswith("desk")])
+    assert enclosed_volume(desk) == pytest.approx(1.6 * 0.8 * 0.04)  # normals out of the body
     points, _ = sensor_grid(room, 0.25, 0.8)
     on_desk = np.all((points[:, :2] > [1.2, 2.6]) & (points[:, :2] < [2.8, 3.4]), axis=1)
     in_cupboard = np.all((points[:, :2] > [0.2, 5.4]) & (points[:, :2] < [1.2, 5.9]), axis=1)

@@ -150,6 +150,8 @@ def test_air_between_rooms_is_joined(tmp_path):
     text = two_rooms().replace("InteriorWall", "Air")
     (one,) = read_gbxml(written(tmp_path, text), join=["Office + Hall"]).spaces
     assert (one.floor_area, one.volume) == pytest.approx((72, 216))
+    # a box of 9 x 8 x 3 m less the window: nothing is left of what was between
+    assert sum(face.area for face in one.faces) == pytest.approx(2 * 72 + 2 * 3 * 17 - 4.5)
     assert not open_edges(one.shell)
 
 

@@ -233,3 +233,32 @@ def test_an_isotropic_blind_keeps_all_it_lets_through(variant, real_data):
     )
     np.testing.assert_allclose(np.array(parts[1]), np.array(whole[1]), rtol=1e-3, atol=1e-5)
     assert 0.02 < nulls(parts[0]).mean() < 0.6
+
+
+@pytest.mark.parametrize("rank", [3, 4])
+def test_the_sun_and_paths_have_the_beam_and_the_rest_of_a_tree(variant, real_data, rank):
+    """Either rank: what goes straight on and what scatters are together what the tree passes."""
+    import mitsuba as mi
+
+    from mitsuba_cfs.trace.systems import lit_system, sun_scattering
+
+    if rank == 3:
+        tree = TensorTreeBsdf(transmission_front=isotropic_glass(0.5, 0.2))
+    else:
+        tree = read_bsdf_xml(real_data / "bsdf" / TREE_BLIND).band("Visible")
+    suns = np.array([[0.3, 0.5, 0.8], [-0.2, 0.1, 0.97], [0.6, -0.4, 0.7]])
+    suns /= np.linalg.norm(suns, axis=1)[:, None]
+    whole = direct_hemispherical(tree, "transmission_front", suns)
+    u = np.random.default_rng(3).random((2, 100_000))
+    r, phi = np.sqrt(u[0]), 2 * np.pi * u[1]
+    outward = mi.Vector3f(np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - u[0])]))
+    way, paths, beams = sun_scattering(tree), lit_system(tree), []
+    for given, passed in zip(suns, whole, strict=True):
+        sun = mi.Vector3f(*map(float, given))
+        beam = float(way.through(sun).numpy()[0])
+        assert float(paths.straight(sun).numpy()[0]) == pytest.approx(beam)
+        beams.append(beam)
+        values = np.pi * way.scattered(sun, outward).numpy()
+        noise = 5 * values.std() / np.sqrt(len(values))
+        assert beam + values.mean() == pytest.approx(passed, abs=noise + 1e-4)
+    assert max(beams) > 0.1  # there is a beam at all

@@ -16,7 +16,7 @@ from tests.report.synthetic import run_result
 
 TILE = 2  # pixels across of the squares that share their reflected light
 SIZE = 96  # pixels of a side of the pictures
-STEP = 11  # of the hours with the sun up, one in so many is explored
+STEP = 23  # of the hours with the sun up, one in so many is explored
 
 
 class MadeUpPictures:

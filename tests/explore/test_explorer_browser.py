@@ -95,7 +95,7 @@ def test_the_glare_of_the_page_is_the_programs(page, run) -> None:
 
 def test_luminance_and_illuminance_are_those_written(page, run) -> None:
     explored = run.spaces[0].explored
-    for hour in (3, 90, 200):
+    for hour in (3, 60, 150):
         values = page.value(
             "(async () => { const room = await cfs.explorer.variants[0].room();"
             f"return [Array.from((await room.rated(0, {hour})).values),"

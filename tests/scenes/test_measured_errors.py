@@ -7,6 +7,7 @@ import pytest
 
 from mitsuba_cfs.bsdf.glazing import Glazing, glazing_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.calibration.errors import (
@@ -46,6 +47,14 @@ def test_a_systems_traits_are_its_beam_and_how_far_it_turns_light():
     assert spread == pytest.approx(np.sqrt((angle**2).mean()), abs=0.02)
     half = system_traits(scattering(0.1, 0.1))[0]
     assert half == pytest.approx(np.log10(500), abs=0.02)
+
+
+def test_a_tensor_tree_is_known_for_one():
+    """A diffuser of 0.4 as one leaf: the traits of its Klems matrices, and a tree."""
+    leaf = TensorTree(4, np.zeros(1, dtype=np.int64), np.array([0.4 / np.pi]))
+    beam, spread, dark, tree = system_traits(TensorTreeBsdf(leaf, leaf))
+    assert tree == 1.0
+    assert (beam, spread, dark) == pytest.approx(system_traits(scattering(0.4))[:3], abs=0.01)
 
 
 def test_the_sun_in_view_and_the_hidden_sky_of_a_room():

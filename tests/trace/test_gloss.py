@@ -428,6 +428,39 @@ def test_the_sun_on_a_rough_facade_is_seen_through_the_window():
     assert lit.sum() > 20 and whole[lit].mean() > 0.8  # the others lie on the window's edges
 
 
+@pytest.mark.parametrize("alpha", [0.05, 0.2])
+def test_window_patches_have_the_sun_of_a_rough_facade_in_its_lobe(alpha):
+    """Irradiance of the window by the patches' light, against the lobe's integral."""
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
+    from mitsuba_cfs.trace.scene import TracedScene
+
+    outside = TracedScene(facade(mirror(0.6, alpha)), rooms.test_room()[1])
+    shares = window_shares(outside, samples=1024)
+    found = outdoor_light(shares, outside, np.stack([SUN, -SUN]), np.full(2, SUN_SOLID_ANGLE))
+    irradiance = KLEMS_FULL.projected_solid_angles() @ found
+    # the house itself hides the sun from what of the facade lies right before its window
+    assert irradiance[0] == pytest.approx(lobe_irradiance(0.6, alpha), rel=0.02)
+    assert irradiance[1] == 0
+
+
+def test_the_sun_on_a_smooth_mirror_is_counted_by_its_image_alone():
+    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.sun_paths import Places, reflecting_places
+
+    normals = np.tile(np.float32([0, -1, 0]), (4096, 1))
+    for gloss, diffuse, expected in (
+        (mirror(0.8), 0.0, 0.0), (mirror(0.5), 0.3, 0.3), (mirror(0.6, 0.1), 0.3, 0.9),
+    ):  # fmt: skip
+        outside = TracedScene(facade(gloss, diffuse), rooms.test_room()[1])
+        start = Places(np.zeros((4096, 3), np.float32), normals)
+        whole = reflecting_places(outside, start, 0, 1)
+        some = reflecting_places(outside, start, 0, 1, mirrored=True)
+        assert whole.weight.mean() == pytest.approx(gloss.at_normal + diffuse, rel=1e-3)
+        assert some.weight.sum() / 4096 == pytest.approx(expected, rel=0.01)  # some pass the edge
+
+
 def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
     """In a black room: the floor keeps 0.6 of what meets it first, the others 0.4."""
     from mitsuba_cfs.trace.absorption_matrix import absorption_matrix

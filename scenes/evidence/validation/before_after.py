@@ -88,9 +88,24 @@ def mirrors() -> tuple[Drawn, Drawn]:
     corners = [(-15, 12, 0), (-15, 12, 14), (20, 12, 14), (20, 12, 0)]
     noon = sky((0.2, -1.0, 1.1), 800.0, 100.0)
     pair = ((GLASS_REFLECTANCE, None), (0.0, CLEAR_GLAZING))
-    scenes = (office(0.0, exterior=plate(_turned(corners), *one)) for one in pair)
+    house = office(0.0)
+    facades = (plate(_turned(corners), *one) for one in pair)
+    scenes = (replace(house, exterior=beside(house.interior, facade)) for facade in facades)
     before, now = (Drawn(scene, [glass()], noon) for scene in scenes)
     return before, now
+
+
+def beside(house: cfs.Surfaces, facade: cfs.Surfaces) -> cfs.Surfaces:
+    """The house as it stands outdoors, and a facade of one surface before it."""
+    number = int(house.surface.max()) + 1
+    gloss = (*(None,) * number, facade.gloss[0]) if facade.gloss else ()
+    return cfs.Surfaces(
+        np.concatenate([house.triangles, facade.triangles]),
+        np.concatenate([house.reflectance, facade.reflectance]),
+        np.concatenate([house.surface, facade.surface + number]),
+        (),
+        gloss,
+    )
 
 
 def _turned(corners: Sequence[tuple]) -> list[tuple]:
@@ -143,7 +158,7 @@ def picture(drawn: Drawn) -> tuple[NDArray[np.float32], cfs.GlareResult]:
     sampling = cfs.Sampling(view_samples=SAMPLES, window_parts=drawn.window_parts)
     traced, view = cfs.PhaseScene(drawn.scene, sampling), drawn.scene.view
     light = cfs.PhaseSystems(traced, drawn.systems).light(drawn.sky)
-    shown = light.pictures(np.array([0]), [0])
+    shown = light.pictures(np.array([0]), [0] * len(drawn.systems))
     found = np.zeros(view.width * view.height, dtype=np.float32)
     found[shown.pixels] = shown.values(np.array([0]))[0]
     found = found.reshape(view.height, view.width)
@@ -172,7 +187,7 @@ def draw(name: str, file: Path) -> str:
     bar = figure.colorbar(shown, ax=axes, shrink=0.8)
     bar.set_label("cd/m2", fontsize=7)
     bar.ax.tick_params(labelsize=7)
-    figure.savefig(file, dpi=110)
+    figure.savefig(file, dpi=100)
     plt.close(figure)
     return f"{name}: {'; '.join(said)}"
 

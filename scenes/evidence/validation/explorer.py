@@ -2,10 +2,10 @@
 
     python -m scenes.evidence.validation.explorer RESULTS [--screenshot FILE.png]
 
-RESULTS is a folder of `cfs run --explore`. Judge: this program's rating of its own uncompressed
+RESULTS is a folder of `cfs run --explore`.  Judge: this program's rating of its own uncompressed
 pictures in the hours that it drew at random when it wrote the folder, against what the page
-computes and rates. Shared: the view's matrices, their pixels and noise, the rule. Cannot show:
-whether the pictures are right, which docs/validation.md shows elsewhere. Times are of one browser
+computes and rates.  Shared: the view's matrices, their pixels and noise, the rule.  Cannot show:
+whether the pictures are right, which docs/validation.md shows elsewhere.  Times are of one browser
 tab: the hour's codes are on disk, unpacked, made a picture, and rated.
 """
 

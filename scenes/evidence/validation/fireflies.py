@@ -8,6 +8,11 @@ glass: a box under an overhang with sunlit ground and a house across the street;
 file; the Geneva office of raytraverse.  Each pixel is held against the brightest of its 3 x 3
 neighbourhood in a picture by paths with twice as many pixels across, both without the sun's disc.
 A pixel is a firefly above 1.5 times that.
+
+    python -m scenes.evidence.validation.fireflies --weather CITY.epw --walls
+
+What the side wall of the box has straight from its window, by the window's Klems patches as in the
+pictures, over the same point by point, at distances from the window's plane and heights.
 """
 
 from __future__ import annotations
@@ -15,7 +20,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -36,6 +41,8 @@ FINER = 2  # times as many pixels across in the pictures by paths
 LEAST_BEAM = 5000.0  # [lx] normal to the sun, of the hours that are drawn
 BRIGHT = 2000.0  # [cd/m2] evalglare's threshold
 DARK = 0.1  # [cd/m2] below it nothing shines
+DISTANCES, HEIGHTS = (0.05, 0.15, 0.3, 0.6, 1.5), (0.5, 1.2, 2.2)  # of the wall's points [m]
+WALL_HOURS = 6
 GLASS = [0.0, 0.6, 0.6, 0.6, 0.6]  # transmittance at even steps of the cosine
 
 
@@ -166,6 +173,21 @@ def brightest(finer: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.max(around, axis=0)
 
 
+def beside_window(lit: LitScene, hours: int) -> Iterator[str]:
+    """Direct light by patches over that point by point, least to most of some hours: table rows."""
+    points = np.array([[1e-3, y, z] for y in DISTANCES for z in HEIGHTS])
+    around = lit.scene.interior, lit.scene.exterior, lit.scene.groups
+    scene = cfs.DaylightScene(*around, points, np.tile([1.0, 0, 0], (len(points), 1)))
+    chosen = cfs.Sampling(patch_samples=4096, sensor_samples=16384, window_parts=1)
+    sky = lit.drawn(hours, 0)
+    filled = cfs.PhaseSystems(cfs.PhaseScene(scene, chosen), lit.systems)
+    exact = filled.straight.matrix(0, 0).values
+    patches = exact - filled.straight.coefficients(0, 0)
+    ratio = (patches @ sky.without_sun()) / (exact @ sky.without_sun())
+    for row, y in zip(ratio.reshape(len(DISTANCES), len(HEIGHTS), -1), DISTANCES, strict=True):
+        yield f"| {y} | " + " | ".join(f"{r.min():.2f} to {r.max():.2f}" for r in row) + " |"
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Hold the scenes that files are given for, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -178,8 +200,12 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--samples", type=int, default=16, help="of each pixel by paths")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--walls", action="store_true", help="the wall beside the box's window")
     options = parser.parse_args(arguments)
     weather = cfs.read_epw(options.weather)
+    if options.walls:
+        print("\n".join(beside_window(overhang(weather, options.size), WALL_HOURS)))
+        return
     scenes = [overhang(weather, options.size)]
     if options.ifc:
         scenes.append(ifc_room(options.ifc, options.space, weather, options.size))

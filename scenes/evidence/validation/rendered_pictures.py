@@ -140,10 +140,9 @@ def blind_layer(reflectance: float = 0.55) -> PeriodicLayer:
     return venetian_blind(plastic("slat", reflectance), **slats)
 
 
-def blind_tree(levels: int = TREE_LEVELS) -> BsdfFile:
+def blind_tree() -> BsdfFile:
     """Its tensor trees."""
-    samples = TREE_SAMPLES >> 2 * max(levels - TREE_LEVELS, 0)
-    trees, _ = generate_tensor_tree(blind_layer(), levels, samples=samples, seed=1)
+    trees, _ = generate_tensor_tree(blind_layer(), TREE_LEVELS, samples=TREE_SAMPLES, seed=1)
     return BsdfFile({"Visible": trees[0]}, name="blind", manufacturer="mitsuba-cfs", thickness=0.08)
 
 

@@ -1,12 +1,12 @@
 r"""The beam of a tensor tree by Radiance's `aBSDF` and by this project: twelve suns, Ev and DGP.
 
-    python -m scenes.evidence.validation.tree_peak --tree BLIND.xml [--every 1] [--size 160] \
-        [--json FILE]
+    python -m scenes.evidence.validation.tree_peak [--tree BLIND.xml | --layer fabric] \
+        [--levels 5] [--every 1] [--size 120] [--json FILE]
 
-The room and the suns of `rendered_pictures` behind the tensor tree of a file, or by `--levels 5`
-behind one of the dissertation's blind at 40 degrees made here.  Besides Ev and DGP of both
-programs' pictures, ours by paths and by five phases, the share of the sun that passes straight
-on: in the tree, and between the slats themselves where they are known.
+The room and the suns of `rendered_pictures` behind the tensor tree of a file, or behind one made
+here of a layer: the dissertation's blind at 40 degrees, or a dark fabric of which 3 % is open.
+Besides Ev and DGP of both programs' pictures, ours by paths and by five phases, the share of the
+sun that passes straight on: in the tree, and between the layer's own slats or threads.
 """
 
 from __future__ import annotations
@@ -25,9 +25,12 @@ from numpy.typing import NDArray
 
 import mitsuba_cfs as cfs
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.generate import generate_tensor_tree
+from mitsuba_cfs.bsdf.periodic import PeriodicLayer, plastic
 from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.bsdf.screens import woven_screen
 from mitsuba_cfs.bsdf.traced_layer import TracedLayer, follow
-from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
+from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.view import View, fisheye
@@ -41,8 +44,9 @@ from scenes.evidence.benchmarks.annual_product import WEATHER
 from scenes.evidence.validation import rendered_pictures as rendered
 
 SLAT_RAYS = 1 << 16
+PATHS = 1 << 32  # of a tree, over all pairs of incident and outgoing cells
 POINTS = 4  # times that rtrace finds Ev
-POINT = "-u+ -ss 1 -ab 6 -ad 16384 -aa 0 -lr 12 -lw 1e-7"
+POINT = "-u+ -ss 1 -ab 8 -ad 16384 -aa 0 -lr 20 -lw 1e-9"
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class Outcome:
     moment: str
     altitude_deg: float
     beam: float  # share of the sun's light, of the tree
-    beam_of_slats: float | None
+    beam_of_layer: float | None
     ev_rtrace: float
     ev_rtrace_error: float
     ev: float  # of the picture by paths
@@ -64,15 +68,30 @@ class Outcome:
     dgp_five_phase: float
 
 
+def fabric(reflectance: float = 0.2) -> PeriodicLayer:
+    """A dark fabric, 3 % open."""
+    thread = plastic("thread", reflectance)
+    return woven_screen(thread, spacing=1e-3, openness=0.03, thickness=5e-5)
+
+
+LAYERS = {"blind": rendered.blind_layer, "fabric": fabric}  # by reflectance
+
+
+def layer_tree(layer: str, levels: int) -> BsdfFile:
+    """A layer's tensor trees."""
+    samples = PATHS >> 4 * levels
+    trees, _ = generate_tensor_tree(LAYERS[layer](), levels, samples=samples, seed=1)
+    return BsdfFile({"Visible": trees[0]}, name=layer, manufacturer="mitsuba-cfs", thickness=0.0)
+
+
 def outcomes(
-    tree: Path | None, levels: int, every: int, size: int, folder: Path
-) -> Iterator[Outcome]:
+    tree: Path | None, layer: str, levels: int, chosen: list[rendered.Moment], view: View,
+    folder: Path,
+) -> Iterator[Outcome]:  # fmt: skip
     """Every moment in both programs."""
-    view, weather = fisheye(rendered.EYE, rendered.DIRECTION, size), cfs.read_epw(WEATHER)
-    chosen = rendered.moments(weather)[::every]
     file = folder / "tree.xml"
     if tree is None:
-        write_bsdf_xml(rendered.blind_tree(levels), file)
+        write_bsdf_xml(layer_tree(layer, levels), file)
     else:
         file.write_bytes(tree.read_bytes())
     fenestration = rendered.PicturedSystem("tree", folder)
@@ -99,7 +118,7 @@ def outcomes(
             moment.name,
             float(np.degrees(np.arcsin(moment.sun[2]))),
             float(np.ravel(through.numpy())[0]),
-            None if tree is not None else beam_of_slats(local),
+            None if tree is not None else beam_between(layer, local),
             ev,
             ev_error,
             float(np.mean([one.Ev for one in own])),
@@ -130,23 +149,38 @@ def five_phase(
     return [full_picture(row, shown.pixels, view) for row in values]
 
 
-def beam_of_slats(local: NDArray[np.float64]) -> float:
-    """Share of a beam from a direction in the window's frame that meets none of the slats."""
-    layer = TracedLayer(rendered.blind_layer(reflectance=0.0))  # what is met is lost
+def beam_between(layer: str, local: NDArray[np.float64]) -> float:
+    """Share of a beam from a direction in the window's frame that meets nothing of the layer."""
+    black = TracedLayer(LAYERS[layer](0.0))  # what is met is lost
     lane = dr.arange(mi.UInt32, SLAT_RAYS)
     start = lattice_2d(lane, mi.UInt32(0), 0)
     direction = mi.Vector3f(*map(float, -local)) + dr.zeros(mi.Vector3f, SLAT_RAYS)
-    _, weights = follow(layer, start, direction, mi.Mask(True), mi.PCG32(size=SLAT_RAYS))
+    _, weights = follow(black, start, direction, mi.Mask(True), mi.PCG32(size=SLAT_RAYS))
     return float(weights[0].numpy().mean())
+
+
+def line(row: Outcome) -> str:
+    """A row of the table."""
+    between = "" if row.beam_of_layer is None else f"{row.beam_of_layer:.4f}"
+    return (
+        f"| {row.moment} | {row.altitude_deg:.0f} | {row.beam:.4f} | {between} | "
+        f"{row.ev_rtrace:,.0f} ± {row.ev_rtrace_error:.0f} | {row.ev:,.0f} "
+        f"({100 * (row.ev / row.ev_rtrace - 1):+.1f} %) | {row.ev_five_phase:,.0f} "
+        f"({100 * (row.ev_five_phase / row.ev_rtrace - 1):+.1f} %) | "
+        f"{row.dgp_rpict:.4f} ± {row.dgp_rpict_error:.4f} | {row.dgp:.4f} ± {row.dgp_error:.4f} "
+        f"({row.dgp - row.dgp_rpict:+.4f}) | {row.dgp_five_phase:.4f} "
+        f"({row.dgp_five_phase - row.dgp_rpict:+.4f}) |"
+    )
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--tree", type=Path, help="BSDF XML; else the blind of 40 degrees")
-    parser.add_argument("--levels", type=int, default=5, help="of the blind's own tree")
+    parser.add_argument("--tree", type=Path, help="BSDF XML")
+    parser.add_argument("--layer", choices=LAYERS, default="blind", help="where there is no file")
+    parser.add_argument("--levels", type=int, default=5, help="of the layer's tree")
     parser.add_argument("--every", type=int, default=1, help="moments from one to the next")
-    parser.add_argument("--size", type=int, default=160, help="[px]")
+    parser.add_argument("--size", type=int, default=120, help="[px]")
     parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
@@ -155,9 +189,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = (options.keep or Path(temporary)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
-        for row in outcomes(options.tree, options.levels, options.every, options.size, folder):
+        chosen = rendered.moments(cfs.read_epw(WEATHER))[:: options.every]
+        view = fisheye(rendered.EYE, rendered.DIRECTION, options.size)
+        given = options.tree, options.layer, options.levels
+        for row in outcomes(*given, chosen, view, folder):
             rows.append(asdict(row))
-            print(row, flush=True)
+            print(line(row), flush=True)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1))
 

@@ -1,0 +1,1 @@
+"""What stands around a building, from files of its own."""

@@ -1,0 +1,125 @@
+"""CityJSON: the buildings, plants and terrain of a quarter, in the finest detail up to LoD 2.
+
+Source: CityJSON 1.0 to 2.0 (https://www.cityjson.org/specs).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.context.objects import TERRAIN, ContextFile, ContextObject, read_object
+from bim.georeference import crs_name
+from bim.polygon_rooms import triangles_of_rings
+from mitsuba_cfs.errors import DataError
+
+DEPTH = {"MultiSurface": 1, "CompositeSurface": 1, "Solid": 2, "MultiSolid": 3, "CompositeSolid": 3}
+TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "PlantCover")
+FINEST = 3.0  # level of detail below which geometry is taken: 2.2 is, 3 (with openings) is not
+
+
+def read_cityjson(path: Path) -> ContextFile:
+    """The objects of a CityJSON file; each in its finest level of detail below 3.
+
+    Raises: `DataError` that names file, object and field.
+    """
+    content = read_object(path)
+    if content.get("type") != "CityJSON":
+        found = content.get("type")
+        raise DataError(f"expected CityJSON, got {found!r:.60}", file=path, field="type")
+    vertices = _vertices(content, path)
+    things = content.get("CityObjects")
+    if not isinstance(things, dict):
+        raise DataError("expected objects by name", file=path, field="CityObjects")
+    objects, left_out = [], Counter()
+    for name, thing in things.items():
+        geometry = _geometry(thing, name, path)
+        if geometry is None:
+            left_out["object(s) without geometry below LoD 3"] += not _has_children(thing)
+            continue
+        triangles = _triangles(geometry, vertices, name, path)
+        if len(triangles):
+            terrain = thing.get("type") in TERRAINS
+            kind = {"ifc_class": TERRAIN} if terrain else {}
+            objects.append(ContextObject(name, triangles, **kind))
+    metadata = content.get("metadata")
+    system = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
+    return ContextFile(
+        path, tuple(objects), crs_name(system) if isinstance(system, str) else None,
+        left_out=tuple((what, count) for what, count in left_out.items() if count),
+    )  # fmt: skip
+
+
+def _has_children(thing: dict[str, Any]) -> bool:
+    return bool(thing.get("children"))
+
+
+def _vertices(content: dict[str, Any], path: Path) -> NDArray[np.float64]:
+    listed = content.get("vertices")
+    try:
+        points = np.asarray(listed, dtype=float).reshape(-1, 3)
+        transform = content.get("transform")
+        if transform is not None:
+            scale = np.asarray(transform["scale"], dtype=float).reshape(3)
+            points = points * scale + np.asarray(transform["translate"], dtype=float).reshape(3)
+    except (TypeError, ValueError, KeyError, OverflowError):
+        message = "expected triples of numbers, and a transform of scale and translate"
+        raise DataError(message, file=path, field="vertices") from None
+    if not np.isfinite(points).all():
+        raise DataError("expected finite numbers", file=path, field="vertices")
+    return points
+
+
+def _geometry(thing: Any, name: str, path: Path) -> dict[str, Any] | None:
+    """The finest geometry of an object below LoD 3; None without one."""
+    if not isinstance(thing, dict):
+        raise DataError("expected an object", file=path, element=name[:60])
+    listed = thing.get("geometry") or []
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        raise DataError("expected a list", file=path, element=name[:60], field="geometry")
+    found = [(_level(one), one) for one in listed if one.get("type") in DEPTH]
+    found = [(level, one) for level, one in found if level < FINEST]
+    return max(found, key=lambda pair: pair[0])[1] if found else None
+
+
+def _level(geometry: dict[str, Any]) -> float:
+    try:
+        return float(geometry.get("lod", 0))
+    except (TypeError, ValueError):
+        return 0.0
+
+
+def _triangles(
+    geometry: dict[str, Any], vertices: NDArray[np.float64], name: str, path: Path
+) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of all surfaces of a geometry."""
+    found = [np.empty((0, 3, 3))]
+    try:
+        for surface in _surfaces(geometry["boundaries"], DEPTH[geometry["type"]]):
+            rings = tuple(_ring(ring, vertices) for ring in surface)
+            if rings and min(map(len, rings)) >= 3:
+                found.append(triangles_of_rings(rings))
+    except (TypeError, ValueError, KeyError, IndexError):
+        message = "expected lists of the numbers of vertices"
+        raise DataError(message, file=path, element=name[:60], field="boundaries") from None
+    return np.concatenate(found)
+
+
+def _ring(ring: list[int], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    if not all(isinstance(i, int) and 0 <= i < len(vertices) for i in ring):
+        raise IndexError(ring)
+    return vertices[np.asarray(ring, dtype=int)]
+
+
+def _surfaces(boundaries: Any, depth: int) -> Iterator[Any]:
+    """The surfaces in nested boundaries: lists of rings."""
+    for part in boundaries:
+        if depth == 1:
+            yield part
+        else:
+            yield from _surfaces(part, depth - 1)

@@ -1,0 +1,128 @@
+"""GeoJSON: footprints with heights, as blocks on the ground.
+
+Source: RFC 7946; the fields of heights are those of OpenStreetMap and of usual exports.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+import shapely.errors
+import shapely.geometry
+
+from bim.context.objects import ContextFile, ContextObject, is_number, read_object
+from bim.georeference import LONGITUDE_LATITUDE, crs_name
+from bim.planes import plane_through, polygons_of
+from bim.solids import prism, triangles_of
+from mitsuba_cfs.errors import DataError
+
+HEIGHTS = ("height", "building:height", "measuredHeight", "measuredheight", "Height", "HEIGHT")
+LEVELS = ("building:levels", "levels", "num_floors")
+BASES = ("min_height", "building:min_height", "base")
+STOREY = 3.0  # height of one, where only their number is stated [m]
+
+
+def read_footprints(path: Path) -> ContextFile:
+    """The polygons of a GeoJSON file that state a height, their corners in its coordinates.
+
+    Raises: `DataError` that names file, feature and field; a file without any height.
+    """
+    content = read_object(path)
+    features = content.get("features")
+    if content.get("type") != "FeatureCollection" or not isinstance(features, list):
+        raise DataError("expected a FeatureCollection of GeoJSON", file=path, field="type")
+    objects: list[ContextObject] = []
+    without = 0
+    for number, feature in enumerate(features):
+        found = _block(feature, f"feature {number}", path)
+        without += not found
+        objects += found
+    if not objects:
+        message = f"no polygon states a height ({', '.join(HEIGHTS[:3])}, or {LEVELS[0]})"
+        raise DataError(message, file=path, field="properties")
+    left_out = (("feature(s) without a polygon or a height", without),) if without else ()
+    return ContextFile(path, tuple(objects), _crs(content), True, left_out)
+
+
+def _crs(content: dict[str, Any]) -> str:
+    """Longitude and latitude, unless the file states another system in the old way."""
+    try:
+        return crs_name(str(content["crs"]["properties"]["name"]))
+    except (KeyError, TypeError):
+        return LONGITUDE_LATITUDE
+
+
+def _block(feature: Any, name: str, path: Path) -> list[ContextObject]:
+    """A feature's polygons from base to top; none without a height."""
+    if not isinstance(feature, dict) or not isinstance(feature.get("properties") or {}, dict):
+        raise DataError("expected a feature", file=path, element=name)
+    fields = feature.get("properties") or {}
+    geometry = feature.get("geometry") or {}
+    is_polygon = isinstance(geometry, dict) and geometry.get("type") in ("Polygon", "MultiPolygon")
+    height = _number(fields, HEIGHTS, name, path)
+    levels = _number(fields, LEVELS, name, path)
+    top = height if height is not None else None if levels is None else STOREY * levels
+    base = _number(fields, BASES, name, path) or 0.0
+    if not is_polygon or top is None or top <= base:
+        return []
+    try:
+        shape = shapely.make_valid(shapely.force_2d(shapely.geometry.shape(geometry)))
+        finite = bool(np.isfinite(shapely.get_coordinates(shape)).all())
+    except (ValueError, TypeError, LookupError, AttributeError, shapely.errors.ShapelyError):
+        finite = False
+    if not finite:
+        raise DataError("is no polygon", file=path, element=name, field="geometry.coordinates")
+    label = str(fields.get("name") or fields.get("id") or name)[:60]
+    return [
+        ContextObject(label, triangles)
+        for polygon in shapely.get_parts(shape)
+        if polygon.geom_type == "Polygon" and len(triangles := _prism(polygon, base, top))
+    ]
+
+
+def _number(fields: dict[str, Any], names: tuple[str, ...], name: str, path: Path) -> float | None:
+    """The first of some fields that is stated; texts as "12.5 m" are read."""
+    for field in names:
+        value = fields.get(field)
+        if isinstance(value, str):
+            try:
+                value = float(value.strip().removesuffix("m").strip().replace(",", "."))
+            except ValueError:
+                raise DataError(
+                    f"expected metres, got {value[:40]!r}", file=path, element=name, field=field
+                ) from None
+        if value is None:
+            continue
+        if not is_number(value) or not 0 <= value < 10_000:
+            message = f"expected metres, got {value!r:.40}"
+            raise DataError(message, file=path, element=name, field=field)
+        return float(value)
+    return None
+
+
+def _prism(polygon: shapely.Polygon, base: float, top: float) -> np.ndarray:
+    """Triangles of the block over a polygon.
+
+    Degrees are far apart in number and near in metres: the polygon is lifted to a size at which
+    nothing is dust, and put back.
+    """
+    low = np.asarray(polygon.bounds[:2])
+    size = max(np.ptp(np.asarray(polygon.bounds).reshape(2, 2), axis=0).max(), 1e-12)
+    scale = 100.0 / size
+    unit = shapely.transform(polygon, lambda p: (p - low) * scale)
+    plane = plane_through(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    parts = polygons_of(shapely.transform(unit, lambda p: plane.to_plane(_flat(p))[:, :2]))
+    if not parts:
+        return np.empty((0, 3, 3))
+    body = prism(shapely.union_all(parts), plane, base, top)
+    if body is None:
+        return np.empty((0, 3, 3))
+    triangles, _ = triangles_of(body)
+    return np.concatenate([triangles[..., :2] / scale + low, triangles[..., 2:]], axis=2)
+
+
+def _flat(points: np.ndarray) -> np.ndarray:
+    return np.column_stack([points, np.zeros(len(points))])

@@ -1,0 +1,217 @@
+"""Surroundings from files of their own, placed beside any building: `with_surroundings`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from bim.coarser import coarser_mesh
+from bim.context.cityjson import read_cityjson
+from bim.context.footprints import read_footprints
+from bim.context.horizon import horizon_wall, read_horizon
+from bim.context.meshes import SUFFIXES, read_meshes
+from bim.context.objects import ContextFile, ContextObject
+from bim.defaults import FACADE_REFLECTANCE, SITE_REFLECTANCE
+from bim.georeference import LONGITUDE_LATITUDE, local_metres, transformed
+from bim.model import Building, Element, Problem
+from bim.outdoors import lifted_sites, unblinded
+from mitsuba_cfs.errors import DataError
+
+READ = (*SUFFIXES, ".city.json", ".geojson", ".json", ".csv")
+SEEN_DEG = 0.2  # by which corners may move as seen from the building: less than the sun's disc
+PLAIN = 100  # triangles that an object may keep whatever its distance
+FARTHEST = 20_000.0  # objects further from the building are left out [m]
+SAME_PLACE = 0.5  # share of a room that a footprint covers which is the building itself
+
+
+def with_surroundings(
+    building: Building,
+    files: Sequence[str | PathLike[str]],
+    offset: Sequence[float] | None = None,
+) -> Building:
+    """The building with what files hold of its surroundings.
+
+    OBJ, STL, PLY, glTF, CityJSON, GeoJSON footprints with heights; the horizon of PVGIS.  Objects
+    on a map are placed by the building's map conversion, else by its latitude and longitude, which
+    are then taken as those of its origin; others lie in the building's own metres.  What the
+    surroundings hold of the building itself is left out.  Corners of far objects are merged by
+    less than 0.2 degrees as seen from the building.
+
+    Args: offset: added to the files' coordinates [m] in place of any georeference.
+
+    Raises: `DataError` for a file that cannot be used, or that cannot be placed.
+    """
+    spaces = [space.shell.reshape(-1, 3) for space in building.spaces if len(space.shell)]
+    if not spaces:
+        raise DataError("has no rooms that anything could stand around", file=building.file)
+    corners = np.concatenate(spaces)
+    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    elements: list[Element] = []
+    problems: list[Problem] = []
+    for file in map(Path, files):
+        if _is_horizon(file):
+            walls, radius = horizon_wall(read_horizon(file), centre, size)
+            what = f"horizon of {file.name}"
+            problems.append(Problem(file.name, what, f"a wall {radius:.0f} m away stands for it"))
+            elements.append(_element(ContextObject("horizon", walls), file, len(elements)))
+            continue
+        context = read_context(file)
+        placed = _placed(context, building, offset)
+        kept, more = _beside(placed, context, building, centre)
+        problems += more
+        kept, more = _as_seen(kept, centre, size, file)
+        problems += more
+        elements += [_element(one, file, len(elements) + n) for n, one in enumerate(kept)]
+    windows = list(building.windows)
+    free, more = lifted_sites(elements, windows)
+    outdoors = unblinded([*building.elements, *free], building.spaces)
+    problems += [*more, *outdoors.problems]
+    return replace(building, elements=outdoors.elements, problems=(*building.problems, *problems))
+
+
+def read_context(path: Path) -> ContextFile:
+    """The objects of a file by its name's ending.
+
+    Raises: `DataError` for an ending that is not read.
+    """
+    ending = path.suffix.lower()
+    if ending in SUFFIXES:
+        return read_meshes(path)
+    if ending == ".geojson":
+        return read_footprints(path)
+    if ending == ".json":
+        return read_cityjson(path)
+    raise DataError(f"expected a file of {', '.join(READ)}", file=path, field="--surroundings")
+
+
+def _is_horizon(path: Path) -> bool:
+    """Whether a file is a horizon: by its ending, or by what PVGIS calls it."""
+    if path.suffix.lower() == ".csv":
+        return True
+    return path.suffix.lower() == ".json" and "horizon" in path.name.lower()
+
+
+def _placed(
+    context: ContextFile, building: Building, offset: Sequence[float] | None
+) -> list[ContextObject]:
+    """The file's objects in the building's world."""
+    if offset is not None:
+        moved = np.asarray(offset, dtype=float)
+        return [replace(one, triangles=one.triangles + moved) for one in context.objects]
+    if context.crs is None:
+        return list(context.objects)
+    return [
+        replace(one, triangles=_to_world(one.triangles, context, building))
+        for one in context.objects
+    ]
+
+
+def _to_world(
+    triangles: NDArray[np.float64], context: ContextFile, building: Building
+) -> NDArray[np.float64]:
+    points, file = triangles.reshape(-1, 3), str(context.path)
+    place = building.georeference
+    if place is not None:
+        flat = transformed(points[:, :2], context.crs, place.crs, file=file)
+        heights = points[:, 2]
+        if context.from_ground:
+            heights = heights - place.to_world[2, 3] / place.to_world[2, 2]
+        whole = np.column_stack([flat, heights, np.ones(len(flat))])
+        return (whole @ place.to_world.T)[:, :3].reshape(-1, 3, 3)
+    if building.latitude_deg is None or building.longitude_deg is None:
+        message = (
+            f"lies on the map {context.crs}, and the building has neither a map conversion nor"
+            " latitude and longitude: give --surroundings-offset"
+        )
+        raise DataError(message, file=context.path)
+    degrees = transformed(points[:, :2], context.crs, LONGITUDE_LATITUDE, file=file)
+    flat = local_metres(degrees, building.longitude_deg, building.latitude_deg)
+    heights = points[:, 2] if context.from_ground else points[:, 2] - building.elevation
+    return np.column_stack([flat, heights]).reshape(-1, 3, 3)
+
+
+def _beside(
+    objects: Sequence[ContextObject],
+    context: ContextFile,
+    building: Building,
+    centre: NDArray[np.float64],
+) -> tuple[list[ContextObject], list[Problem]]:
+    """The objects that are not the building itself and not beyond all sight."""
+    rooms = [
+        (shapely.MultiPoint(s.shell.reshape(-1, 3)[:, :2]).convex_hull, s.shell.reshape(-1, 3))
+        for s in building.spaces
+    ]
+    kept, own, far = [], [], 0
+    for one in objects:
+        corners = one.triangles.reshape(-1, 3)
+        if np.linalg.norm(corners[:, :2] - centre[:2], axis=1).min() > FARTHEST:
+            far += 1
+        elif _is_building_itself(one, rooms):
+            own.append(one.name)
+        else:
+            kept.append(one)
+    problems = [
+        Problem(context.path.name, f"{count} {what}", "left out")
+        for what, count in context.left_out
+    ]
+    if own:
+        what = f"{', '.join(own[:3])}: {len(own)} object(s) where rooms of the building are"
+        problems.append(Problem(context.path.name, what, "left out as the building itself"))
+    if far:
+        what = f"{far} object(s) further than {FARTHEST / 1000:.0f} km"
+        problems.append(Problem(context.path.name, what, "left out: is the file placed rightly?"))
+    return kept, problems
+
+
+def _is_building_itself(
+    one: ContextObject, rooms: Sequence[tuple[shapely.Geometry, NDArray[np.float64]]]
+) -> bool:
+    corners = one.triangles.reshape(-1, 3)
+    if one.ifc_class != ContextObject.__dataclass_fields__["ifc_class"].default:
+        return False
+    outline = shapely.MultiPoint(corners[:, :2]).convex_hull
+    low, high = corners[:, 2].min(), corners[:, 2].max()
+    return any(
+        outline.intersection(room).area > SAME_PLACE * room.area
+        and low < shell[:, 2].max() - 0.5
+        and high > shell[:, 2].min() + 0.5
+        for room, shell in rooms
+    )
+
+
+def _as_seen(
+    objects: Sequence[ContextObject], centre: NDArray[np.float64], size: float, file: Path
+) -> tuple[list[ContextObject], list[Problem]]:
+    """Objects of many triangles with corners merged as far as it cannot be seen."""
+    kept, before, after, worst = [], 0, 0, 0.0
+    for one in objects:
+        corners = one.triangles.reshape(-1, 3)
+        gap = np.linalg.norm(corners - centre, axis=1).min() - size / 2
+        if len(one.triangles) > PLAIN and gap > size:
+            step = gap * np.tan(np.radians(SEEN_DEG)) / np.sqrt(3)
+            steps = tuple(step * part for part in (0.125, 0.25, 0.5, 1.0))
+            fewer, moved = coarser_mesh(one.triangles, PLAIN, steps)
+            if len(fewer) < len(one.triangles):
+                before, after = before + len(one.triangles), after + len(fewer)
+                worst = max(worst, float(np.degrees(np.arctan2(moved, gap))))
+                one = replace(one, triangles=fewer)
+        kept.append(one)
+    if not before:
+        return kept, []
+    what = f"{before} triangles of far objects"
+    done = f"{after} are traced, corners moved by {worst:.2f} degrees or less as seen from here"
+    return kept, [Problem(file.name, what, done)]
+
+
+def _element(one: ContextObject, file: Path, number: int) -> Element:
+    terrain = one.ifc_class.startswith("IfcGeographic") or one.name == "horizon"
+    value = SITE_REFLECTANCE if terrain else FACADE_REFLECTANCE
+    guid = f"{file.stem}-{number}"
+    return Element(guid, one.name, one.ifc_class, one.triangles, value, value)

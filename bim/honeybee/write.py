@@ -1,0 +1,231 @@
+"""A building as a honeybee model: `write_honeybee`.
+
+A window's glass is an aperture of the face that it lies in: its frame, else the wall around it,
+else a face of its own that is a thousandth wider.  Reveals are walls with an adiabatic condition.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from bim.hosted_windows import HostedPolygon, hosted_polygons
+from bim.model import Building, Construction, Element, Face, Space, Window
+from bim.planes import Plane, rings_of
+from bim.to_radiance import identifier
+from mitsuba_cfs.files import write_text
+
+TYPES = {"floor": "Floor", "ceiling": "RoofCeiling", "roof": "RoofCeiling"}
+Known = Mapping[str, tuple[float | None, float | None]]  # U and g by a window's GUID
+
+
+def write_honeybee(
+    building: Building, path: str | PathLike[str], *, known: Known | None = None
+) -> None:
+    """Write rooms, windows, constructions, reflectances and what stands outdoors as HBJSON.
+
+    What is lost: BSDF data and shading states, gloss, furniture; a glazing without U, g or visible
+    transmittance has no construction.
+
+    Args: known: U and g of windows in place of those that the building states.
+    """
+    library = _Library(known or {})
+    names = _Names()
+    guids = {space.guid: names.of(space.label) for space in building.spaces}
+    rooms = [_room(space, guids, names, library) for space in building.spaces]
+    windows = {window.guid for window in building.windows}
+    meshes = [_mesh(e, names, library) for e in building.elements if e.guid not in windows]
+    model = {
+        "type": "Model", "identifier": names.of(building.name or "building"),
+        "display_name": building.name, "units": "Meters", "tolerance": 0.001,
+        "angle_tolerance": 1.0, "rooms": rooms, "shade_meshes": meshes,
+        "properties": {"type": "ModelProperties", "energy": library.energy(),
+                       "radiance": library.radiance()},
+    }  # fmt: skip
+    write_text(Path(path), json.dumps(model, indent=1) + "\n")
+
+
+class _Names:
+    """Identifiers as honeybee takes them, each once."""
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set()
+
+    def of(self, name: str) -> str:
+        """The name in letters that honeybee takes, with a number where it is taken."""
+        base = identifier(name)[:80]
+        found, number = base, 1
+        while found in self._taken:
+            number += 1
+            found = f"{base}_{number}"
+        self._taken.add(found)
+        return found
+
+
+class _Library:
+    """Constructions and modifiers that have been asked for."""
+
+    def __init__(self, known: Known) -> None:
+        self._known = known
+        self._keys: dict[tuple, str] = {}
+        self._materials: dict[str, dict] = {}
+        self._constructions: dict[str, dict] = {}
+        self._modifiers: dict[str, dict] = {}
+
+    def construction(self, one: Construction, solar: float, visible: float) -> str:
+        """Name of layers whose room side reflects so much."""
+        content = (one.layers, solar, visible)
+        known = content in self._keys
+        key = self._keys.setdefault(content, f"{identifier(one.name)[:50]}_{len(self._keys)}")
+        if not known:
+            names = []
+            for number, layer in enumerate(one.layers):
+                inner = number == len(one.layers) - 1
+                absorbed = (1 - solar, 1 - visible) if inner else (0.7, 0.7)
+                name = f"{key}_{number}"
+                names.append(name)
+                self._materials[name] = {
+                    "type": "EnergyMaterial", "identifier": name, "display_name": layer.name,
+                    "thickness": layer.thickness, "conductivity": layer.conductivity,
+                    "density": layer.density, "specific_heat": max(layer.heat_capacity, 100.0),
+                    "roughness": "MediumRough", "thermal_absorptance": 0.9,
+                    "solar_absorptance": absorbed[0], "visible_absorptance": absorbed[1],
+                }  # fmt: skip
+            self._constructions[key] = {
+                "type": "OpaqueConstructionAbridged", "identifier": key, "materials": names,
+                "display_name": one.name,
+            }  # fmt: skip
+        return key
+
+    def glazing(self, window: Window) -> str | None:
+        """Name of a simple glazing with the window's U, g and transmittance; None without them."""
+        u_value, g_value = self._known.get(window.guid, (window.u_value, window.g_value))
+        if u_value is None or g_value is None or not window.visible_transmittance:
+            return None
+        values = (u_value, g_value, window.visible_transmittance)
+        key = "glazing_" + "_".join(f"{value:.4g}" for value in values)
+        fields = dict(zip(("u_factor", "shgc", "vt"), values, strict=True))
+        material = f"{key}_system"
+        self._materials[material] = {
+            "type": "EnergyWindowMaterialSimpleGlazSys",
+            "identifier": material,
+            **fields,
+        }
+        self._constructions[key] = {
+            "type": "WindowConstructionAbridged",
+            "identifier": key,
+            "materials": [material],
+        }
+        return key
+
+    def modifier(self, reflectance: float) -> str:
+        """Name of a grey diffuse plastic."""
+        name = f"grey_{reflectance:.4f}"
+        colours = {f"{c}_reflectance": round(float(reflectance), 4) for c in "rgb"}
+        self._modifiers[name] = {
+            "type": "Plastic", "identifier": name, "modifier": None, "dependencies": [],
+            "specularity": 0.0, "roughness": 0.0, **colours,
+        }  # fmt: skip
+        return name
+
+    def energy(self) -> dict[str, Any]:
+        """The extension of energy."""
+        return {"type": "ModelEnergyProperties", "materials": list(self._materials.values()),
+                "constructions": list(self._constructions.values())}  # fmt: skip
+
+    def radiance(self) -> dict[str, Any]:
+        """The extension of light."""
+        return {"type": "ModelRadianceProperties", "modifiers": list(self._modifiers.values())}
+
+
+def _room(space: Space, guids: Mapping[str, str], names: _Names, library: _Library) -> dict:
+    own = guids[space.guid]
+    faces = [
+        _own_face(part, own, names, library)
+        if part.face is None
+        else _face(part, part.face, own=own, names=names, library=library)
+        for part in hosted_polygons(space)
+    ]
+    return {
+        "type": "Room", "identifier": own, "display_name": space.label, "faces": faces,
+        "story": space.storey or None, "properties": _properties("Room"),
+    }  # fmt: skip
+
+
+def _own_face(part: HostedPolygon, own: str, names: _Names, library: _Library) -> dict:
+    """A face for glass that lies in none."""
+    ((window, pane),) = part.panes
+    return {
+        "type": "Face", "identifier": names.of(f"{own}_{window.name or 'window'}_wall"),
+        "face_type": "Wall", "geometry": _geometry(part.plane, part.polygon),
+        "boundary_condition": {"type": "Outdoors"},
+        "apertures": [_aperture(window, part.plane, pane, names, library)],
+        "properties": _properties("Face"),
+    }  # fmt: skip
+
+
+def _face(part: HostedPolygon, face: Face, *, own: str, names: _Names, library: _Library) -> dict:
+    plane, windows = part.plane, part.panes
+    conditions = {"outside": "Outdoors", "ground": "Ground"}
+    # two faces of a wall do not lie in one place here: honeybee's "Surface" cannot say that
+    condition = "Outdoors" if windows else conditions.get(face.adjacency, "Adiabatic")
+    construction = library.construction(
+        face.construction, face.total_reflectance("solar"), face.total_reflectance("visible")
+    )
+    slope = "RoofCeiling" if plane.normal[2] > 0.7 else "Wall"
+    return {
+        "type": "Face", "identifier": names.of(f"{own}_{face.name}"), "display_name": face.name,
+        "face_type": TYPES.get(face.kind, slope), "geometry": _geometry(plane, part.polygon),
+        "boundary_condition": {"type": condition},
+        "apertures": [_aperture(w, plane, pane, names, library) for w, pane in windows],
+        "properties": _properties(
+            "Face", construction, library.modifier(face.total_reflectance("visible"))
+        ),
+    }  # fmt: skip
+
+
+def _aperture(
+    window: Window, plane: Plane, pane: shapely.Polygon, names: _Names, library: _Library
+) -> dict:
+    return {
+        "type": "Aperture", "identifier": names.of(window.name or window.guid),
+        "display_name": window.name or window.guid, "geometry": _geometry(plane, pane),
+        "is_operable": False, "boundary_condition": {"type": "Outdoors"},
+        "properties": _properties("Aperture", library.glazing(window)),
+    }  # fmt: skip
+
+
+def _mesh(element: Element, names: _Names, library: _Library) -> dict:
+    corners, index = np.unique(
+        element.triangles.reshape(-1, 3).round(6), axis=0, return_inverse=True
+    )
+    return {
+        "type": "ShadeMesh", "identifier": names.of(element.name or element.guid),
+        "display_name": element.name, "is_detached": True,
+        "geometry": {"type": "Mesh3D", "vertices": corners.tolist(),
+                     "faces": index.reshape(-1, 3).tolist()},
+        "properties": _properties(
+            "ShadeMesh", None, library.modifier(element.reflectance_visible)
+        ),
+    }  # fmt: skip
+
+
+def _geometry(plane: Plane, polygon: shapely.Polygon) -> dict:
+    outline, *holes = (plane.to_world(ring).round(6).tolist() for ring in rings_of(polygon))
+    return {"type": "Face3D", "boundary": outline, **({"holes": holes} if holes else {})}
+
+
+def _properties(kind: str, construction: str | None = None, modifier: str | None = None) -> dict:
+    energy: dict[str, Any] = {"type": f"{kind}EnergyPropertiesAbridged"}
+    radiance: dict[str, Any] = {"type": f"{kind}RadiancePropertiesAbridged"}
+    if construction is not None:
+        energy["construction"] = construction
+    if modifier is not None:
+        radiance["modifier"] = modifier
+    return {"type": f"{kind}PropertiesAbridged", "energy": energy, "radiance": radiance}

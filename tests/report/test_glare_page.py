@@ -1,0 +1,102 @@
+"""The page of a year of glare: roses on the plan, the worst view, seats and views."""
+
+from __future__ import annotations
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenes.evidence.devtools import Page, chromium
+from scenes.figures.plan import plan_frame
+from scenes.figures.rose import RoseWedge, roses
+from scenes.year_of_glare.options import YearOptions
+from scenes.year_of_glare.page import write_page
+from tests.report.synthetic import two_rooms
+
+DIRECTIONS = 4
+SIDES = [((1, 0), 0, 1), ((0, 1), 1, -1), ((0, -1), 1, 1)]
+
+
+def table() -> pd.DataFrame:
+    """Views of a grid of 2 x 2 eyes in four directions; the south is worst, nearest the window."""
+    rows = []
+    for e, (x, y) in enumerate([(1.5, 1.5), (3.5, 1.5), (1.5, 4.0), (3.5, 4.0)]):
+        for d in range(DIRECTIONS):
+            way = np.array([np.sin(np.pi * d / 2), -np.cos(np.pi * d / 2)])
+            much = 0.5 * max(-way[1], 0) * (1.0 if y < 2 else 0.3) + 0.01 * e
+            protection = "none" if much > 0.2 else "minimum" if much > 0.1 else "high"
+            rows.append(
+                {"view": f"eye{e + 1:03d}_{d + 1}", "x": x, "y": y, "z": 1.2,
+                 "direction_x": way[0], "direction_y": way[1], "direction_z": 0.0,
+                 "hours_of_use": 3650, "share_above_0.35": much, "share_above_0.40": 0.6 * much,
+                 "share_above_0.45": 0.3 * much, "dgp_exceeded_in_5_percent": 0.3 + much / 2,
+                 "protection_en17037": protection, "highest_dgp": 0.3 + much,
+                 "worst_hour": "2017-12-21 12:30:00"}
+            )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    options = YearOptions("office.ifc", "city.epw", grid=2.0, directions=DIRECTIONS)
+    year = SimpleNamespace(
+        options=options, room="101 <Open> office", space=two_rooms().spaces[0],
+        weather=SimpleNamespace(site="Lyon"), notes=("A note & more.",),
+        fenestration=({"name": "Blind at 45"},),
+    )  # fmt: skip
+    path = tmp_path_factory.mktemp("glare") / "report.html"
+    write_page(year, table(), path)
+    return path
+
+
+def test_every_view_is_a_wedge_with_its_figures(page) -> None:
+    text = page.read_text()
+    assert text.count('class="wedge"') == 4 * DIRECTIONS
+    assert "eye002_1: 51 % above 0.35, 31 % above 0.40, 15 % above 0.45; highest 0.81" in text
+    assert "101 &lt;Open&gt; office" in text and "A note &amp; more." in text
+    assert "eye002_1: DGP 0.81, 21 December" in text
+    assert 'src="eye002_1_12-21_12h.png"' in text
+
+
+def test_seats_have_their_worst_and_best_direction(page) -> None:
+    text = page.read_text()
+    section = text[text.index('id="seats"') : text.index('id="views"')]
+    rows = re.findall(r"<tr>(.*?)</tr>", section, re.DOTALL)[1:]
+    cells = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in rows]
+    assert [c[3:5] for c in cells] == [["none", "high"]] * 2 + [["minimum", "high"]] * 2
+
+
+@pytest.mark.parametrize(("way", "axis", "sign"), SIDES)
+def test_wedges_point_where_the_eye_looks(way, axis, sign) -> None:
+    """In SVG y goes down: a view to the north has its wedge above the eye."""
+    space = two_rooms().spaces[0]
+    wedge = RoseWedge(np.array([2.0, 3.0]), np.array(way, float), (0.25, 0.04), "words")
+    _, body = roses(plan_frame(space, np.array([[2.0, 3.0, 1.2]])), [wedge], 1.0, 4)
+    eye = np.array([200.0, -300.0])
+    lengths = {}
+    for name, path in re.findall(r'class="(reach|above\d)" d="(.*?)"', body):
+        numbers = np.array(re.findall(r"-?\d+\.\d", path), float)
+        first, last = numbers[2:4] - eye, numbers[-2:] - eye
+        lengths[name] = np.linalg.norm(first)
+        assert sign * (first + last)[axis] > 0
+        assert abs((first + last)[1 - axis]) < 1
+    # areas are shares: radii their roots
+    assert lengths["above0"] / lengths["reach"] == pytest.approx(0.5, abs=0.01)
+    assert lengths["above1"] / lengths["reach"] == pytest.approx(0.2, abs=0.01)
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+def test_the_page_opens_without_a_fault(page, tmp_path) -> None:
+    with Page(tmp_path) as browser:
+        browser.open(page.as_uri(), ready="document.readyState === 'complete'")
+        boxes = browser.value(
+            "[...document.querySelectorAll('.rose .reach')]"
+            ".map((e) => e.getBoundingClientRect().width)"
+        )
+        assert len(boxes) == 4 * DIRECTIONS and min(boxes) > 10
+        assert browser.value("document.documentElement.scrollWidth") <= 1400
+        missing = [f for f in browser.faults if "ERR_FILE_NOT_FOUND" not in f]  # its two pictures
+        assert missing == []

@@ -1,0 +1,77 @@
+"""The verdict: each sentence says what the results hold, in the words of the standards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenes.report.headline import cards
+from scenes.report.verdict import verdict
+from tests.report.synthetic import run_result
+
+
+@pytest.fixture(scope="module")
+def result():
+    return run_result(picture_size=64, pictures=2)
+
+
+def said(result, heading: str) -> str:
+    return dict(verdict(result, [cards(result, r) for r in result.spaces]).sentences)[heading]
+
+
+def _with_glare(result, **changed: float):
+    """The run with one picture in its first room, of this glare."""
+    room = result.spaces[0]
+    picture = room.glare.pictures[0]
+    glare = {"dgp": 0.3, "ev": 1000.0, "sources": 2} | changed
+    one = replace(room, glare=replace(room.glare, pictures=(replace(picture, glare=glare),)))
+    return replace(result, spaces=(one,))
+
+
+def test_glare_names_its_hour_its_sun_and_its_cause(result) -> None:
+    # 5.87e-5 of 5,000 lx are 0.29; the sources add 0.05
+    text = said(_with_glare(result, dgp=0.50, ev=5000.0, dgp_standard_error=0.0012), "Glare")
+    assert "intolerable, DGP 0.50 ± 0.001" in text and "high in the" in text
+    assert "5\u202f000 lx at the eye weigh more than single bright sources" in text
+    text = said(_with_glare(result, dgp=0.42, ev=1000.0, sources=3), "Glare")
+    assert "disturbing" in text and "3 bright sources in view weigh more" in text
+    text = said(_with_glare(result, dgp=0.30), "Glare")
+    assert text.startswith("No picture has more than imperceptible glare; the highest DGP is 0.30")
+
+
+def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
+    text = said(result, "Warmth")
+    counts = []
+    for room in result.spaces:
+        used = room.heat.comfort["occupied"].to_numpy()
+        counts.append(int(((room.heat.operative_c.to_numpy() > 26) & used).sum()))
+    worst = result.spaces[int(np.argmax(counts))]
+    number = f"{max(counts):,}".replace(",", "\u202f")
+    assert text.startswith(f"{worst.space.label} is above 26 °C in {number} of its ")
+    room = result.spaces[0]
+    cold = room.heat.temperatures.assign(operative_c=20.0)
+    one = replace(room, heat=replace(room.heat, temperatures=cold))
+    assert said(replace(result, spaces=(one,)), "Warmth").startswith("No occupied hour is above 26")
+
+
+def test_shading_says_how_often_and_at_what_cost(result) -> None:
+    from tests.explore.synthetic import explored_run
+
+    assert "stays in one state" in said(replace(result, spaces=result.spaces[:1]), "Shading")
+    text = said(result, "Shading")
+    assert text.startswith("In ") and "the shading is drawn in" in text and "--explore" in text
+    whole = explored_run(step=400, size=32)
+    moved = replace(whole.spaces[0], operation=result.spaces[1].operation)
+    text = said(replace(whole, spaces=(moved,)), "Shading")
+    first, second = (float(t.split()[-1]) for t in text.split(" %")[1].split(" to ")[0:2])
+    assert first > second, "a blind does not bring light"
+
+
+def test_figures_stand_against_limits_with_their_errors(result) -> None:
+    found = verdict(result, [cards(result, r) for r in result.spaces]).limits
+    by_figure = {row[1]: row for row in found.rows}
+    assert "LM-83" in by_figure["Annual sunlight exposure"][3]
+    assert "% of each illuminance" in by_figure["Spatial daylight autonomy"][4]
+    assert {row[0] for row in found.rows} == {room.space.label for room in result.spaces}
