@@ -16,7 +16,6 @@ from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
-from mitsuba_cfs.progress import in_shares
 from mitsuba_cfs.trace import scene as traced_scenes
 from mitsuba_cfs.trace.scene import TracedScene
 from scenes.comply.light import lights_of
@@ -78,11 +77,3 @@ def test_nothing_of_a_checked_room_is_left(variant, made, weather, skies, blind,
     assert found[0].operated is not None and "PhaseLight" in living(made)
     del room
     assert not living(made)
-
-
-def test_a_stage_fills_its_share() -> None:
-    told = []
-    steps = in_shares(lambda *now: told.append(now), {"daylight": 0.6})
-    steps("daylight", 0.5)
-    steps("view matrices", 0.5)
-    assert told == [("daylight", 0.3), ("view matrices", 0.5)]
