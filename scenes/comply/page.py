@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.resources import files
 
-import jinja2
 from markupsafe import Markup
 
 from scenes.comply import tables
@@ -15,11 +13,13 @@ from scenes.comply.rules import RuleTable
 from scenes.figures.chart import Chart
 from scenes.quick import NOTE
 from scenes.report.numbers import rounded
-from scenes.report.page import TEMPLATES, environment
+from scenes.report.page import FILES as SHARED
+from scenes.report.page import environment
+from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Column, Table
 
-STYLE = files(__package__) / "templates" / "dossier.css"
+FILES = page_files("scenes.comply")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,9 @@ class DossierRoom(RoomSection):
 
 def dossier_html(result: Compliance, *, quick: bool = False) -> str:
     """The dossier as text: no script, font or picture is fetched from anywhere."""
-    pages = environment()
-    own, shared = (jinja2.PackageLoader(p) for p in (__package__, "scenes.report"))
-    pages.loader = jinja2.ChoiceLoader([own, shared])
     rooms = [dossier_room(result, room, i) for i, room in enumerate(result.rooms, 1)]
-    style = (TEMPLATES.joinpath("style.css"), STYLE)
-    return pages.get_template("dossier.html.j2").render(
+    style = (SHARED["style.css"], FILES["dossier.css"])
+    return environment(FILES).get_template("dossier.html.j2").render(
         title=result.building.name or "Building",
         facts=summary(result),
         notes=([NOTE] if quick else []) + list(result.notes),
@@ -57,7 +54,7 @@ def dossier_html(result: Compliance, *, quick: bool = False) -> str:
         rooms=rooms,
         problems=problems_table(result),
         seconds=", ".join(f"{name} {value:g} s" for name, value in result.seconds.items()),
-        style=Markup("\n".join(one.read_text("utf-8") for one in style)),
+        style=Markup("\n".join(style)),
     )  # fmt: skip
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import shutil
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,12 @@ from mitsuba_cfs.files import write_text
 from scenes.explore.packing import read_data, write_data
 from scenes.explore.room_files import write_room
 from scenes.figures.scale import ColourScale
+from scenes.report.page_files import page_files
 from scenes.results import RunResult
 from scenes.run.outputs import EXPLORER
 
 CASE = "case.js"
-PAGE = files(__package__) / "templates"
-STYLE = files("scenes.report") / "templates" / "style.css"
+FILES = page_files("scenes.explore") | {"style.css": page_files("scenes.report")["style.css"]}
 STEPS = 256  # of the palette
 
 
@@ -56,10 +55,8 @@ def write_explorer(result: RunResult, folder: Path) -> None:
 
 def write_page(folder: Path) -> None:
     """Write the page with its style and scripts."""
-    for one in sorted(PAGE.iterdir(), key=lambda one: one.name):
-        if one.is_file():
-            write_text(folder / one.name, one.read_text("utf-8"))
-    write_text(folder / "style.css", STYLE.read_text("utf-8"))
+    for name, text in FILES.items():
+        write_text(folder / name, text)
 
 
 def explorer_of(results: Path) -> Path:

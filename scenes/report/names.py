@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import dataclass
-from functools import cache
 from importlib.resources import files
 
 PERCENT = "%"
@@ -28,27 +27,29 @@ class Quantity:
     values: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... where they are classes
 
 
-@cache
-def words() -> dict:
+def _words() -> dict:
     """The package's table of quantities and the glossary."""
-    return tomllib.loads((files(__package__) / "words.toml").read_text("utf-8"))
+    return tomllib.loads((files("scenes.report") / "words.toml").read_text("utf-8"))
+
+
+WORDS = _words()
 
 
 def glossary() -> tuple[tuple[str, str], ...]:
     """Terms and their meanings, in the alphabet's order."""
-    return tuple(sorted(words()["glossary"].items(), key=lambda item: item[0].lower()))
+    return tuple(sorted(WORDS["glossary"].items(), key=lambda item: item[0].lower()))
 
 
 def option_words(key: str) -> tuple[str, str]:
     """Label and meaning of an option of the run."""
-    entry = words()["options"].get(key, {})
+    entry = WORDS["options"].get(key, {})
     return entry.get("label", key.replace("_", " ")), entry.get("meaning", "")
 
 
 def quantity(key: str) -> Quantity:
     """The quantity of that name; for an unknown one a label made from the name."""
-    if key in words()["quantities"]:
-        entry = words()["quantities"][key]
+    if key in WORDS["quantities"]:
+        entry = WORDS["quantities"][key]
         return Quantity(**{**entry, "values": tuple(entry.get("values", ()))})
     if match := UDI.match(key):
         return _useful_illuminance(*match.groups())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 
 import jinja2
@@ -18,11 +17,12 @@ from scenes.report.method import method_words
 from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words
 from scenes.report.numbers import rounded
+from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.verdict import verdict
 from scenes.results import RunResult
 
-TEMPLATES = files(__package__) / "templates"
+FILES = page_files("scenes.report")  # that other pages share
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js")
 
@@ -54,15 +54,18 @@ def report_html(result: RunResult) -> str:
         timings=timings_table(result),
         method=method_words(result),
         glossary=glossary(),
-        style=Markup(TEMPLATES.joinpath("style.css").read_text("utf-8")),
-        scripts=Markup("\n".join(TEMPLATES.joinpath(s).read_text("utf-8") for s in SCRIPTS)),
+        style=Markup(FILES["style.css"]),
+        scripts=Markup("\n".join(FILES[name] for name in SCRIPTS)),
     )  # fmt: skip
 
 
-def environment() -> jinja2.Environment:
-    """Templates of this package; everything inserted is escaped unless marked as markup."""
+def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
+    """Templates; everything inserted is escaped unless marked as markup.
+
+    Args: own: files of a page of another package, beside those that all share.
+    """
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader(__package__),
+        loader=jinja2.DictLoader({**FILES, **(own or {})}),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -177,6 +180,7 @@ def remaining(manifest: Mapping) -> dict:
         "inputs",
         "options",
         "versions",
+        "fenestration",
         "seconds",
         "rooms",
         "building",

@@ -35,7 +35,8 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
     """
     names = [room.space.label for room in result.spaces]
     rooms = names[0] if len(names) == 1 else f"{len(names)} rooms"
-    system = result.manifest.get("system") or "what fills its windows"
+    systems = [f"“{one['system']}”" for one in result.manifest.get("fenestration", ())]
+    system = " and ".join(systems) or result.manifest.get("system") or "what fills its windows"
     asked = (
         f"Daylight, glare and temperatures of {rooms} of {result.building.name or 'the building'} "
         f"in a year of {result.manifest.get('site') or 'the given weather'}, with {system}, "
@@ -61,7 +62,8 @@ def _glare(result: RunResult) -> str:
         return (
             f"No picture has more than imperceptible glare; the highest DGP is {value} ({where})."
         )
-    text = f"At its worst glare is {glare_class(dgp)}, DGP {value} in {where}: "
+    text = f"Of {len(found)} pictures the worst" if len(found) > 1 else "The one picture made"
+    text += f" has {glare_class(dgp)} glare, DGP {value} ({where}): "
     text += f"{sun_words(result, picture.hour)}, and {_cause(picture)}."
     if room.annual_glare is not None and occupied(room).any():
         year = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
@@ -78,11 +80,19 @@ def _cause(picture: LuminancePicture) -> str:
     by_light = BY_LIGHT * glare["ev"]
     by_sources = glare["dgp"] - NO_LIGHT - by_light
     light = f"{significant(glare['ev'], 2)} lx at the eye"
+    count = int(glare.get("sources", 0))
+    many = f"{count} bright sources" if count > 1 else "a bright source"
     if by_sources > by_light:
-        count = int(glare.get("sources", 0))
-        many = f"{count} bright sources" if count > 1 else "a bright source"
-        return f"{many} in view weigh more than the {light}"
-    return f"the {light} weigh more than single bright sources"
+        return f"{many} in view weigh more than the {light} ({_parts(by_sources, by_light)})"
+    if count == 0 or by_sources <= 0:
+        return f"the {light} are all of it"
+    return f"the {light} weigh more than {many} in view ({_parts(by_light, by_sources)})"
+
+
+def _parts(one: float, other: float) -> str:
+    """Two shares of what DGP has beyond its value without light."""
+    part = round(100 * one / (one + other))
+    return f"{part} to {100 - part} %"
 
 
 def _warmth(result: RunResult) -> str:

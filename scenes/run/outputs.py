@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +18,9 @@ from scenes.results import RoomYear, RunResult
 from scenes.room.daylight import illuminance_table
 from scenes.room.glare import glare_table
 from scenes.run.csv_text import csv_text
+from scenes.user_errors import user_message
 
+REPORT = "report.html"
 EXPLORER = "explore"  # folder of the explorer, inside that of the results
 
 
@@ -28,7 +32,10 @@ def write_results(
     Args:
         write_report: `scenes.report.write_report`, or None for no report.
         write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
+
+    A fault of the program in one of these pages is raised when all else is in place.
     """
+    faults = []
     with folder.replaced() as temporary:
         several = len(result.spaces) > 1
         names = folder_names([room.space for room in result.spaces])
@@ -37,12 +44,33 @@ def write_results(
             place.mkdir(exist_ok=True)
             _write_room(result, room, place)
         write_table(_problems(result), temporary / "problems.csv", index=False)
-        if write_report is not None:
-            write_report(result, temporary / "report.html")
-        if write_explorer is not None:
-            write_explorer(result, temporary / EXPLORER)
+        for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
+            if write is not None:
+                faults += _faults(write, result, temporary / page)
         text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
+    if faults:
+        raise faults[0] if len(faults) == 1 else ExceptionGroup("no page was written", faults)
+
+
+def _faults(
+    write: Callable[[RunResult, Path], None], result: RunResult, page: Path
+) -> list[Exception]:
+    """Write a page; the fault that it was left out for, so that hours of work are not lost to it.
+
+    A full disk and the like are no such fault: the earlier results stay then, as for every file.
+    """
+    try:
+        write(result, page)
+    except Exception as fault:
+        if user_message(fault) is not None:
+            raise
+        if page.is_dir():
+            shutil.rmtree(page)
+        page.unlink(missing_ok=True)
+        fault.add_note(f"{page.name} was left out; the other results are whole")
+        return [fault]
+    return []
 
 
 def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from importlib import metadata
-from importlib.resources import files
 from pathlib import Path
 
-import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
@@ -15,6 +13,7 @@ from scenes.report import page as run_page
 from scenes.report import tables
 from scenes.report.names import glossary
 from scenes.report.numbers import rounded, share
+from scenes.report.page_files import page_files
 from scenes.study.study import StudyResult
 from scenes.study_report.case_page import case_page
 from scenes.study_report.comparison import (
@@ -27,7 +26,7 @@ from scenes.study_report.comparison import (
 )
 from scenes.study_report.model import study_model
 
-TEMPLATES = files(__package__) / "templates"
+FILES = page_files("scenes.study_report")
 MOST_CASES = 60  # that have a section of their own: some 200 kB each
 
 
@@ -44,13 +43,9 @@ def study_report_html(study: StudyResult) -> str:
     pages = tuple(case_page(study, number, case, r) for number, case, r in done[:MOST_CASES])
     errors = [r.figures["illuminance_error_mean"] for _, _, r in done]
     worst = max(r.figures["illuminance_error_max"] for _, _, r in done)
-    loaders = [jinja2.PackageLoader("scenes.study_report"), jinja2.PackageLoader("scenes.report")]
-    environment = run_page.environment()
-    environment.loader = jinja2.ChoiceLoader(loaders)
-    styles = (run_page.TEMPLATES.joinpath("style.css"), TEMPLATES.joinpath("study.css"))
-    scripts = [run_page.TEMPLATES.joinpath(name) for name in run_page.SCRIPTS]
-    scripts.append(TEMPLATES.joinpath("study.js"))
-    return environment.get_template("study.html.j2").render(
+    styles = (run_page.FILES["style.css"], FILES["study.css"])
+    scripts = [*(run_page.FILES[name] for name in run_page.SCRIPTS), FILES["study.js"]]
+    return run_page.environment(FILES).get_template("study.html.j2").render(
         study=study,
         title=study.title or "Study of fenestration systems",
         facts=facts(study),
@@ -70,8 +65,8 @@ def study_report_html(study: StudyResult) -> str:
         worst_error=share(worst / 100),
         version=metadata.version("mitsuba-cfs"),
         glossary=glossary(),
-        style=Markup("\n".join(style.read_text("utf-8") for style in styles)),
-        scripts=Markup("\n".join(script.read_text("utf-8") for script in scripts)),
+        style=Markup("\n".join(styles)),
+        scripts=Markup("\n".join(scripts)),
     )  # fmt: skip
 
 

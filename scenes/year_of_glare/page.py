@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import pandas as pd
 import shapely
@@ -17,10 +16,13 @@ from scenes.figures.plan import PlanFrame, plan_frame, sensor_cells
 from scenes.figures.rose import RoseWedge, roses
 from scenes.quick import NOTE
 from scenes.report.numbers import percent, rounded
-from scenes.report.page import TEMPLATES, environment
+from scenes.report.page import FILES as SHARED
+from scenes.report.page import environment
+from scenes.report.page_files import page_files
 from scenes.report.tables import Column, Table, spoken
 from scenes.year_of_glare.year import GlareYear, rating_of
 
+FILES = page_files("scenes.year_of_glare")
 ALONE = 1.5  # [m] between eyes where there is one
 NEAR = 0.01  # [m] eyes nearer than this are one
 
@@ -30,18 +32,20 @@ def write_page(year: GlareYear, table: pd.DataFrame, path: Path) -> None:
 
     Args: table: a row for each view, as in `views.csv`.
     """
-    own = jinja2.PackageLoader(__package__)
-    pages = environment().overlay(loader=jinja2.ChoiceLoader([own, environment().loader]))
-    text = pages.get_template("glare_year.html.j2").render(
-        year=year,
-        facts=_facts(year, table),
-        plan=_plan(year, table),
-        limits=[f"{limit:.2f}" for limit in LIMITS],
-        worst=_worst(year, table),
-        seats=_seats(table),
-        views=_views(table),
-        style=Markup(TEMPLATES.joinpath("style.css").read_text("utf-8")),
-        scripts=Markup(TEMPLATES.joinpath("tables.js").read_text("utf-8")),
+    text = (
+        environment(FILES)
+        .get_template("glare_year.html.j2")
+        .render(
+            year=year,
+            facts=_facts(year, table),
+            plan=_plan(year, table),
+            limits=[f"{limit:.2f}" for limit in LIMITS],
+            worst=_worst(year, table),
+            seats=_seats(table),
+            views=_views(table),
+            style=Markup(SHARED["style.css"]),
+            scripts=Markup(SHARED["tables.js"]),
+        )
     )
     write_text(path, text)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import threading
 import urllib.error
@@ -18,6 +19,9 @@ from scenes.cli import cfs
 from scenes.explore.folder import explorer_of, join_explorers, write_explorer
 from scenes.explore.packing import packed, read_data
 from scenes.explore.serve import server
+from scenes.report import write_report
+from scenes.result_folder import ResultFolder
+from scenes.run.outputs import write_results
 from tests.explore.synthetic import explored_run
 
 
@@ -73,6 +77,37 @@ def test_a_window_drawn_in_the_building_casts_no_shadow_on_its_own_room(tmp_path
         (file,) = (tmp_path / guid / "data").glob("room0.js")
         count.append(read_data(file)["arrays"]["blockers"]["length"])
     assert count[0] - count[1] == window.triangles.size
+
+
+@pytest.mark.parametrize("lost", ["report.html", "explore"])
+def test_a_fault_in_one_page_leaves_all_else(lost, tmp_path) -> None:
+    """It is raised all the same, when the results are in their folder."""
+
+    def failing(_result, page: Path) -> None:
+        if page.suffix != ".html":
+            page.mkdir()
+        half = page if page.suffix == ".html" else page / "half.js"
+        half.write_text("half")
+        raise ZeroDivisionError("a fault of the program")
+
+    folder = ResultFolder(tmp_path / "out", "run")
+    pages = {"report.html": write_report, "explore": write_explorer} | {lost: failing}
+    with pytest.raises(ZeroDivisionError) as fault:
+        write_results(explored_run(step=400, size=32), folder, *pages.values())
+    assert fault.value.__notes__ == [f"{lost} was left out; the other results are whole"]
+    found = {one.name for one in (tmp_path / "out").iterdir()}
+    assert {"run.json", "problems.csv", "report.html", "explore"} - found == {lost}
+
+
+def test_a_page_refused_by_the_disk_keeps_the_earlier_results(tmp_path) -> None:
+    def refused(_result, page: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(page))
+
+    with pytest.raises(DataError, match="the disk is full"):
+        write_results(
+            explored_run(step=400, size=32), ResultFolder(tmp_path / "out", "run"), refused
+        )
+    assert not (tmp_path / "out").exists()
 
 
 def test_several_are_joined(results, tmp_path) -> None:
