@@ -44,11 +44,12 @@ def design_loads(
     options = {"step_s": min(step_s, row_s), "row_s": row_s, "air_links": air_links}
     cold = float(np.percentile(weather.dry_bulb_c, COLD)) if outdoor_c is None else outdoor_c
     first = np.arange(day_rows)
+    used = day_rows * _aired_day(zones, hours, day_rows) + first
     calm = [
-        replace(of_hours(zone, first, hours), gains=Gains(), loads=_warmest(zone)) for zone in zones
+        replace(of_hours(zone, used, hours), gains=Gains(), loads=_warmest(zone)) for zone in zones
     ]
     dark = [no_sun(day_rows, len(zone.surfaces), len(zone.windows)) for zone in zones]
-    moved = [of_hours(one, first, hours) for one in transfers]
+    moved = [of_hours(one, used, hours) for one in transfers]
     results = simulate_zones(calm, _steady(whole, cold, day_rows), dark, transfers=moved, **options)
     rows = [
         {"room": r.name, "case": "heating", "day": "", "outdoor_mean_c": cold,
@@ -89,6 +90,16 @@ def of_hours(value: T, chosen: NDArray[np.int64], hours: int) -> T:
         parts = {f.name: getattr(value, f.name) for f in fields(value) if f.init}
         return replace(value, **{k: of_hours(v, chosen, hours) for k, v in parts.items()})
     return value
+
+
+def _aired_day(zones: Sequence[Zone], hours: int, rows: int) -> int:
+    """The first day on which fans bring most: the year may begin with a holiday without."""
+    air = np.zeros(hours)
+    for zone in zones:
+        if zone.supply is not None:
+            air += zone.volume * np.broadcast_to(zone.supply.ach, hours)
+    days = hours // rows
+    return int(np.argmax(air[: rows * days].reshape(days, rows).sum(axis=1)))
 
 
 def _hot_days(rooms: Sequence[RoomZone], weather: Weather, rows: int) -> list[int]:

@@ -16,6 +16,7 @@ from thermal.records import TERMS
 DEMANDS = ("heat", "cold")
 ELECTRICITY = ("electricity fans", "electricity lamps", "electricity equipment")
 WEEK = pd.Timedelta(days=7)
+SUN_OF = {"facade": "facade sun", "windows": "glass sun"}  # what is absorbed there
 
 
 def year_figure(year: ThermalYear, path: Path) -> None:
@@ -36,6 +37,8 @@ def energy_panel(year: ThermalYear, axes: Axes) -> None:
     names = [*DEMANDS, *ELECTRICITY]
     for number, name in enumerate(names):
         values = year.energy[f"{name} [kWh/m2]"].to_numpy()
+        if not values.any():
+            continue
         axes.bar(months + 0.16 * (number - 2), values, 0.16, label=name)
     axes.set(xlabel="month", ylabel="kWh/m2", xticks=months)
     axes.legend(fontsize="small")
@@ -45,7 +48,7 @@ def duration_panel(year: ThermalYear, axes: Axes) -> None:
     """Operative and outdoor temperature, sorted."""
     for name, label in (("operative_c", "operative"), ("outdoor_c", "outdoors")):
         values = np.sort(year.hours[name].to_numpy())[::-1]
-        axes.plot(np.arange(len(values)), values, label=label)
+        axes.plot(_step_h(year) * np.arange(len(values)), values, label=label)
     axes.set(xlabel="hours above", ylabel="temperature [C]")
     axes.legend(fontsize="small")
 
@@ -64,18 +67,27 @@ def week_panel(year: ThermalYear, axes: Axes) -> None:
 
 
 def balance_panel(year: ThermalYear, axes: Axes) -> None:
-    """Gains and losses of the room's heat by month, stacked."""
-    flows = [name for name in TERMS if name != "storage"]
-    columns = [f"{name.replace(' ', '_')}_w" for name in flows]
-    table = year.hours[columns].groupby(year.hours.index.month).sum() / 1e3
-    above, below = np.zeros(len(table)), np.zeros(len(table))
-    colours = colormaps["tab20"]
-    for number, (name, column) in enumerate(zip(flows, columns, strict=True)):
-        values = table[column].to_numpy()
+    """Gains and losses of the room's heat by month, stacked.
+
+    Walls and panes come with the sun that they absorb: most of it goes straight back outdoors.
+    """
+    flows = {name: [name] for name in TERMS if name not in ("storage", *SUN_OF.values())}
+    flows |= {name: [name, sun] for name, sun in SUN_OF.items()}
+    kwh, month = _step_h(year) / 1e3, year.hours.index.month
+    colours, above, below = colormaps["tab20"], np.zeros(12), np.zeros(12)
+    months = pd.RangeIndex(1, 13)
+    for number, (name, terms) in enumerate(flows.items()):
+        power = year.hours[[f"{term.replace(' ', '_')}_w" for term in terms]].sum(axis=1)
+        values = kwh * power.groupby(month).sum().reindex(months, fill_value=0.0).to_numpy()
         if np.abs(values).max() < 1.0:  # kWh
             continue
         base = np.where(values > 0, above, below)
-        axes.bar(table.index, values, bottom=base, label=name, color=colours(number))
+        axes.bar(months, values, bottom=base, label=name, color=colours(number))
         above, below = above + np.maximum(values, 0), below + np.minimum(values, 0)
-    axes.set(xlabel="month", ylabel="heat into the room [kWh]")
-    axes.legend(fontsize="x-small", ncols=2)
+    axes.set(xlabel="month", ylabel="heat into the room [kWh]", xticks=months)
+    axes.legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _step_h(year: ThermalYear) -> float:
+    """Length of the rows of a year [h]."""
+    return float((year.hours.index[1] - year.hours.index[0]) / pd.Timedelta(hours=1))

@@ -36,12 +36,14 @@ def _run_job(_options, *_others, **_more):
 def _thermal(_study, *_others):
     hours = pd.DataFrame({"air_c": np.linspace(15.0, 30.0, 8760)})
     summary = dict.fromkeys(
-        ("operative_min_c", "operative_max_c", "heating_kwh", "cooling_kwh",
+        ("operative_min_c", "operative_max_c", "heat_kwh", "cold_kwh",
          "comfortable_h ASHRAE 55 80 %"), 1.0,
     )  # fmt: skip
     room = SimpleNamespace(
         name="A", floor_area=10.0, hours=hours, summary=summary,
-        months=pd.DataFrame({"discomfort": np.zeros(12)}),
+        months=pd.DataFrame({"discomfort": np.zeros(12)}), design=None,
+        powers=pd.DataFrame({"heat": np.zeros(8760)}),
+        energy=pd.DataFrame({"heat [kWh]": np.zeros(12)}),
     )  # fmt: skip
     return (room,), ()
 
