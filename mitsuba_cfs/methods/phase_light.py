@@ -25,6 +25,7 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.annual_pictures import FivePhasePictures
 from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.picture_beam import BeamLight, beam_light
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients, outdoors
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.scene import kept_scene
@@ -43,6 +44,7 @@ class PhaseSystems:
             raise ValueError(f"systems of {len(systems)} groups for {len(traced.scene.groups)}")
         self.traced, self.systems = traced, systems
         self._seen: dict[tuple[int, ...], tuple[PictureSun, OutdoorCoefficients]] = {}
+        self._beams: dict[tuple[int, ...], BeamLight | None] = {}
         self.straight = StraightViews(traced, systems)
         self.reflected_sun = ReflectedSun(traced, systems, self.straight)
         self.mirrored = WindowReflection(traced)
@@ -88,6 +90,27 @@ class PhaseSystems:
                 seed=chosen.seed,
             )  # fmt: skip
         return self._seen[state]
+
+    def beam_light(self, state: tuple[int, ...]) -> BeamLight | None:
+        """The beam on what the view's pixels show of the room, with each group in a state.
+
+        None where there is none; behind glossy outdoors, which one ray does not know, by patches.
+        """
+        if state not in self._beams:
+            self._beams[state] = None
+            scene, chosen, parts = self.traced.scene, self.traced.sampling, self.traced.parts
+            last = [min(j, len(s) - 1) for j, s in zip(state, self.systems, strict=True)]
+            beams = [self.straight.beam(g, last[g]) for g in parts.group]
+            ways = [
+                o.scattering if beam.any() else None
+                for o, beam in zip(self.optics(state), beams, strict=True)
+            ]
+            if any(way is not None for way in ways) and not scene.exterior.glossy:
+                self._beams[state] = beam_light(
+                    scene.interior, scene.exterior, parts.groups, ways, np.stack(beams),
+                    scene.view, subdivision=chosen.subdivision, seed=chosen.seed,
+                )  # fmt: skip
+        return self._beams[state]
 
 
 class PhaseLight:
@@ -229,9 +252,8 @@ class PhaseLight:
             sky.illuminance[hours],
             beam=self._window_luminance("beam", rows, hours),
         )
-        found.show_outdoors(
-            seen, daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
-        )
+        outdoors = daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
+        found.show_outdoors(seen, *outdoors, light=self.filled.beam_light(tuple(map(int, state))))
         return found
 
     @cached_property

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
@@ -25,16 +23,17 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, flat
 from mitsuba_cfs.glare.sun_disc import SunDisc
-from mitsuba_cfs.images.view import View, pixel_directions
+from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.image import picture_part_blocks
+from mitsuba_cfs.trace.picture_beam import BeamLight, faces_luminance
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
-from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, smoothing, tile_size
+from mitsuba_cfs.trace.picture_rows import PictureRows
+from mitsuba_cfs.trace.picture_sharing import tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
 from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
-from mitsuba_cfs.trace.sampling import tables, vectors
-from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.scene import kept_scene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
 NEGATIVE = 1e-4  # of the largest luminance: what rounding may leave below zero
@@ -98,8 +97,8 @@ def view_matrices(
     """
     tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
-    pixels, row, group, keys = _tiles(tracer, view, tile)
-    m, half = len(keys), 2 * row + _second_half(pixels, view)
+    shared = PictureRows.of_view(tracer, view, tile)
+    pixels, row, half, m = shared.pixels, shared.row, shared.half, len(shared.keys)
     shape = (2 * m, len(groups) * options.get("basis", KLEMS_FULL).size)
     sums = [_storage(shape, 8 * math.prod(shape) > memory, folder) for _ in range(2)]
     options["window_reflectance"] = window_reflectance
@@ -108,22 +107,17 @@ def view_matrices(
     share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0)
     if window_reflectance is not None:  # where a window reflects, all of a pixel does
         reflecting = np.append(np.asarray(window_reflectance) > 0, False)  # OPAQUE is the last
-        share = np.where(reflecting[group], 1.0, share)
+        share = np.where(reflecting[shared.group], 1.0, share)
     share = share.astype(np.float32)
-    total = np.bincount(half, share, minlength=2 * m)
     elements, close = None, None
     if options.get("max_depth", 2) > 1:
         area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
         elements, close = sun_elements(tracer, area, view, pixels, half, tile, seed=seed)
     least = 0.5 / options.get("samples", 32)
-    smooth = sparse.csr_array(sparse.eye_array(m, dtype=np.float32))
-    sharper = smooth  # of the windows' light, which changes fastest where other surfaces are close
-    if tile > 1:
-        count = np.maximum(total.reshape(-1, 2).sum(axis=1), least)
-        squares = Tiles(tile, view.width)
-        smooth = smoothing(squares, keys, count).astype(np.float32)
-        sharper = smoothing(squares, keys, count, close).astype(np.float32)
-    mean, noise = _of_halves(total, least)
+    smooth = shared.smoothing(share, least)
+    # sharper for the windows' light, which changes fastest where other surfaces are close
+    sharper = smooth if close is None else shared.smoothing(share, least, close)
+    mean, noise = shared.of_halves(share, least)
     for start in range(0, shape[1], KLEMS_FULL.size):
         part = slice(start, start + KLEMS_FULL.size)
         for rows, means in zip(sums, (smooth, sharper), strict=True):
@@ -135,29 +129,6 @@ def view_matrices(
     parts = (PictureMatrix(rows[:m], row, share) for rows in sums)
     off = ViewNoise(*(rows[m:] for rows in sums), found[1])
     return ViewMatrices(view, pixels, *parts, seen, off, found[0])
-
-
-def _second_half(pixels: NDArray[np.int64], view: View) -> NDArray[np.int64]:
-    """1 for the pixels on the black squares of a chequerboard, else 0."""
-    row, column = np.divmod(pixels, view.width)
-    return (row + column) % 2
-
-
-def _of_halves(
-    total: NDArray[np.float64], least: float
-) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """What sums over the halves of rows [2 m] become: the rows' means, and their noise [m, 2 m].
-
-    Args: total: [2 m] what is behind each sum; least: of a row's, or it is a sliver.
-    """
-    m, (first, second) = len(total) // 2, total.reshape(-1, 2).T
-    place = np.repeat(np.arange(m), 2), np.arange(2 * m)
-    mean = np.repeat(1 / np.maximum(first + second, least), 2)
-    both = np.minimum(first, second) > least
-    unlike = 0.5 / np.maximum(np.where(both, (first, second), np.inf), least) * [[1], [-1]]
-    parts = ((mean, place), (unlike.T.ravel(), place))
-    mean, noise = (sparse.csr_array(part, shape=(m, 2 * m)).astype(np.float32) for part in parts)
-    return mean, noise
 
 
 def _summed(
@@ -175,30 +146,6 @@ def _summed(
         seen.append(sparse.csr_array(shown))
         start += len(block)
     return sparse.csr_array(sparse.vstack(seen))
-
-
-def _tiles(tracer: TracedScene, view: View, tile: int) -> tuple[NDArray[np.int64], ...]:
-    """The pixels [n] that show something, the row [n] that each shares, its window; rows' keys [m].
-
-    A row belongs to a square of pixels and to one face: surface and normal.  The window is the
-    group that the pixel's middle shows, OPAQUE where it shows none.
-    """
-    directions, counts = pixel_directions(view)
-    pixels = np.flatnonzero(counts.reshape(-1))
-    way = vectors(directions.reshape(-1, 3)[pixels])
-    eye = tracer.place(view.position)
-    hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(eye, way), coherent=True)
-    valid = hit.is_valid()
-    group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
-    group = group.numpy().astype(np.int64)
-    if tile == 1:
-        return pixels, np.arange(len(pixels)), group, np.arange(len(pixels))
-    faces = 1 + face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
-    windows = faces.max() + 1 + group  # apart from surfaces in their plane
-    face = faces[np.where(valid.numpy(), hit.prim_index.numpy().astype(np.int64), 0)]
-    face = np.where(valid.numpy(), np.where(group == OPAQUE, face, windows), 0)
-    keys, row = np.unique(Tiles(tile, view.width).of_pixels(pixels, face), return_inverse=True)
-    return pixels, row, group, keys
 
 
 def _add_rows(rows: NDArray, row: NDArray[np.int64], values: NDArray) -> None:
@@ -220,7 +167,8 @@ class FivePhasePictures:
     from elements of the surfaces instead, lit by the true disc at its own angle (`room_sun`).
     L_s is the sun that the windows scatter, on Klems patches; in a pixel that shows a window it is
     the BSDF's value for the sun and that pixel, and the sun's beam falls on each pixel for itself.
-    With `show_outdoors` what a window's straight beam shows is no mean over patches either.
+    With `show_outdoors` what a window's straight beam shows is no mean over patches either, nor is
+    what it lights.
     """
 
     def __init__(
@@ -256,6 +204,7 @@ class FivePhasePictures:
             self._reflected = np.maximum(self._whole - flat(beam, len(self._whole)), 0)
             self._elements = matrices.elements
         self._scattered, self._outdoors = self._rest, None
+        self._lighting, self._light = self._rest, None
         self._directions = np.asarray(directions, dtype=float)
         self._illuminance = np.asarray(illuminance, dtype=float)
         expected = self._whole.shape[1]
@@ -269,12 +218,15 @@ class FivePhasePictures:
         direct_daylight: ArrayLike,
         sky: ArrayLike,
         sun: ArrayLike,
+        *,
+        light: BeamLight | None = None,
     ) -> None:
         """See the outdoors through the windows' straight beam pixel by pixel.
 
         Args:
             daylight, direct_daylight: D and D_d [G, K, P].
             sky, sun: [P, H] the sky without the sun, and the sun alone: s = sky + sun.
+            light: of the beam on the room's surfaces; by patches without it.
         """
         sky, sun = np.asarray(sky), np.asarray(sun)
         daylight, direct = np.asarray(daylight), np.asarray(direct_daylight)
@@ -282,6 +234,11 @@ class FivePhasePictures:
         beam = (seen.beam[:, :, None] * outside).reshape(self._rest.shape)
         self._scattered = np.maximum(self._rest - beam, 0).astype(np.float32)
         self._outdoors, self._sky = seen, sky.astype(np.float32)
+        if light is not None:
+            beam = (light.transmittance[:, :, None] * outside).reshape(self._rest.shape)
+            self._lighting = np.maximum(self._rest - beam, 0).astype(np.float32)
+            self._faces = faces_luminance(daylight, direct, sky + sun)
+            self._light = light
 
     @property
     def hours(self) -> int:
@@ -311,7 +268,7 @@ class FivePhasePictures:
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
-        m, noise, rest = self._matrices, self._matrices.noise, self._rest[:, batch]
+        m, noise, rest = self._matrices, self._matrices.noise, self._lighting[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength).reshape(rest.shape)
         more = None
@@ -319,7 +276,10 @@ class FivePhasePictures:
             more = self._sun.on_elements(noise.elements, suns, strength)
         values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
         m.indirect.with_rows(noise.indirect).add_to(values, self._reflected[:, batch], more)
-        m.lit.with_rows(noise.lit).add_to(values, rest + scattered)
+        beam = None
+        if self._light is not None:
+            beam = self._light.noise(self._sky[:, batch], self._faces[:, batch]).T
+        m.lit.with_rows(noise.lit).add_to(values, rest + scattered, beam)
         return values
 
     def _values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -332,7 +292,7 @@ class FivePhasePictures:
 
     def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
-        m, rest = self._matrices, self._rest[:, batch]
+        m, rest = self._matrices, self._lighting[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength)
         windows = m.seen @ self._scattered[:, batch]
@@ -347,6 +307,8 @@ class FivePhasePictures:
                 seen.rough.add_to(values, suns, strength)
         rows = m.indirect.of_rows(self._reflected[:, batch])
         rows += m.lit.of_rows(rest + scattered.reshape(rest.shape))
+        if self._light is not None:
+            rows += self._light.rows(self._sky[:, batch], self._faces[:, batch])
         if self._elements is not None:
             rows += self._sun.on_elements(self._elements, suns, strength).T
         self._sun.add_to(values, suns, strength)

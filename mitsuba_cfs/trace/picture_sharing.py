@@ -29,6 +29,15 @@ def face_numbers(surface: NDArray, normal: NDArray[np.float64]) -> NDArray[np.in
     return np.unique(table, axis=0, return_inverse=True)[1].reshape(-1)
 
 
+def numbered(row: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The number of each among those of its row [n]."""
+    order = np.argsort(row, kind="stable")
+    _, first, place = np.unique(row[order], return_index=True, return_inverse=True)
+    number = np.empty(len(row), dtype=np.int64)
+    number[order] = np.arange(len(row)) - first[place]
+    return number
+
+
 def tile_size(view: View) -> int:
     """Pixels across of a view's tiles: 0.9 degrees, 2 pixels at least."""
     size = float(np.sqrt(pixel_solid_angles(view).max()))

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.images.view import View, pixel_solid_angles, rays
-from mitsuba_cfs.trace.picture_sharing import FACE_STEPS
+from mitsuba_cfs.trace.picture_sharing import FACE_STEPS, numbered
 from mitsuba_cfs.trace.sampling import column, lattice_2d, pixel_places, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
@@ -205,7 +205,7 @@ def sun_elements(
     rays_each = -(-NEAR_RAYS // tile**2)
     chosen = np.flatnonzero(close[half // 2])
     number = np.zeros(len(pixels), dtype=np.int64)
-    number[chosen] = _numbered(half[chosen])
+    number[chosen] = numbered(half[chosen])
     blocks = _blocks(chosen, rays_each)
     near = [look.near(pixels[p], half[p], number[p], rays_each) for p in blocks]
     shares, places = [], []
@@ -223,15 +223,6 @@ def _blocks(numbers: NDArray[np.int64], samples: int) -> Iterator[NDArray[np.int
     size = max(1, RAYS // samples)
     for start in range(0, len(numbers), size):
         yield numbers[start : start + size]
-
-
-def _numbered(row: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The number of each among those of its row [n]."""
-    order = np.argsort(row, kind="stable")
-    _, first, place = np.unique(row[order], return_index=True, return_inverse=True)
-    number = np.empty(len(row), dtype=np.int64)
-    number[order] = np.arange(len(row)) - first[place]
-    return number
 
 
 def _elements(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], int]:

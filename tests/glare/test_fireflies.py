@@ -24,7 +24,7 @@ def test_a_pixel_is_held_against_the_brightest_around_it() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("variant")
 def test_nothing_bright_shines_out_of_the_box_under_an_overhang() -> None:
-    """Three random hours; what is beyond the limit is dim: the windows' light by Klems patches."""
+    """Three random hours; what is beyond the limit is dim."""
     lit = fireflies.overhang(cfs.read_epw(Path(WEATHER)), 160)
     found = fireflies.held(lit, 3, samples=16)
     assert found.bright.sum() == 0
