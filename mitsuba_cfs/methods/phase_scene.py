@@ -192,7 +192,7 @@ class PhaseScene:
         (groups, through), beyond = self.beyond[i], self.scene.beyond[i]
         return borrowed_view(
             (self.scene.interior, self.scene.groups), g, beyond.beam,
-            (beyond.scene.interior, groups), through, *self.scene.sensors(),
+            (beyond.scene.interior, groups), through, self.scene.sensors(),
             samples=samples, max_depth=INDOOR_DEPTH, stopping=stopping,
             seed=self.sampling.seed, cache=self.cache,
         )  # fmt: skip

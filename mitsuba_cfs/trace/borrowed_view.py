@@ -35,8 +35,7 @@ def borrowed_view(
     beam: NDArray[np.float64],
     beyond: Room,
     luminance: NDArray[np.float64],
-    points: ArrayLike,
-    directions: ArrayLike,
+    sensors: tuple[ArrayLike, ArrayLike],
     *,
     samples: int = 4096,
     max_depth: int = 32,
@@ -54,11 +53,11 @@ def borrowed_view(
         beam: [K] what goes straight on in each patch of the group.
         beyond: the room beyond and its windows.
         luminance: T D of these [G, K, P], towards that room.
-        points, directions: [S, 3] sensor positions [m] and normals.
+        sensors: positions [S, 3] [m] and normals [S, 3].
         samples: paths of a sensor in each batch.
     """
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    points, normals = (np.atleast_2d(np.asarray(one, dtype=float)) for one in sensors)
+    directions = normalize(normals)
     here, bins, n, S = kept_scene(*room), DirectionBins(KLEMS_FULL), int(samples), len(points)
     there = kept_scene(*beyond, centre=here.centre)
     flat = luminance.reshape(-1, luminance.shape[-1])
