@@ -139,9 +139,10 @@ def _face(
     if behind.adjacency == "unknown":
         assumed["adjacency"] += 1
     guid = filling.guid if own else (record.guid if record is not None else None)
+    is_pane = piece.role == "inner glass" and behind.neighbour is not None
     return Face(
         name, kind, triangles, behind.adjacency, construction, visible, solar, EMISSIVITY,
-        behind.neighbour, guid, gloss,
+        behind.neighbour, guid, gloss, _window([(piece, triangles)]) if is_pane else None,
     )  # fmt: skip
 
 

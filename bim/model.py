@@ -94,6 +94,7 @@ class Face:
     neighbour: str | None = None  # GUID of the other space where adjacency is "space"
     element: str | None = None  # GUID of the building element
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
+    pane: Window | None = None  # the glass to the neighbour that the face is
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, out of the room
     area: float = field(init=False)  # [m2]
 

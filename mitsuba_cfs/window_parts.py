@@ -39,6 +39,20 @@ class Region:
         return np.all((points >= self.low) & (points < self.high), axis=1)
 
 
+def even_regions(group: WindowGroup, size: float) -> list[Region]:
+    """Boxes that cut a group's windows, taken together, evenly to pieces of about a size [m]."""
+    corners = np.concatenate([w.triangles for w in group.windows]).reshape(-1, 3) @ group.frame.T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    regions = [Region.everything()]
+    for axis in (0, 1):
+        count = max(1, round((high[axis] - low[axis]) / size))
+        for place in np.linspace(low[axis], high[axis], count + 1)[1:-1]:
+            last = [r for r in regions if np.isinf(r.high[axis])]
+            cut = [half for r in last for half in r.halves(axis, float(place))]
+            regions = [r for r in regions if not np.isinf(r.high[axis])] + cut
+    return regions
+
+
 @dataclass(frozen=True, slots=True)
 class Cells:
     """Rectangles C that the windows of a group are seen as."""

@@ -139,6 +139,7 @@ class RoomYear:
     problems: tuple[Problem, ...] = ()  # that tracing found
     explored: ExploredRoom | None = None  # where the explorer was asked for
     template: str = ""  # name of the equal room that was computed; "": this one
+    borrowed: str = ""  # how much of its daylight comes through glass of other rooms; "": none does
 
     @property
     def hours(self) -> pd.DataFrame:

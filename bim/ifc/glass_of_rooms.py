@@ -208,7 +208,8 @@ def _said(
     if inner:
         what = f"{label}: glass between {' and '.join(inner)}"
         kind = "glass between rooms"
-        problems.append(Problem(filling.guid, what, "taken as opaque", "window", kind=kind))
+        done = "taken as opaque; cfs run --inner-glass lets daylight through"
+        problems.append(Problem(filling.guid, what, done, "window", kind=kind))
     rooms = sorted({names[a.room] for a in found if a.neighbour is None})
     if len(rooms) > 1:
         what = f"{filling.name}: lies before the rooms {', '.join(rooms)}"

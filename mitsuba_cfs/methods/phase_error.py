@@ -27,13 +27,15 @@ def matrix_variance(
     """
     found = np.zeros(len(traced.scene.sensors()[0]))
     hours = len(sky.lit)
-    lit = sky.whole if reflected is None else sky.without_sun()
+    outdoors = len(traced.scene.outdoor_groups)
     for g, row in enumerate(state):
         left = np.zeros(len(found))
+        by_rays = reflected is not None and g < outdoors
+        lit = sky.without_sun() if by_rays else sky.whole
         for j in np.unique(row):
             some = row == j
             mean, sun = lit[:, some].sum(axis=1) / hours, None
-            if reflected is not None:
+            if by_rays:
                 sun = sky.sun[:, some].sum(axis=1) / hours, reflected.replaced(some) / hours
             for q in traced.parts.of(g):
                 found += _part_variance(traced, straight, (g, j, q), mean, sun)
@@ -83,7 +85,7 @@ def _left_by_means(
     points, normals = traced.scene.sensors()
     passed = sky.without_sun() if traced.five_phase else sky.whole
     mean = coarse_sky(passed[:, some], traced.sampling.subdivision).sum(axis=1, keepdims=True)
-    if not traced.parts.cells or not mean.any():
+    if g >= len(traced.parts.cells) or not mean.any():
         return np.zeros(len(points))
     through = straight.transmission(g, j)
     if straight.matrix(g, j) is not None:

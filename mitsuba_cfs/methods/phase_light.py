@@ -269,7 +269,8 @@ class PhaseLight:
         if not self._traced.five_phase:
             return SensorLight(diffuse, None, 0.0)
         error = 0.0
-        if self._reflected_sun is not None:
+        outdoors = g < len(self._traced.scene.outdoor_groups)
+        if self._reflected_sun is not None and outdoors:
             beams = (self.windows[q][j].beam is not None for q in self._traced.parts.of(g))
             more = self._reflected_sun.sensors(g, j, beam=any(beams))
             diffuse, error = diffuse + more.values, more.sum_error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -17,21 +18,25 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, subdivided
 from mitsuba_cfs.methods.view_cache import kept_view
 from mitsuba_cfs.progress import Progress, part, silent
-from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
+from mitsuba_cfs.trace.borrowed_daylight import borrowed_daylight
+from mitsuba_cfs.trace.borrowed_view import borrowed_view
 from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.view_matrix import view_matrix
 from mitsuba_cfs.trace.window_exchange import window_exchange
-from mitsuba_cfs.window_parts import window_cells
+from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
 
 BATCHES = 8  # independent repetitions that the standard errors come from
 INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path
 CELL_SHARE = 0.06  # paths of the cells that a group's parts follow from, of those of its D
 EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room, in each batch
 PART_BATCHES = 2  # of D where groups are cut
+INNER_PART = 0.75  # of glass between rooms, about: in the room beyond D changes along it [m]
+INNER_SHARE = 8  # paths of a patch for D, for each of a part of glass between rooms
 
 
 class PhaseScene:
@@ -84,41 +89,51 @@ class PhaseScene:
     @cached_property
     def parts(self) -> Parts:
         """The window groups, cut where what stands outdoors is not the same before all of them."""
+        found = self._outdoor_parts(self.scene.outdoor_groups)
+        if not self.scene.beyond:
+            return found
+        inner = self.scene.groups[-len(self.scene.beyond) :]
+        return found.and_inner(cut_group(g, even_regions(g, INNER_PART)) for g in inner)
+
+    def _outdoor_parts(self, groups: Sequence[WindowGroup]) -> Parts:
+        """Those of the groups that look outdoors."""
         scene, chosen = self.scene, self.sampling
-        if not len(scene.exterior.triangles) or not scene.groups:
-            return Parts.whole(scene.groups)
-        cells = [window_cells(group) for group in scene.groups]
+        if not len(scene.exterior.triangles) or not groups:
+            return Parts.whole(groups)
+        cells = [window_cells(group) for group in groups]
         paths = CELL_SHARE * chosen.patch_samples * len(cells) / sum(len(c.area) for c in cells)
         found = cell_daylight(
             scene.exterior,
-            scene.groups,
+            groups,
             cells,
             samples=max(round(paths / CELL_BATCHES), 1),
             max_depth=OUTDOOR_DEPTH,
             seed=chosen.seed,
             cache=self.cache,
         )
-        lights = map(CellLight, scene.groups, cells, found)
+        lights = map(CellLight, groups, cells, found)
         return Parts.of_cells(subdivided(light, chosen.window_parts or None) for light in lights)
 
     @cached_property
     def daylight(self) -> Estimate:
         """D [Q, K, P]."""
-        return self._daylight(OUTDOOR_DEPTH, 0.0, 0.2)
+        found = [self._daylight(OUTDOOR_DEPTH, 0.0, 0.2)] if self.scene.outdoor_groups else []
+        return joined([*found, *self._borrowed()])
 
     @cached_property
     def direct_daylight(self) -> NDArray[np.float64]:
-        """D_d [Q, K, P]: what comes straight from the sky, or by a smooth mirror; a part of D."""
-        if not len(self.scene.exterior.triangles):  # nothing outdoors reflects
-            return self.daylight.values
-        return self._daylight(1, 0.2, 0.3).values
+        """D_d [Q, K, P]: what comes straight from the sky, or by a smooth mirror; a part of D.
+
+        Nothing of groups that look into another room: the sun comes through these by patches.
+        """
+        return self._with_no_inner(self.scene.exterior)
 
     @cached_property
     def straight_daylight(self) -> NDArray[np.float64]:
         """D_d without what mirrors show."""
         if not self.scene.exterior.glossy:
             return self.direct_daylight
-        return self._daylight(1, 0.2, 0.3, replace(self.scene.exterior, gloss=())).values
+        return self._with_no_inner(replace(self.scene.exterior, gloss=()))
 
     @cached_property
     def sensors(self) -> Estimate:
@@ -159,13 +174,66 @@ class PhaseScene:
         """What glare needs of the view."""
         return GlareView(self.scene.view)
 
+    @cached_property
+    def beyond(self) -> list[tuple[tuple[WindowGroup, ...], NDArray[np.float64]]]:
+        """Of each room beyond its windows' parts [Q] and their T D [Q, K, P]."""
+        rooms: dict[int, tuple[tuple[WindowGroup, ...], NDArray[np.float64]]] = {}
+        for beyond in self.scene.beyond:
+            if id(beyond.scene) not in rooms:
+                room = PhaseScene(beyond.scene, self.sampling, five_phase=False, cache=self.cache)
+                pairs = zip(room.parts.group, room.daylight.values, strict=True)
+                through = np.stack([beyond.transmission[n] @ d for n, d in pairs])
+                rooms[id(beyond.scene)] = room.parts.groups, through
+        return [rooms[id(beyond.scene)] for beyond in self.scene.beyond]
+
+    def borrowed_view(self, g: int, samples: int, stopping: Stopping) -> Estimate:
+        """B [S, P] of a group that looks into another room."""
+        i = g - len(self.scene.outdoor_groups)
+        (groups, through), beyond = self.beyond[i], self.scene.beyond[i]
+        return borrowed_view(
+            (self.scene.interior, self.scene.groups), g, beyond.beam,
+            (beyond.scene.interior, groups), through, self.scene.sensors(),
+            samples=samples, max_depth=INDOOR_DEPTH, stopping=stopping,
+            seed=self.sampling.seed, cache=self.cache,
+        )  # fmt: skip
+
+    def _with_no_inner(self, exterior: Surfaces) -> NDArray[np.float64]:
+        """What comes straight [Q, K, P] past what stands outdoors."""
+        scene = self.scene
+        if not scene.beyond and not len(exterior.triangles):  # nothing outdoors reflects
+            return self.daylight.values
+        found, outdoors = np.zeros_like(self.daylight.values), self.parts.outdoors(scene)
+        if not len(exterior.triangles):
+            found[:outdoors] = self.daylight.values[:outdoors]
+        elif outdoors:
+            found[:outdoors] = self._daylight(1, 0.2, 0.3, exterior).values
+        return found
+
+    def _borrowed(self) -> list[Estimate]:
+        """D [Q, K, P] of each group that looks into another room."""
+        first, chosen = len(self.scene.outdoor_groups), self.sampling
+        found = []
+        for g, beyond in enumerate(self.scene.beyond, first):
+            room, through = self.beyond[g - first]
+            inner = [self.parts.groups[q] for q in self.parts.of(g)]
+            found.append(
+                borrowed_daylight(
+                    beyond.scene.interior, room, through, inner,
+                    samples=max(chosen.patch_samples // INNER_SHARE // BATCHES, 1),
+                    max_depth=INDOOR_DEPTH, stopping=Stopping(batches=BATCHES), seed=chosen.seed,
+                    cache=self.cache,
+                )
+            )  # fmt: skip
+        return found
+
     def _daylight(
         self, depth: int, start: float, end: float, exterior: Surfaces | None = None
     ) -> Estimate:
-        chosen, parts = self.sampling, self.parts.groups
+        chosen, groups = self.sampling, self.scene.outdoor_groups
+        parts = self.parts.groups[: self.parts.outdoors(self.scene)]
         samples, batches = chosen.patch_samples, BATCHES
-        if len(parts) > len(self.scene.groups):  # at about the cost of the whole groups
-            samples = samples * len(self.scene.groups) // len(parts)
+        if len(parts) > len(groups):  # at about the cost of the whole groups
+            samples = samples * len(groups) // len(parts)
             batches = PART_BATCHES
         return daylight_matrix(
             self.scene.exterior if exterior is None else exterior,

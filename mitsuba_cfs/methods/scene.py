@@ -17,6 +17,15 @@ def _nowhere() -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True)
+class RoomBeyond:
+    """The room that a window group of another one looks into; of some groups it may be the same."""
+
+    scene: DaylightScene  # its interior without the glass that is looked through
+    transmission: tuple[NDArray[np.float64], ...]  # [G][K, K] T of its window groups
+    beam: NDArray[np.float64]  # [K] what goes straight on through the group that looks into it
+
+
+@dataclass(frozen=True, slots=True)
 class DaylightScene:
     """What light meets, the sensors it is taken at, and an eye."""
 
@@ -26,12 +35,18 @@ class DaylightScene:
     points: NDArray[np.float64] = field(default_factory=_nowhere)  # [S, 3] [m]
     normals: NDArray[np.float64] = field(default_factory=_nowhere)  # [S, 3]
     view: View | None = None  # of the eye whose glare is rated
+    beyond: tuple[RoomBeyond, ...] = ()  # what the last of the groups look into, else outdoors
 
     def __post_init__(self) -> None:
         if self.points.shape != self.normals.shape or self.points.shape[1:] != (3,):
             raise ValueError(
                 f"points {self.points.shape}, normals {self.normals.shape}: expected [S, 3] both"
             )
+
+    @property
+    def outdoor_groups(self) -> Sequence[WindowGroup]:
+        """The groups that look outdoors: the first ones."""
+        return self.groups[: len(self.groups) - len(self.beyond)]
 
     def sensors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions and directions [S + 1, 3] of sensors, the eye last; [S, 3] without a view."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from mitsuba_cfs.trace.straight_view import straight_view_matrix
 
 BATCHES = 4
 HELD = 0.98  # share of a beam that T's diagonal has at the least
+INNER_SHARE = 8  # rays of a sensor that glass to another room is looked for with, for each of V
 SHARE = 4  # paths of a sensor for V, for each that looks straight through a cut group
 
 
@@ -30,7 +32,8 @@ class StraightViews:
     is added to V T D s: patches of 10 to 15 degrees blur the sky that a sensor sees through a
     beam (11 % of a sensor's light beside a small opening), and means over a group the edges that
     not all of its points see alike, and the lobe of a glossy facade.  The three-phase method has it
-    of cut groups, and where there is gloss: the patches of the others are what it is.
+    of cut groups, of glass to another room, and where there is gloss: the patches of the others
+    are what it is.
     """
 
     def __init__(self, traced: PhaseScene, systems: Sequence[States]) -> None:
@@ -44,6 +47,9 @@ class StraightViews:
         Nothing where the diagonal holds less than the beam: the cells of a tensor tree lie across
         patches, and what of a beam T has beside the diagonal would be counted twice.
         """
+        inner = g - len(self._traced.scene.outdoor_groups)
+        if inner >= 0:
+            return self._traced.scene.beyond[inner].beam
         optics, omega = self._systems[g][j], KLEMS_FULL.projected_solid_angles()
         through = patch_beams([optics.scattering], KLEMS_FULL)[0]
         held = np.minimum(through, np.diag(optics.transmission))
@@ -64,6 +70,8 @@ class StraightViews:
         Args: direct: without what the outdoors reflects.
         """
         traced = self._traced
+        if g >= len(traced.scene.outdoor_groups):
+            return self._of_inner(g, direct=direct) if self.beam(g, j).any() else None
         sharp = traced.five_phase or len(traced.parts.of(g)) > 1 or traced.scene.exterior.glossy
         if not sharp or not self.beam(g, j).any():
             return None
@@ -81,6 +89,15 @@ class StraightViews:
             )  # fmt: skip
             self._found[g, j, direct] = found.part(np.s_[g])
         return self._found[g, j, direct]
+
+    def _of_inner(self, g: int, *, direct: bool) -> Estimate:
+        """B of a group that looks into another room [S, P]; nothing comes straight from the sky."""
+        if (g, 0, False) not in self._found:
+            samples = INNER_SHARE * self._traced.sampling.sensor_samples // BATCHES
+            found = self._traced.borrowed_view(g, samples, Stopping(batches=BATCHES))
+            self._found[g, 0, False] = found
+        found = self._found[g, 0, False]
+        return replace(found, values=np.zeros_like(found.values)) if direct else found
 
     def rest(self, g: int, j: int, q: int) -> NDArray[np.float64]:
         """What the sensors have of the luminance before a part of a group but for B [S, K].

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import incident_azimuth
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import WindowGroup
@@ -90,7 +91,7 @@ class Parts:
 
     groups: tuple[WindowGroup, ...]  # [Q], each with matrices of its own
     group: NDArray[np.int64]  # [Q] the window group of each
-    cells: tuple[CellLight, ...] = ()  # [G]; none where nothing stands outdoors
+    cells: tuple[CellLight, ...] = ()  # of those that look outdoors; none where it is empty
 
     @classmethod
     def whole(cls, groups: Sequence[WindowGroup]) -> Parts:
@@ -104,6 +105,19 @@ class Parts:
         pieces = [cut_group(light.group, light.regions) for light in cells]
         group = np.repeat(np.arange(len(cells)), [len(found) for found in pieces])
         return cls(tuple(part for found in pieces for part in found), group, cells)
+
+    def and_inner(self, pieces: Iterable[Sequence[WindowGroup]]) -> Parts:
+        """These and the parts of groups that look into another room, which come after them."""
+        groups, group = list(self.groups), list(self.group)
+        first = max(group, default=-1) + 1
+        for g, parts in enumerate(pieces, first):
+            groups += parts
+            group += [g] * len(parts)
+        return replace(self, groups=tuple(groups), group=np.array(group, dtype=np.int64))
+
+    def outdoors(self, scene: DaylightScene) -> int:
+        """How many of the parts, the first ones, look outdoors."""
+        return int(np.count_nonzero(self.group < len(scene.outdoor_groups)))
 
     def of(self, g: int) -> NDArray[np.int64]:
         """The parts of a window group."""

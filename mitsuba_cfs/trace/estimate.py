@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -69,6 +69,16 @@ class Stopping:
             raise ValueError(
                 f"batches: at least 2 are needed for a standard error, got {self.batches}"
             )
+
+
+def joined(estimates: Sequence[Estimate]) -> Estimate:
+    """Estimates of rows one after the other as one."""
+    first = estimates[0]
+    if len(estimates) == 1:
+        return first
+    names = ("values", "standard_error", "sum_error")
+    arrays = {name: np.concatenate([getattr(e, name) for e in estimates]) for name in names}
+    return replace(first, seconds=sum(e.seconds for e in estimates), **arrays)
 
 
 def accumulate(

@@ -54,6 +54,10 @@ _DEFAULT = RoomOptions()
     help="TOML file: shading states and control, gains, set points; see docs/thermal.md.",
 )  # fmt: skip
 @click.option(
+    "--inner-glass", is_flag=True,
+    help="Let daylight through glass between rooms; rooms lit by it alone are computed too.",
+)  # fmt: skip
+@click.option(
     "--explore", is_flag=True,
     help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
 )  # fmt: skip
@@ -73,6 +77,7 @@ def command(
     surroundings_offset: tuple[float, float, float] | None,
     operation: Path | None,
     no_cache: bool,
+    inner_glass: bool,
     explore: bool,
     quick: bool,
     **chosen,
@@ -82,11 +87,15 @@ def command(
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
     if explore and chosen["method"] == "point-in-time":
         raise click.UsageError("--explore needs --method three-phase or five-phase")
+    if inner_glass and explore:
+        raise click.UsageError("--inner-glass and --explore exclude each other")
+    if inner_glass and chosen["method"] == "point-in-time":
+        raise click.UsageError("--inner-glass needs --method three-phase or five-phase")
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
-        RoomOptions.of(**chosen), operation=operation, explore=explore,
+        RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,
         u_value=u_value, g_value=g_value, surroundings=surroundings,
         surroundings_offset=surroundings_offset,
     )  # fmt: skip

@@ -21,6 +21,7 @@ from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.results import DaylightResult
+from scenes.room.inner_glass import InnerGlass
 from scenes.room.metrics import daylight_metrics
 from scenes.room.options import SensorGrid
 from scenes.room.windows import RoomWindows
@@ -32,22 +33,25 @@ def room_scene(
     windows: RoomWindows,
     grids: Sequence[SensorGrid],
     picture_size: int,
+    inner: InnerGlass | None = None,
 ) -> DaylightScene:
     """Triangles, window groups, sensors and view of a room in the visible band.
 
     Args:
         grids: of the sensors, one after the other.
         picture_size: pixels of a side of the view.
+        inner: the glass to other rooms that gives light; without it that is opaque.
     """
     points = np.concatenate([grid_points(space, grid) for grid in grids])
     position, direction = view_point(space)
     return DaylightScene(
-        furnished_surfaces(space, "visible"),
+        furnished_surfaces(space, "visible") if inner is None else inner.interior,
         exterior_surfaces(building, space, "visible"),
-        windows.groups,
+        [*windows.groups, *(() if inner is None else inner.groups)],
         points,
         np.tile([0.0, 0.0, 1.0], (len(points), 1)),
         fisheye(position, direction, picture_size),
+        () if inner is None else inner.beyond,
     )
 
 

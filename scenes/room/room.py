@@ -20,9 +20,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
-from bim.to_thermal import ThermalRoom, thermal_room
+from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
-from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
@@ -54,6 +53,7 @@ from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.holes import hole_problems
 from scenes.room.humidity import felt_by, room_humidity
+from scenes.room.inner_glass import borrowed_share, inner_glass
 from scenes.room.operation import Operation
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import ComfortTable, OperationTables
@@ -69,10 +69,9 @@ from scenes.room.zone import (
     operated,
     plain_services,
     services_of,
-    with_states,
+    zone_surfaces,
 )
 from thermal.balance import ZoneResult
-from thermal.errors import ThermalInputError
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -103,6 +102,7 @@ def compute_room(
     pictures: bool = True,
     explore: bool = False,
     rate: tuple[str, NDArray[np.int64]] | None = None,
+    inner: bool = False,
     progress: Progress = silent,
 ) -> RoomYear:
     """Daylight, glare, temperatures and comfort of one room, with one method.
@@ -120,6 +120,7 @@ def compute_room(
         pictures: False leaves the luminance pictures and their glare out.
         explore: True gives every hour's picture in every state, for the explorer.
         rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
+        inner: True lets light of rooms with windows in through glass; phase methods only.
 
     Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
         `ValueError` for a window without a system.
@@ -129,7 +130,7 @@ def compute_room(
     room = RoomSimulation(
         building, space, systems, weather, options,
         operation=None if operation is None else operation.tables,
-        skies=skies, cache=cache, progress=progress,
+        skies=skies, cache=cache, inner=inner, progress=progress,
     )  # fmt: skip
     outputs, skies = options.outputs, room.skies
     hours = wanted_hours(outputs.picture_hours, weather.midpoints, skies.lit)
@@ -146,7 +147,7 @@ def compute_room(
     ran = None if operation is None else room.operation_result(balance)
     return RoomYear(
         space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes,
-        explored=explored,
+        explored=explored, borrowed=borrowed_share(space, room.light, room.inner),
     )  # fmt: skip
 
 
@@ -168,6 +169,7 @@ class RoomSimulation:
         skies: AnnualSky | None = None,
         cache: MatrixCache | None = None,
         grids: Sequence[SensorGrid] = (),
+        inner: bool = False,
         progress: Progress = silent,
     ) -> None:
         """See `compute_room`; grids: of the sensors in place of the options' one."""
@@ -183,6 +185,7 @@ class RoomSimulation:
             else skies
         )
         self.windows = room_windows(space, systems)
+        self.inner = inner_glass(building, space, systems) if inner else None
         self.seconds: dict[str, float] = {}
 
     def timed(self, stage: str, work: Callable[[], T]) -> T:
@@ -196,7 +199,12 @@ class RoomSimulation:
     def scene(self) -> DaylightScene:
         """Triangles, window groups, sensors and view in the visible band."""
         return room_scene(
-            self.building, self.space, self.windows, self.grids, self.outputs.picture_size
+            self.building,
+            self.space,
+            self.windows,
+            self.grids,
+            self.outputs.picture_size,
+            self.inner,
         )
 
     @cached_property
@@ -213,7 +221,8 @@ class RoomSimulation:
     @cached_property
     def light(self) -> PhaseLight:
         """The light of the lit hours in every state."""
-        filled = PhaseSystems(self.traced, self.windows.optics())
+        inner = () if self.inner is None else self.inner.optics
+        filled = PhaseSystems(self.traced, [*self.windows.optics(), *inner])
         return filled.light(self.skies, progress=part(self.progress, 0.6, 0.9, "daylight"))
 
     def eye(self) -> NDArray[np.float32]:
@@ -247,8 +256,7 @@ class RoomSimulation:
         """Illuminance of the work plane and its metrics."""
         self.progress("daylight", 0.0)
         steps = part(self.progress, 0.9, 1.0, "daylight")
-        method = self.options.method
-        found = room_daylight(self.light, self.lit_state, self.weather, method, steps)
+        found = room_daylight(self.light, self.lit_state, self.weather, self.options.method, steps)
         self.progress("daylight", 1.0)
         return found
 
@@ -257,8 +265,7 @@ class RoomSimulation:
         """The light that pictures are made of."""
         if self.options.method != "point-in-time":
             return self.light
-        filled = PathSystems(self.scene, self.light.filled.systems, self.sampling)
-        return filled.light(self.skies)
+        return PathSystems(self.scene, self.light.filled.systems, self.sampling).light(self.skies)
 
     def holes(self) -> tuple[Problem, ...]:
         """What of the light leaves through no window."""
@@ -282,8 +289,7 @@ class RoomSimulation:
 
     def explored(self) -> ExploredRoom:
         """Every hour in every state."""
-        states = max(self.windows.systems, key=len)
-        names = [state.name for state in states]
+        names = [state.name for state in max(self.windows.systems, key=len)]
         steps = part(self.progress, 0.0, 1.0, "explorer")
         return explored_room(self.light, self.state, names, steps)
 
@@ -304,8 +310,10 @@ class RoomSimulation:
     def outdoors(self) -> PhaseScene:
         """D of the solar band: the visible one's where the outdoors reflects both bands alike."""
         exterior = exterior_surfaces(self.building, self.space, "solar")
-        if "scene" in self.__dict__ and np.array_equal(
-            exterior.reflectance, self.scene.exterior.reflectance
+        if (
+            self.inner is None
+            and "scene" in self.__dict__
+            and np.array_equal(exterior.reflectance, self.scene.exterior.reflectance)
         ):
             return self.traced
         scene = DaylightScene(Surfaces.none(), exterior, self.windows.groups)
@@ -338,15 +346,9 @@ class RoomSimulation:
     @cached_property
     def surfaces(self) -> ThermalRoom:
         """The room's surfaces and windows as a zone, with the gains and the air of the options."""
-        group, heats = self.windows.group, self.thermals
-        first = heats[group[0]][0].fenestration if len(group) else None
         gains = internal_gains(self.space, self.occupied, self.options.occupancy)
-        air = self.options.infiltration_ach
-        try:
-            room = thermal_room(self.space, first, infiltration_ach=air, gains=gains)
-        except ThermalInputError as error:  # its faces are no zone
-            raise RoomError(f"space {self.space.label}: {error}") from error
-        return replace(room, zone=with_states(room.zone, [heats[g] for g in group]))
+        systems = [self.thermals[g] for g in self.windows.group]
+        return zone_surfaces(self.space, systems, gains, self.options.infiltration_ach)
 
     @cached_property
     def plane(self) -> FloatArray | None:
@@ -392,6 +394,5 @@ class RoomSimulation:
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:
         """What control, heating, cooling and lamps did."""
-        most = max(self.windows.systems, key=len)
-        names = tuple(system.name for system in most)
+        names = tuple(system.name for system in max(self.windows.systems, key=len, default=()))
         return operated_year(self.zone, balance, self.weather, names, self.operation.control.rule)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Space
-from bim.to_thermal import ThermalRoom, coupled_rooms, door_links
+from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, thermal_room
 from mitsuba_cfs.compiled import must_compile
+from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.thermal_system import ThermalSystem
@@ -19,6 +20,7 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.options import Occupancy
 from thermal.balance import ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
+from thermal.errors import ThermalInputError
 from thermal.gains import dimmed_share, split_gains
 from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
@@ -102,8 +104,24 @@ def coupled(
     return found, door_links(spaces, door_m3_s), notes
 
 
-def with_states(zone: Zone, thermals: Sequence[Sequence[ThermalSystem]]) -> Zone:
-    """The zone whose windows W have their fenestration in every state."""
+def zone_surfaces(
+    space: Space, systems: Sequence[Sequence[ThermalSystem]], gains: Gains, air: float
+) -> ThermalRoom:
+    """A room's surfaces, and its windows W with their fenestration in every state, as a zone.
+
+    Args: air: that leaks in [1/h].
+
+    Raises: `RoomError` where its faces are no zone.
+    """
+    first = systems[0][0].fenestration if systems else None
+    try:
+        room = thermal_room(space, first, infiltration_ach=air, gains=gains)
+    except ThermalInputError as error:
+        raise RoomError(f"space {space.label}: {error}") from error
+    return replace(room, zone=_with_states(room.zone, systems))
+
+
+def _with_states(zone: Zone, thermals: Sequence[Sequence[ThermalSystem]]) -> Zone:
     windows = tuple(
         replace(window, states=tuple(t.fenestration for t in states))
         for window, states in zip(zone.windows, thermals, strict=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -27,20 +27,27 @@ def read_weather(path: str | PathLike[str]) -> Weather:
     return weather
 
 
-def chosen_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
+def chosen_spaces(
+    building: Building,
+    names: Sequence[str],
+    path: Path,
+    lit: Callable[[Space], bool] = lambda space: bool(space.windows),
+) -> list[Space]:
     """The spaces of those names or GUIDs, or every space with a window.
+
+    Args: lit: whether a space has one, or what counts as one.
 
     Raises: `DataError` that quotes what the model's problems say about a room that is not there.
     """
     chosen = named_spaces(building, names, path)
     if names:
         for space in chosen:
-            if not space.windows:
+            if not lit(space):
                 about = [p for p in _lost(building, "window") if _says(p.what, space.name)]
                 why = f": {_quoted(about)}" if about else ""
                 raise DataError(f"has no window{why}", file=path, element=f"space {space.label}")
         return chosen
-    chosen = [space for space in chosen if space.windows]
+    chosen = [space for space in chosen if lit(space)]
     if not chosen:
         why = _because(building, "window") or _because(building, "room")
         what = f"no space has a window to the outside{why}"

@@ -37,6 +37,7 @@ class JobOptions(BuildingOptions):
     operation: Path | None = None
     surroundings: tuple[Path, ...] = ()  # files of what stands around
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    inner_glass: bool = False  # light passes glass between rooms
     explore: bool = False  # every hour's picture in every shading state, for the explorer
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence

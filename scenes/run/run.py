@@ -26,6 +26,7 @@ from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.drawn_shades import traced_building
 from scenes.room.equal_rooms import moved_result
+from scenes.room.inner_glass import lit_neighbours
 from scenes.room.operation import Operation, check_states
 from scenes.room.room import compute_room, skies_for
 from scenes.run.building import read_building
@@ -116,6 +117,7 @@ def run_inputs(
         *thermal_notes,
         *_state_notes(inputs, options),
         *notes,
+        *(result.borrowed for result in results if result.borrowed),
         *(f"{hole.what}: {hole.consequence}." for hole in holes),
         *weather.notes,
         *_site_notes(building, weather),
@@ -148,19 +150,29 @@ def read_inputs(
         surroundings_offset=options.surroundings_offset,
         progress=steps,
     )
-    inputs = job_inputs(building, options.spaces, files)
+    inputs = job_inputs(building, options.spaces, files, inner=options.inner_glass)
     progress("inputs", 1.0)
     return inputs
 
 
-def job_inputs(building: Building, names: Sequence[str], files: JobFiles) -> JobInputs:
+def job_inputs(
+    building: Building, names: Sequence[str], files: JobFiles, *, inner: bool = False
+) -> JobInputs:
     """A building's rooms of those names with what fills their windows.
+
+    Args: inner: light passes glass between rooms; rooms lit by that alone are among them.
 
     Raises: `DataError` for a room that is not there, a window without a system.
     """
     operation, weather = files.operation, files.weather
-    spaces = chosen_spaces(building, names, building.file)
-    windows = [window for space in spaces for window in space.windows]
+    beyond: dict[str, list[Space]] = {}
+    if inner:
+        beyond = {space.guid: lit_neighbours(building, space) for space in building.spaces}
+    spaces = chosen_spaces(
+        building, names, building.file, lambda s: bool(s.windows or beyond.get(s.guid))
+    )
+    traced = {s.guid: s for space in spaces for s in (space, *beyond.get(space.guid, ()))}
+    windows = [window for space in traced.values() for window in space.windows]
     systems = fill_windows(windows, files.given, building.file)
     if operation is not None:
         check_states(operation, max(len(states) for states in systems.values()))
@@ -195,11 +207,17 @@ def _rooms(
     """The results of the rooms in their order, what was left out, and what was given twice."""
     cache = MatrixCache.of_user() if options.cache else None
 
+    def borrows(*spaces: Space) -> bool:
+        """Whether what a room gets depends on a neighbour: then none stands for another."""
+        return options.inner_glass and any(
+            lit_neighbours(inputs.building, space) for space in spaces
+        )
+
     def compute(space: Space, steps: Progress) -> RoomYear:
         return compute_room(
             inputs.building, space, inputs.systems, inputs.weather, options.room,
             operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
-            progress=steps,
+            inner=options.inner_glass, progress=steps,
         )  # fmt: skip
 
     return RoomSeries(
@@ -211,7 +229,7 @@ def _rooms(
         compute,
         moved_result,
         options.building,
-        lambda one, other: _operated_alike(inputs, one, other),
+        lambda one, other: not borrows(one, other) and _operated_alike(inputs, one, other),
         on_room or (lambda room: None),
     ).results(progress)
 

@@ -1,0 +1,187 @@
+"""Glass between rooms: window groups of a room whose outdoors is another room with windows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
+from bim.model import Building, Element, Face, Space, centroid
+from bim.to_tracer import (
+    element_surfaces,
+    exterior_surfaces,
+    furnished_surfaces,
+    window_groups,
+)
+from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
+from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.systems import AngularScattering
+from scenes.fenestration.stated import StatedValues, glazing_system
+from scenes.fenestration.systems import States
+from scenes.room.windows import room_windows
+
+CLEAR = 0.88  # visible transmittance of glass that states none: a float pane of 6 mm, EN 410
+SAME_SIZE = 0.05  # share by which the pane may differ as the two rooms have it
+THINNEST = 1e-3  # walls up to this have no reveal [m]
+
+
+@dataclass(frozen=True, slots=True)
+class InnerGlass:
+    """The window groups of a room that look into other rooms, and what they take from there."""
+
+    interior: Surfaces  # the room without this glass
+    groups: tuple[WindowGroup, ...]  # axis I
+    optics: tuple[tuple[SystemOptics, ...], ...]  # [I], each of one state
+    beyond: tuple[RoomBeyond, ...]  # [I]
+    names: tuple[str, ...]  # [I] labels of the rooms beyond
+    area: float  # of the glass [m2]
+
+
+def lit_neighbours(building: Building, space: Space) -> list[Space]:
+    """The rooms with windows that glass of a room leads to, as far as both rooms agree on it."""
+    pairs = _panes(building, space)
+    return [other for other in building.spaces if other.guid in pairs and other.windows]
+
+
+def inner_glass(
+    building: Building, space: Space, systems: Mapping[str, States]
+) -> InnerGlass | None:
+    """The glass of a room to rooms with windows; None where there is none.
+
+    The windows there are in their first state, the glass between is a clear pane of the
+    transmittance that it states.  The wall's thickness is a tube of reveals beyond the glass.
+
+    Args: systems: of the windows of both rooms, by their GUID.
+    """
+    found, used = [], []
+    dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun comes by patches
+    for other in lit_neighbours(building, space):
+        pairs = _panes(building, space)[other.guid]
+        scene, transmission = _lit_room(building, other, pairs, systems)
+        used += [face for face, _ in pairs]
+        for optics, group in _groups(space, [face for face, _ in pairs]):
+            given = GivenOptics(optics.transmission, dark, reflection=optics.reflection)
+            beam = np.diag(optics.transmission)
+            named = replace(group, name=f"{group.name}, to {other.label}")
+            beyond = RoomBeyond(scene, transmission, beam)
+            found.append((named, (given,), beyond, other.label))
+    if not found:
+        return None
+    names = {face.name for face in used}
+    rest = replace(space, faces=tuple(face for face in space.faces if face.name not in names))
+    area = sum(face.area for face in used)
+    return InnerGlass(furnished_surfaces(rest), *map(tuple, zip(*found, strict=True)), area)
+
+
+def borrowed_share(space: Space, light: PhaseLight, inner: InnerGlass | None) -> str:
+    """How much of the light of a room's sensors over the year its inner glass gives, in words."""
+    if inner is None:
+        return ""
+    first = len(light.filled.traced.scene.outdoor_groups)
+    states = [one[0] for one in light.sensors]
+    sums = [
+        one.diffuse[:-1].sum() + (0 if one.sun is None else one.sun[:-1].sum()) for one in states
+    ]
+    share = float(sum(sums[first:]) / max(sum(sums), 1e-9))
+    return (
+        f"Room {space.label} borrows {100 * share:.0f} % of its daylight through {inner.area:.1f} "
+        f"m2 of glass from {', '.join(dict.fromkeys(inner.names))}; the sun comes through it by "
+        "sky patches, blinds there are in their first state, the heat balance has none of it."
+    )
+
+
+def _panes(building: Building, space: Space) -> dict[str, list[tuple[Face, Face]]]:
+    """Panes of a room and the same as the room beyond has them, by the GUID of that room."""
+    rooms = {other.guid: other for other in building.spaces}
+    found: dict[str, list[tuple[Face, Face]]] = {}
+    for face in space.faces:
+        other = rooms.get(face.neighbour or "")
+        if face.pane is None or other is None or other.guid == space.guid:
+            continue
+        for back in other.faces:
+            if back.pane is None or back.neighbour != space.guid:
+                continue
+            away = _depth(face, back)
+            if (
+                back.pane.guid == face.pane.guid
+                and back.normal @ face.normal < -0.999
+                and abs(back.area - face.area) < SAME_SIZE * face.area
+                and away > -THINNEST
+                and _beside(face, back) < 0.5 * np.sqrt(face.area)
+            ):
+                found.setdefault(other.guid, []).append((face, back))
+    return found
+
+
+def _depth(face: Face, back: Face) -> float:
+    """How far the pane of the room beyond lies behind that of the room [m]."""
+    return float((centroid(back.triangles) - centroid(face.triangles)) @ face.normal)
+
+
+def _beside(face: Face, back: Face) -> float:
+    """How far the panes' middles lie apart along the wall [m]."""
+    step = centroid(back.triangles) - centroid(face.triangles)
+    return float(np.linalg.norm(step - (step @ face.normal) * face.normal))
+
+
+def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[BsdfOptics, WindowGroup]]:
+    """Panes of a room in groups of one orientation and one transmittance, with their optics."""
+    by_tau: dict[float, list] = {}
+    for face in faces:
+        tau = face.pane.visible_transmittance or CLEAR
+        by_tau.setdefault(tau, []).append(face.pane)
+    found = []
+    for tau, panes in by_tau.items():
+        glass = glazing_system(StatedValues(tau, None, None, None, 1), "the model")
+        optics = BsdfOptics(glass.visible, glass.fine, glass.angular)
+        groups = window_groups(replace(space, windows=tuple(panes)))
+        found += [(optics, group) for group in groups]
+    return found
+
+
+def _lit_room(
+    building: Building,
+    room: Space,
+    pairs: Sequence[tuple[Face, Face]],
+    systems: Mapping[str, States],
+) -> tuple[DaylightScene, tuple[NDArray[np.float64], ...]]:
+    """The room beyond seen from the panes of another one, and T of its windows."""
+    away = {back.name for _, back in pairs}
+    kept = [face for face in room.faces if face.name not in away]
+    glass = [_piece(face.pane.guid, face.triangles, GLASS_REFLECTANCE) for face, _ in pairs]
+    reveals = [
+        _piece(face.pane.guid, _tube(face, _depth(face, back)), ROOM_REFLECTANCE["reveal"])
+        for face, back in pairs
+        if _depth(face, back) > THINNEST
+    ]
+    windows = room_windows(room, systems)
+    scene = DaylightScene(
+        element_surfaces([*kept, *room.furniture, *glass, *reveals]),
+        exterior_surfaces(building, room),
+        windows.groups,
+    )
+    return scene, tuple(states[0].transmission for states in windows.optics())
+
+
+def _piece(guid: str, triangles: NDArray[np.float64], reflectance: float) -> Element:
+    return Element(guid, "glass between rooms", "IfcWindow", triangles, reflectance, reflectance)
+
+
+def _tube(face: Face, depth: float) -> NDArray[np.float64]:
+    """The reveals [T, 3, 3] from a pane's outline through the wall to the room beyond."""
+    corners, number = np.unique(
+        np.round(face.triangles.reshape(-1, 3), 6), axis=0, return_inverse=True
+    )
+    triangles = number.reshape(-1, 3)
+    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    _, first, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    a, b = corners[edges[first[count == 1]]].transpose(1, 0, 2)
+    step = depth * face.normal
+    return np.concatenate([np.stack([a, b, b + step], 1), np.stack([a, b + step, a + step], 1)])
