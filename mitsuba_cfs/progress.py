@@ -72,6 +72,15 @@ def summed(progress: Progress, stage: str, shares: Mapping[str, float]) -> Progr
     return inner
 
 
+def in_shares(progress: Progress, shares: Mapping[str, float]) -> Progress:
+    """A `Progress` whose stages fill only their shares, from 0; all of what has no share."""
+
+    def inner(label: str, fraction: float) -> None:
+        progress(label, shares.get(label, 1.0) * fraction)
+
+    return inner
+
+
 def item(
     progress: Progress, noun: str, number: int, total: int, name: str = "", *, whole: bool = False
 ) -> Progress:

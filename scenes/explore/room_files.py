@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.model import Building
+from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.picture_year.year import PictureYear
 from scenes.explore.packing import packed, write_data
 from scenes.explore.view_files import view_arrays, view_facts, write_pictures
@@ -75,9 +76,9 @@ def _arrays(result: RunResult, room: RoomYear, explored: ExploredRoom) -> dict[s
 
 
 def _blockers(building: Building, room: RoomYear) -> NDArray[np.float64]:
-    """Triangles [T, 3, 3] of what is opaque: the room's faces, what stands in it and outdoors."""
-    parts = [part.triangles for part in (*room.space.faces, *room.space.furniture)]
-    return np.concatenate([*parts, largest_triangles(building)[0]])
+    """Triangles [T, 3, 3] of what is opaque: what light meets in the room and outdoors."""
+    outdoors, _ = largest_triangles(exterior_surfaces(building, room.space).triangles)
+    return np.concatenate([furnished_surfaces(room.space).triangles, outdoors])
 
 
 def _plan(room: RoomYear) -> dict[str, Any]:

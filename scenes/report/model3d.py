@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Building, Space
+from bim.model import Space
+from bim.to_tracer import element_surfaces
 from scenes.figures.plan import sensor_cells
 from scenes.figures.scale import ColourScale
 from scenes.report.daylight_figures import top_of_scale, useful_column
@@ -61,7 +62,7 @@ class Model3D:
 def model3d(result: RunResult) -> Model3D:
     """The mesh of the run's rooms, all elements outdoors, and the sensors in their colours."""
     spaces = tuple(room.space for room in result.spaces)
-    outdoors, left_out = largest_triangles(result.building)
+    outdoors, left_out = largest_triangles(element_surfaces(result.building.elements).triangles)
     shells = [space.shell.reshape(-1, 3) for space in spaces]
     corners = np.concatenate(shells)
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -108,12 +109,8 @@ def room_batches(space: Space):
         yield kind, np.concatenate(parts), edges
 
 
-def largest_triangles(building: Building) -> tuple[NDArray[np.float64], int]:
-    """Triangles [T, 3, 3] of the elements, the smallest left out beyond the limit; how many."""
-    parts = [element.triangles for element in building.elements]
-    if not parts:
-        return np.empty((0, 3, 3)), 0
-    triangles = np.concatenate(parts)
+def largest_triangles(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """The triangles [T, 3, 3], the smallest left out beyond the limit; how many."""
     if len(triangles) <= MOST_TRIANGLES:
         return triangles, 0
     sides = triangles[:, 1:] - triangles[:, :1]

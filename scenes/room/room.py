@@ -32,7 +32,7 @@ from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.metrics.schedules import working_hours
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, in_shares, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
@@ -76,6 +76,8 @@ from thermal.errors import ThermalInputError
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
+# of the daylight's stage, the sensors' matrices; those of the view are a stage of their own
+TRACED = {"daylight": 0.6}
 WORST = 4  # pictures of an annual glare without hours asked for
 
 
@@ -205,12 +207,8 @@ class RoomSimulation:
             self.sampling,
             five_phase=self.options.method != "three-phase",
             cache=self.cache,
-            progress=self._tracing,
+            progress=in_shares(self.progress, TRACED),
         )
-
-    def _tracing(self, stage: str, fraction: float) -> None:
-        """The sensors' matrices are a part of the daylight, those of the view a stage."""
-        self.progress(stage, (0.6 if stage == "daylight" else 1.0) * fraction)
 
     @cached_property
     def light(self) -> PhaseLight:

@@ -54,7 +54,7 @@ def _facts(year: GlareYear, table: pd.DataFrame) -> list[tuple[str, str]]:
         *rows,
         ("Room", year.room),
         ("Weather", year.weather.site),
-        ("Fenestration", ", ".join(dict.fromkeys(str(f["name"]) for f in year.fenestration))),
+        ("Fenestration", ", ".join(dict.fromkeys(str(f["system"]) for f in year.fenestration))),
         ("Views", f"{len(table)}, of {len(_eyes(table)[1])} eyes"),
         ("Hours of use", f"{start} to {end} o'clock, {table['hours_of_use'].iloc[0]} hours"),
         ("Rating", f"{options.metric}, {options.method}; {rating_of(options).rule}"),

@@ -66,7 +66,7 @@ class GlareYear:
     used: NDArray[np.bool_]  # [H] hours of use
     digest: str  # of all inputs
     notes: tuple[str, ...] = ()  # of systems and weather
-    fenestration: Sequence[dict] = ()  # name, source and windows of each system
+    fenestration: Sequence[dict] = ()  # system, source and windows of each, see `resolver`
     space: Space | None = None  # the room, for its plan
 
 

@@ -6,11 +6,13 @@ import re
 import threading
 import urllib.error
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+from bim.model import Element
 from mitsuba_cfs.errors import DataError
 from scenes.cli import cfs
 from scenes.explore.folder import explorer_of, join_explorers, write_explorer
@@ -58,6 +60,19 @@ def test_packed_arrays_are_planes_of_bytes() -> None:
     data = packed([1, 258, -2], "i2")
     raw = zlib.decompress(base64.b64decode(data["data"]), -15)
     assert list(raw) == [1, 2, 254, 0, 1, 255] and data["length"] == 3
+
+
+def test_a_window_drawn_in_the_building_casts_no_shadow_on_its_own_room(tmp_path) -> None:
+    """Its frame and panes are among what stands outdoors: of a model read from IFC they are."""
+    run, count = explored_run(step=400, size=32), []
+    (window, *_) = run.spaces[0].space.windows
+    for guid in ("another", window.guid):
+        drawn = Element(guid, "pane", "IfcWindow", window.triangles, 0.5, 0.5)
+        building = replace(run.building, elements=(*run.building.elements, drawn))
+        write_explorer(replace(run, building=building), tmp_path / guid)
+        (file,) = (tmp_path / guid / "data").glob("room0.js")
+        count.append(read_data(file)["arrays"]["blockers"]["length"])
+    assert count[0] - count[1] == window.triangles.size
 
 
 def test_several_are_joined(results, tmp_path) -> None:

@@ -45,7 +45,7 @@ def page(tmp_path_factory):
     year = SimpleNamespace(
         options=options, room="101 <Open> office", space=two_rooms().spaces[0],
         weather=SimpleNamespace(site="Lyon"), notes=("A note & more.",),
-        fenestration=({"name": "Blind at 45"},),
+        fenestration=({"system": "Blind at 45"},),
     )  # fmt: skip
     path = tmp_path_factory.mktemp("glare") / "report.html"
     write_page(year, table(), path)

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from bim.building_file import STAGES
 from bim.ifc.building import read_ifc
-from mitsuba_cfs.progress import Stage, TimeLeft, item, part, spoken_left, summed
+from mitsuba_cfs.progress import Stage, TimeLeft, in_shares, item, part, spoken_left, summed
 from scenes.commands import compiling
 from scenes.commands.progress_bar import ProgressBar
 from scenes.demo import OFFICE
@@ -196,3 +196,11 @@ def test_the_balance_is_compiled_beside_only_where_it_must_be(
     with compiling.compiled_beside():
         pass
     assert len(begun) == (not compiled_already)
+
+
+def test_a_stage_fills_its_share() -> None:
+    told = []
+    steps = in_shares(lambda *now: told.append(now), {"daylight": 0.6})
+    steps("daylight", 0.5)
+    steps("view matrices", 0.5)
+    assert told == [("daylight", 0.3), ("view matrices", 0.5)]

@@ -104,6 +104,7 @@ def test_a_view_is_kept_as_well(tmp_path, variant, monkeypatch, weather, skies, 
     assert file.stat().st_size > 1000
 
 
+@pytest.mark.slow  # quick: test_bands_of_panes.py
 def test_windows_with_their_own_systems(variant, weather, skies, blind, glass) -> None:
     """Two windows in one wall, one system each: the light of each alone adds up."""
     both = shoebox(

@@ -15,6 +15,8 @@ from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import fisheye
 from scenes import cli
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
+from scenes.explore.folder import CASE
+from scenes.explore.packing import write_data
 from tests.conftest import REPOSITORY
 from tests.scenes.study_files import study_file
 from tests.thermal.test_study import study_file as thermal_file
@@ -40,6 +42,14 @@ def to_folder(*words: object, **options) -> Job:
 
 def _study(inputs: Path, out: Path) -> list[object]:
     return ["study", study_file(inputs, "orientations_deg = [0, 90]\n"), "--out", out]
+
+
+def _explorer(inputs: Path) -> Path:
+    """A folder of results with an explorer of no room."""
+    results = inputs / "results"
+    (results / "data").mkdir(parents=True, exist_ok=True)
+    write_data(results / CASE, {"title": "A", "hours": 8760, "rooms": []})
+    return results
 
 
 def _measured(inputs: Path, out: Path) -> list[object]:
@@ -74,6 +84,9 @@ JOBS = {
     ),
     "pv": to_folder("pv", OFFICE, "--weather", WEATHER, "--study", PV_STUDY),
     "dgp": to_folder("dgp"),
+    "explore": Job(
+        lambda inputs, out: ["explore", _explorer(inputs), "--out", out], folder=True
+    ),
     "study": Job(_study, folder=True),
     "study --write-ifc": Job(
         lambda inputs, out: [

@@ -50,6 +50,7 @@ def compile_once(cache: Path) -> tuple[str, float, str]:
     return before, float(seconds), after
 
 
+@pytest.mark.slow  # quick: tests/setup/test_compiled.py, that code is kept and found
 def test_the_balance_compiles_once_in_seconds_and_is_found_again(tmp_path: Path):
     before, seconds, after = compile_once(tmp_path)
     assert (before, after) == ("True", "False")

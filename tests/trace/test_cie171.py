@@ -48,7 +48,7 @@ def test_a_pane_of_the_quadrature_is_the_programs_pane():
     assert pane_transmittance(cosine, 0.88) == pytest.approx(ours, abs=1e-6)
 
 
-@pytest.mark.parametrize("method", ["two-phase", "five-phase"])
+@pytest.mark.parametrize("method", ["paths", "two-phase", "five-phase"])
 def test_a_few_points_behind_glass_have_the_sky_that_they_see(method):
     """Beside a small window of Klems glass: patches alone were 11 % off, 20 % at grazing."""
     case = case_of("5.12 facade opening 2x1, glass", slice(6, 14, 3))

@@ -120,7 +120,7 @@
     byId("sun").textContent = text;
     byId("time").textContent = lit ? `Picture ${lit.milliseconds.toFixed(0)} ms, glare ${lit.glareMilliseconds.toFixed(0)} ms, with unpacking ${lit.wholeMilliseconds.toFixed(0)} ms.` : "";
     const check = found.room.facts.checks[found.state];
-    byId("error").textContent = check ? `In ${check.hours.length} hours drawn at random the DGP shown differs from that of the uncompressed pictures by ${check.largest.toFixed(4)} at most, ${check.mean.toFixed(4)} in the mean.` : "";
+    byId("error").textContent = check ? `In ${check.hours.length} hours drawn at random the DGP shown differs from that of the uncompressed pictures by ${check.largest.toFixed(4)} at most, ${check.mean < 0.0001 ? "less than 0.0001" : check.mean.toFixed(4)} in the mean.` : "";
   }
 
   function paintCarpet(found, day, clock) {

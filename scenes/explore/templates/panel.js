@@ -95,7 +95,7 @@
         .filter(([name]) => room.arrays[name] && room.arrays[name][hour] >= 1)
         .map(([name, label]) => `${label} ${cfs.number(room.arrays[name][hour], 2)} W`);
       const operated = room.facts.states.length > 1 ? " (of the year as operated)" : "";
-      this.at("temperatures").textContent = lines.map((l) => `${l.label} ${l.now.toFixed(1)} °C`).concat(loads).join(", ") + operated;
+      this.at("temperatures").textContent = lines.map((l) => `${l.label} ${l.now.toFixed(1).replace("-", "−")} °C`).concat(loads).join(", ") + operated;
       cfs.paintDay(this.at("day"), lines, hour % 24);
     }
 

@@ -53,7 +53,7 @@
     pen.font = `${11 * ratio}px system-ui, sans-serif`;
     pen.fillStyle = pen.strokeStyle = style.color;
     pen.globalAlpha = 0.75;
-    for (const v of [low, high]) pen.fillText(`${v} °C`, 0, y(v) + 4 * ratio);
+    for (const v of [low, high]) pen.fillText(`${v} °C`.replace("-", "−"), 0, y(v) + 4 * ratio);
     for (const t of [0, 6, 12, 18, 24]) pen.fillText(String(t), Math.min(x(t), w - 14 * ratio), h - 2 * ratio);
     pen.globalAlpha = 0.3;
     pen.fillRect(x(hour), y(high), x(hour + 1) - x(hour), y(low) - y(high));

@@ -1,0 +1,189 @@
+"""Gloss in the sun: mirrors and rough facades in direct matrices and in pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.gloss import mirror
+from tests.trace.gloss_scenes import (
+    EYE,
+    IMAGE,
+    POINTS,
+    SUN,
+    UP,
+    black_room,
+    clear,
+    facade,
+    hidden_sun,
+    lit_by,
+    lobe_irradiance,
+    normal_illuminance,
+    one_hour,
+    traced,
+)
+
+from . import rooms
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+
+def test_the_sun_in_a_mirror_is_a_sun_to_the_direct_matrix():
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
+
+    room, groups = black_room(None)[0], rooms.test_room()[1]
+    scattered = np.full((145, 145), 0.1)
+    beam = [KlemsScattering(KLEMS_FULL, scattered, np.full(145, 0.5))]
+
+    def matrix(outdoors, sun):
+        return direct_sun_matrix(room, outdoors, groups, beam, POINTS, UP, suns=sun[None]).values
+
+    seen, alone = matrix(facade(mirror(0.8)), SUN), matrix(rooms.NOTHING, SUN * [1, -1, 1])
+    assert alone.min() > 0
+    np.testing.assert_allclose(seen, 0.8 * alone, rtol=2e-3)
+    assert not matrix(rooms.NOTHING, SUN).any()
+    assert not matrix(hidden_sun(mirror(0.8)), SUN).any()
+
+
+def test_a_mirror_behind_the_windows_sends_them_no_sun():
+    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.sun_ways import sun_ways
+
+    _, groups = rooms.test_room()
+    for shift, ways in ((0.0, 2), (30.0, 1)):  # before the window, and behind the house
+        there = facade(mirror(0.8))
+        there = replace(there, triangles=there.triangles + np.array([0.0, shift, 0.0]))
+        assert len(sun_ways(TracedScene(there, groups, windows_block=False))) == ways
+
+
+@pytest.mark.slow
+def test_five_phases_have_the_sun_of_a_mirror_facade():
+    """E in a room behind clear glass by five phases against paths, an even sky and the sun."""
+    import mitsuba_cfs as cfs
+    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+
+    room, groups = rooms.test_room()
+    outdoors = facade(mirror(0.8))
+    scene = cfs.DaylightScene(room, outdoors, groups, POINTS, UP)
+    sky = np.tile(np.where(np.arange(2306) == 0, 200.0, 2000.0)[:, None], (1, 1))
+    system = cfs.AngularOptics(np.ones(64))
+    traced_scene = cfs.PhaseScene(scene, cfs.Sampling(patch_samples=2**14, sensor_samples=2**15))
+    annual = one_hour(sky, SUN, 50_000.0)
+    found = cfs.PhaseSystems(traced_scene, [[system]]).light(annual).illuminance()[:, 0]
+    paths = traced(outdoors, lit_by(sky[:, 0], SUN, 50_000.0 / SUN_SOLID_ANGLE), samples=2**16)
+    error = 4 * paths.standard_error / paths.values
+    assert np.all(np.abs(found / paths.values - 1) < 0.02 + error), (found, paths.values)
+
+
+def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+    from mitsuba_cfs.trace.lit_room import LitRoom
+    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+
+    sky = lit_by(np.zeros(146), SUN, 50_000.0 / SUN_SOLID_ANGLE)
+    view = fisheye(EYE, (0.0, -1.0, 0.0), 32)
+    for outdoors, expected in ((facade(mirror(0.8)), IMAGE), (hidden_sun(mirror(0.8)), 0.0)):
+        lit = LitRoom(black_room(None)[0], outdoors, rooms.test_room()[1], [clear()])
+        picture = point_in_time_picture(lit, sky, view, samples=4, disc=False)
+        assert normal_illuminance(picture, view) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("indoors", [False, True])
+def test_a_five_phase_picture_shows_the_suns_disc_in_a_mirror(indoors):
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.picture_sun import PictureSun
+
+    room, floor = black_room(mirror(0.8))
+    beam = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
+    eye, direction, sun = EYE, (0.0, -1.0, 0.0), SUN
+    around = room, facade(mirror(0.8)), rooms.test_room()[1]
+    if indoors:  # the floor shows the sun through the window
+        sun = SUN * [1, -1, 1]
+        around = floor, rooms.NOTHING, rooms.test_room()[1]
+        eye, direction = (1.8, 3.0, 1.0), (0.0, -1.0, -1.0)
+    view = fisheye(eye, direction, 64)
+    shown = PictureSun(*around, [beam], view)
+    values = np.zeros((1, len(shown.pixels)))
+    shown.add_to(values, sun[None], np.array([50_000.0]))
+    picture = np.zeros(view.height * view.width)
+    picture[shown.pixels] = values[0]
+    found = normal_illuminance(picture.reshape(view.height, view.width), view)
+    assert found == pytest.approx(IMAGE, rel=0.02)  # pieces of the disc are counted whole
+
+
+def test_the_sun_on_a_rough_facade_is_seen_through_the_window():
+    """Pixels of a five-phase picture against the lobe itself, one sun and a black sky."""
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.picture_outdoors import outdoors
+
+    alpha, view = 0.2, fisheye(EYE, (0.0, -1.0, 0.0), 48)
+    beam = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
+    around = black_room(None)[0], facade(mirror(0.6, alpha)), rooms.test_room()[1]
+    seen = outdoors(*around, [beam], view, subdivision=1, samples=4)
+    values = np.zeros((1, seen.sky.shape[0]))
+    seen.rough.add_to(values, SUN[None], np.array([50_000.0]))
+    from mitsuba_cfs.images.view import pixel_directions
+
+    directions, counts = pixel_directions(view)
+    way = directions.reshape(-1, 3)[np.flatnonzero(counts.reshape(-1))]
+    half = SUN - way
+    along, square = half[:, 1], (half**2).sum(axis=1)
+    f = 0.6 * square * np.exp(-(square / along**2 - 1) / alpha**2) / (np.pi * alpha**2 * along**4)
+    whole = np.isclose(values[0], f * SUN[1] * 50_000.0, rtol=0.03)
+    lit = values[0] > 0.2 * values[0].max()
+    assert lit.sum() > 20 and whole[lit].mean() > 0.8  # the others lie on the window's edges
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.2])
+def test_window_patches_have_the_sun_of_a_rough_facade_in_its_lobe(alpha):
+    """Irradiance of the window by the patches' light, against the lobe's integral."""
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
+    from mitsuba_cfs.trace.scene import TracedScene
+
+    outside = TracedScene(facade(mirror(0.6, alpha)), rooms.test_room()[1])
+    shares = window_shares(outside, samples=1024)
+    found = outdoor_light(shares, outside, np.stack([SUN, -SUN]), np.full(2, SUN_SOLID_ANGLE))
+    irradiance = KLEMS_FULL.projected_solid_angles() @ found
+    # the house itself hides the sun from what of the facade lies right before its window
+    assert irradiance[0] == pytest.approx(lobe_irradiance(0.6, alpha), rel=0.02)
+    assert irradiance[1] == 0
+
+
+def test_the_sun_on_a_smooth_mirror_is_counted_by_its_image_alone():
+    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.sun_paths import Places, reflecting_places
+
+    normals = np.tile(np.float32([0, -1, 0]), (4096, 1))
+    for gloss, diffuse, expected in (
+        (mirror(0.8), 0.0, 0.0), (mirror(0.5), 0.3, 0.3), (mirror(0.6, 0.1), 0.3, 0.9),
+    ):  # fmt: skip
+        outside = TracedScene(facade(gloss, diffuse), rooms.test_room()[1])
+        start = Places(np.zeros((4096, 3), np.float32), normals)
+        whole = reflecting_places(outside, start, 0, 1)
+        some = reflecting_places(outside, start, 0, 1, mirrored=True)
+        assert whole.weight.mean() == pytest.approx(gloss.at_normal + diffuse, rel=1e-3)
+        assert some.weight.sum() / 4096 == pytest.approx(expected, rel=0.01)  # some pass the edge
+
+
+def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
+    """In a black room: the floor keeps 0.6 of what meets it first, the others 0.4."""
+    from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
+    from mitsuba_cfs.trace.estimate import Stopping
+
+    black, floor = black_room(mirror(0.4))
+    _, groups = rooms.test_room()
+    options = {"samples": 512, "stopping": Stopping(batches=2)}
+    dull, mirrored = (absorption_matrix(r, groups, **options).values[0] for r in (black, floor))
+    np.testing.assert_allclose(mirrored[:, 0], 0.6 * dull[:, 0], rtol=1e-5)
+    np.testing.assert_allclose(mirrored.sum(axis=1), 1.0, rtol=1e-5)
+    assert mirrored[:, 1].sum() > dull[:, 1].sum()  # the ceiling has it
