@@ -43,7 +43,8 @@ def room_of(zone: Zone, **services) -> RoomZone:
     dark = no_sun(HOURS, len(zone.surfaces), 0)
     return RoomZone(
         SimpleNamespace(floor_area=FLOOR), SimpleNamespace(zone=zone),
-        replace(dark, state=np.zeros((HOURS, 0), dtype=np.int64)), {}, np.zeros(HOURS, dtype=np.int64),
+        replace(dark, state=np.zeros((HOURS, 0), dtype=np.int64)), {},
+        np.zeros(HOURS, dtype=np.int64),
         np.full(HOURS, 11.0), np.ones(HOURS, dtype=bool), None, RoomServices(**given),
     )  # fmt: skip
 

@@ -107,6 +107,21 @@ def test_limits_of_basement_and_crawl_space():
     assert 0.2 < cellar.u_value < own_floor
 
 
+def test_cellar_passes_on_what_its_air_loses():
+    """ISO 13370, 7.4: its floor, then ground, walls above it and 0.3 air changes."""
+    floor, wall = basement(HOUSE, 0.0, 0.0, 2.0)
+    area, perimeter = HOUSE.area, HOUSE.perimeter
+    ground = area * floor.u_value + 2.0 * perimeter * wall.u_value
+    lost = ground + 0.5 * perimeter * 1.5 + 0.33 * 0.3 * area * 2.5
+    own = 1.0 / (2 * R_SI_DOWN + 1.0)
+    found = over_unheated_basement(HOUSE, 1.0, depth=2.0, height=0.5, wall_u=1.5)
+    assert found.u_value == pytest.approx(1.0 / (1.0 / own + area / lost))
+    open_walls = over_unheated_basement(HOUSE, 1.0, depth=2.0, height=0.5, wall_u=1e6)
+    assert open_walls.u_value == pytest.approx(own, rel=1e-3)
+    assert open_walls.swing == pytest.approx(own, rel=1e-3)
+    assert 0.0 < found.swing < own
+
+
 def test_penetration_depths_of_the_three_soils():
     """ISO 13370, table H.1: 2.2, 3.2 and 4.2 m."""
     found = [SOILS[name].penetration for name in ("clay", "sand", "rock")]

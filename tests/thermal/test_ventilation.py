@@ -104,6 +104,7 @@ def test_windows_flow_as_en_16798_7_says():
     zone = sealed(loads=KEPT, airing=WindowAiring(wind, stack, both=True))
     assert load(zone) == pytest.approx(HEAT * q * density * 18.0, rel=1e-9)
     assert cross_flow([1.0, 1.0], [180.0, 180.0], 1.2)[0] == 0.0  # one facade: no wind through
+    assert cross_flow([1.0, 1.0], [170.0, 190.0], 1.2)[0] == 0.0  # by the axis that passes less
     assert stack_height([0.9, 2.0], [2.1, 2.5]) == pytest.approx(1.6)
 
 
