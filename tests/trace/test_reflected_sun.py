@@ -42,7 +42,7 @@ def scene(exterior: Surfaces):
     return DaylightScene(interior, exterior, groups, points, np.tile([0.0, 0.0, 1.0], (3, 1)))
 
 
-def both(exterior: Surfaces, sky: AnnualSky):
+def both(exterior: Surfaces, sky: AnnualSky, sensor_samples: int = 32_768):
     """Five phases without the direct sun, the same by paths, and the error of these [S]."""
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.path_light import PathSystems
@@ -51,7 +51,9 @@ def both(exterior: Surfaces, sky: AnnualSky):
     from mitsuba_cfs.methods.sampling import Sampling
 
     system = [[BsdfOptics(clear_glass())]]
-    chosen = Sampling(sensor_samples=32_768, patch_samples=4096, subdivision=1, hour_samples=65_536)
+    chosen = Sampling(
+        sensor_samples=sensor_samples, patch_samples=4096, subdivision=1, hour_samples=65_536
+    )
     light = PhaseSystems(PhaseScene(scene(exterior), chosen), system).light(sky)
     paths, error = PathSystems(scene(exterior), system, chosen).light(sky).estimate()
     direct = light.direct_sun()[:, 0]
@@ -116,7 +118,8 @@ def test_what_stands_before_the_sun_leaves_a_floor_dark():
 @pytest.mark.slow
 @pytest.mark.parametrize("sun", [towards(45, 10), towards(30, 50)], ids=["high", "aside"])
 def test_the_sun_reflected_below_an_overhang_is_that_of_paths(sun):
-    found, expected, error = both(overhang(2.0), sun_alone(sun))
+    # the sensor by the window has 9 % of noise with a sixteenth of these samples (four seeds)
+    found, expected, error = both(overhang(2.0), sun_alone(sun), 524_288)
     agrees(found, expected, error)
 
 
