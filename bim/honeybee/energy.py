@@ -53,17 +53,6 @@ class EnergyLibrary:
         self._opaque: dict[str, OpaqueValues] = {}
         self._windows: dict[str, GlazingValues] = {}
 
-    def name(
-        self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str
-    ) -> str | None:
-        """Name of a surface's construction; None where nothing states one.
-
-        Args: part, field: where a construction set has it, such as "wall_set".
-        """
-        if isinstance(own.get("construction"), str):
-            return own["construction"]
-        return self.objects.name_by_set(room, part, field)
-
     def _construction(self, name: str) -> dict[str, Any]:
         return self.objects.find("constructions", name) or {}
 
