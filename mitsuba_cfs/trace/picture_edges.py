@@ -19,18 +19,21 @@ def edge_pixels(
     Args: pixels: [m] row * width + column; others count as their neighbours do.
     """
     row, column = np.divmod(pixels, view.width)
-    place = np.full((view.height + 2, view.width + 2), -1)
-    place[row + 1, column + 1] = np.arange(len(pixels))
-    crossed = np.zeros_like(lit)
-    for down, across in ((0, 1), (1, 0)):
-        other = place[row + 1 + down, column + 1 + across]
-        first = np.flatnonzero(other >= 0)
-        second = other[first]
-        unlike = lit[:, first] != lit[:, second]
-        crossed[:, first] |= unlike
-        crossed[:, second] |= unlike
-    hour, number = np.nonzero(crossed)
-    return hour, number
+    across = view.width + 2  # of a table with a border, so that every pixel has four neighbours
+    number_at = np.full((view.height + 2) * across, -1)
+    at = (row + 1) * across + column + 1
+    number_at[at] = np.arange(len(pixels))
+    found = []
+    for shown in lit:
+        number = np.flatnonzero(shown)  # of two that are unlike, one is lit: few are
+        crossed = [np.empty(0, dtype=np.int64)]
+        for step in (1, -1, across, -across):
+            other = number_at[at[number] + step]
+            unlike = (other >= 0) & ~shown[other]
+            crossed += [number[unlike], other[unlike]]
+        found.append(np.unique(np.concatenate(crossed)))
+    hour = np.repeat(np.arange(len(lit)), [len(numbers) for numbers in found])
+    return hour, np.concatenate([np.empty(0, dtype=np.int64), *found])
 
 
 def places_in_pixels(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -57,6 +57,7 @@ def point_in_time_picture(
     *,
     samples: int = 16,
     tile: int | None = None,
+    pixels: NDArray[np.int64] | None = None,
     max_depth: int = 24,
     seed: int = 0,
     disc: bool = True,
@@ -69,10 +70,11 @@ def point_in_time_picture(
         tile: pixels across of the squares that share slowly varying light, by default 0.9 degrees
             (2 pixels at least); 1: every pixel for itself, without smoothing, for a picture free
             of any assumption.
+        pixels: [n] row * width + column of those to trace, by default all that show something.
         disc: the sun's disc too; without it, it is to be rated apart (`path_disc.disc_seen`).
     """
     tile = tile_size(view) if tile is None else tile
-    shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
+    shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
     picture = np.zeros(view.height * view.width)
@@ -82,13 +84,13 @@ def point_in_time_picture(
     pairs, rows = [], []
     size = max(1, BLOCK // samples)
     for start in range(0, len(shown), size):
-        pixels = shown[start : start + size]
-        sharp, shared = kernel.trace(pixels, shifts[start : start + size])
-        picture[pixels] = sharp
+        block = shown[start : start + size]
+        sharp, shared = kernel.trace(block, shifts[start : start + size])
+        picture[block] = sharp
         for light in shared:
-            pairs.append(light.by_pixel(pixels, samples))
-            rows.append(light.by_tile(pixels, samples, tiles))
-        progress("picture", (start + len(pixels)) / len(shown))
+            pairs.append(light.by_pixel(block, samples))
+            rows.append(light.by_tile(block, samples, tiles))
+        progress("picture", (start + len(block)) / len(shown))
     _add_shared(picture, tiles, pairs, rows, numbers.windows)
     add_mirrored_discs(picture, room, sky, view)
     if disc:

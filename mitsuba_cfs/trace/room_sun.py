@@ -35,7 +35,7 @@ POINTS = 4  # on each, that the sun is taken at; one on those near a tile
 PATHS = 2**19  # of a view at most, but one of each pixel
 RAYS = 2**18  # at once
 NEAR_TILES = 12  # [tiles' widths] that a surface is near within, twice what smoothing spans
-NEAR_RAYS = 256  # of each tile to what is near
+NEAR_RAYS = 1024  # of each tile to what is near: narrow strips of sun beside a corner are small
 FINENESS = 0.5  # edge of an element near a tile over how near it is
 HALVINGS = 4  # of the elements' edge at most
 
