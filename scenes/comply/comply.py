@@ -28,6 +28,7 @@ from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
+from scenes.comply.solar import solar_sentences
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
@@ -123,7 +124,7 @@ class Check:
             self.systems = open_and_closed(systems, files.closed)
         self.building = traced_building(building, self.systems)
         self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
-        self.notes += files.weather.notes
+        self.notes += [*solar_sentences(self.systems), *files.weather.notes]
         self.hidden, self.glass = windows_without_view(windows, self.systems)
         self.calendar = calendar_of(files.weather)
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
