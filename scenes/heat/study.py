@@ -154,7 +154,9 @@ def _balanced(
         moist += room_humidity(together, found, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c
-            design.append(design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air, **place))
+            design.append(
+                design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air, **place)
+            )
         progress("heat balance", (number + 1) / len(groups))
     table = pd.concat(design, ignore_index=True) if design else None
     return _Balanced(rooms, results, moist, notes, table)

@@ -74,9 +74,10 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
     """
     if path is None:
         system = replace(system_of_panes(table.layers), source=f"{by} layers".strip())
-        system = replace(system, u_value=table.u_value, g_value=table.g_value)
     else:
         system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
+    if table.layers:  # they say U and g too: those of the file beside are of another model
+        system = replace(system, u_value=table.u_value, g_value=table.g_value, g_by_patch=None)
     by_patch = table.g_by_patch()
     return replace(
         system,

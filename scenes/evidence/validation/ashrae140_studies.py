@@ -32,7 +32,7 @@ def copied(reference: Path, folder: Path) -> list[Path]:
 
 
 def figures(name: str, year: ThermalYear) -> dict[str, float]:
-    """The standard's outputs of a case from the hours that `cfs thermal` writes: MWh, kW or degC."""
+    """The standard's outputs of a case from the hours of `cfs thermal`: MWh, kW or degC."""
     hours = year.hours
     if name.endswith("FF"):
         air = hours["air_c"]
