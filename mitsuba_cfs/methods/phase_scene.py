@@ -27,7 +27,7 @@ from mitsuba_cfs.trace.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.view_matrix import view_matrix
-from mitsuba_cfs.trace.window_exchange import window_exchange
+from mitsuba_cfs.trace.window_exchange import outdoor_exchange, window_exchange
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
 
 BATCHES = 8  # independent repetitions that the standard errors come from
@@ -70,7 +70,8 @@ class PhaseScene:
             cache=self.cache,
             progress=self.progress if progress is None else progress,
         )
-        for name in ("parts", "daylight", "direct_daylight", "straight_daylight"):
+        outdoors = ("daylight", "direct_daylight", "straight_daylight", "outdoor_exchange")
+        for name in ("parts", *outdoors):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
         return other
@@ -158,6 +159,20 @@ class PhaseScene:
             seed=self.sampling.seed,
             cache=self.cache,
         ).values
+
+    @cached_property
+    def outdoor_exchange(self) -> NDArray[np.float64]:
+        """X [Q, K, Q * K]: what the windows that look outdoors see of what they light there."""
+        parts = self.parts.groups[: self.parts.outdoors(self.scene)]
+        return outdoor_exchange(
+            self.scene.exterior,
+            parts,
+            samples=max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8),
+            max_depth=OUTDOOR_DEPTH,
+            stopping=Stopping(batches=2),
+            seed=self.sampling.seed,
+            cache=self.cache,
+        )
 
     @cached_property
     def view(self) -> ViewMatrices:
