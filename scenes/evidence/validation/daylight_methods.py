@@ -73,7 +73,7 @@ COEFFICIENT_PATHS = 65_536  # of a sensor in each of 16 batches
 def chosen_hours(weather: Weather, every: int) -> AnnualSky:
     """The skies of all sunlit hours of every `every`-th day."""
     series = sky_series(weather)
-    day = np.arange(len(weather.times)) // round(24 / weather.step_h)
+    day = np.arange(len(weather.times)) // weather.per_day
     lit = (series.diffuse_horizontal > 100) & is_up(series.sun) & (day % every == every // 2)
     return annual_sky(weather, SUBDIVISION, hours=np.flatnonzero(lit))
 

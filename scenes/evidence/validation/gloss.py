@@ -16,8 +16,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -39,6 +38,7 @@ from mitsuba_cfs.trace.point_in_time import point_in_time
 from scenes.cost import room
 from scenes.evidence.benchmarks import radiance
 from scenes.evidence.validation.rendered_scene import RenderedScene
+from scenes.evidence.validation.scene_rows import add_row_options, show_rows
 
 EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
 TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
@@ -255,19 +255,15 @@ def main() -> None:
     parser.add_argument("--cases", nargs="+", choices=MATERIALS, default=list(MATERIALS))
     parser.add_argument("--size", type=int, default=SIZE)
     parser.add_argument("--points", type=int, default=8, help="times that rtrace finds Ev")
-    parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
-    parser.add_argument("--json", type=Path)
+    add_row_options(parser)
     options = parser.parse_args()
     variants.activate()
-    rows = []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = (options.keep or Path(temporary)).resolve()
+
+    def rows(folder: Path) -> Iterator[Outcome]:
         for name in options.cases:
-            row = outcome(name, folder / name, size=options.size, points=options.points)
-            rows.append(asdict(row))
-            print(json.dumps(rows[-1], indent=1), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1))
+            yield outcome(name, folder / name, size=options.size, points=options.points)
+
+    show_rows(options, rows, lambda row: json.dumps(asdict(row), indent=1))
 
 
 if __name__ == "__main__":
