@@ -31,6 +31,7 @@ from scenes.room.windows import room_windows
 
 CLEAR = 0.88  # visible transmittance of glass that states none: a float pane of 6 mm, EN 410
 SAME_SIZE = 0.05  # share by which the pane may differ as the two rooms have it
+PANE = "glass between rooms"  # name of a pane as the room beyond has it: opaque
 THINNEST = 1e-3  # walls up to this have no reveal [m]
 
 
@@ -200,9 +201,9 @@ def _room_beyond(
     """The room beyond seen from the panes of another one, and T of all glass that lights it."""
     open_ = {back.name for _, back in pairs} | (set() if onward is None else onward.faces)
     kept = [face for face in room.faces if face.name not in open_]
-    glass = [_piece(face.pane.guid, face.triangles, GLASS_REFLECTANCE) for face, _ in pairs]
+    glass = [_piece(face, PANE, face.triangles, GLASS_REFLECTANCE) for face, _ in pairs]
     reveals = [
-        _piece(face.pane.guid, _tube(face, _depth(face, back)), ROOM_REFLECTANCE["reveal"])
+        _piece(face, "reveal", _tube(face, _depth(face, back)), ROOM_REFLECTANCE["reveal"])
         for face, back in pairs
         if _depth(face, back) > THINNEST
     ]
@@ -217,8 +218,9 @@ def _room_beyond(
     return scene, tuple(states[0].transmission for states in optics)
 
 
-def _piece(guid: str, triangles: NDArray[np.float64], reflectance: float) -> Element:
-    return Element(guid, "glass between rooms", "IfcWindow", triangles, reflectance, reflectance)
+def _piece(face: Face, name: str, triangles: NDArray[np.float64], reflectance: float) -> Element:
+    """Something of the pane of a face that the room beyond has."""
+    return Element(face.pane.guid, name, "IfcWindow", triangles, reflectance, reflectance)
 
 
 def _tube(face: Face, depth: float) -> NDArray[np.float64]:

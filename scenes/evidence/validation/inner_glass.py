@@ -179,7 +179,7 @@ def _mitsuba_scene(rooms: int):
 
 
 def by_radiance(rooms: int, folder: Path) -> NDArray[np.float64]:
-    """The same [S] by `rtrace` in all rooms, panes as `trans`; other random numbers each time."""
+    """The same [S] by `rtrace` in all rooms, panes as `trans`."""
     write_surfaces(surfaces([q for i in range(rooms) for q in room(i, rooms)]), folder / "room.rad")
     lines = []
     for number in range(rooms):
@@ -188,13 +188,23 @@ def by_radiance(rooms: int, folder: Path) -> NDArray[np.float64]:
         lines.append(f"void trans pane{number}\n0\n0\n7 {tau} {tau} {tau} 0 0 1 1\n")
         for i, triangle in enumerate(group(number, rooms).windows[0].triangles):
             lines.append(polygon(f"pane{number}", f"pane{number}_{i}", triangle))
+    (folder / "panes.rad").write_text("\n".join(lines))
+    return illuminance_by_rtrace(folder, sensors(rooms), UP)
+
+
+def illuminance_by_rtrace(
+    folder: Path, points: NDArray[np.float64], normals: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Illuminance [S] of sensors under the overcast sky; other random numbers each time.
+
+    Args: folder: its files room*.rad and panes.rad are the scene.
+    """
     zenith, ground = 9 * SKY_LUX / (7 * np.pi), GROUND * SKY_LUX / np.pi
     level = f"level = if(Dz, {zenith:.9g} * (1 + 2*Dz)/3, {ground:.9g});\n"
     (folder / "sky.cal").write_text(level)
     (folder / "sky.rad").write_text(f"{SKY}sky source all\n0\n0\n4 0 0 1 360\n")
-    (folder / "panes.rad").write_text("\n".join(lines))
-    run("oconv room.rad panes.rad sky.rad > all.oct", folder)
-    found = run(f"{TRACE} all.oct", folder, sensors_text(sensors(rooms), UP))
+    run("oconv room*.rad panes.rad sky.rad > all.oct", folder)
+    found = run(f"{TRACE} all.oct", folder, sensors_text(points, normals))
     return np.frombuffer(found, dtype="<f4").reshape(-1, 3)[:, 0].astype(float)
 
 
