@@ -109,6 +109,7 @@ class AdaptiveComfort:
     """Hours against one adaptive band."""
 
     band: str
+    outdoor_mean_c: NDArray[np.float64]  # [H] that the limits follow
     low_c: NDArray[np.float64]  # [H] operative temperature limits
     high_c: NDArray[np.float64]  # [H]
     applicable: NDArray[np.bool_]  # [H] the outdoor mean lies in the standard's range
@@ -132,7 +133,24 @@ def adaptive_comfort(
     low, high = comfort - below, comfort + above
     applicable = (mean >= lowest) & (mean <= highest)
     excess = np.maximum(operative - high, 0.0) + np.minimum(operative - low, 0.0)
-    return AdaptiveComfort(band, low, high, applicable, applicable & (excess == 0.0), excess)
+    within = applicable & (excess == 0.0)
+    return AdaptiveComfort(band, mean, low, high, applicable, within, excess)
+
+
+def comfort_by_outdoors(
+    operative_c: ArrayLike, outdoor_c: ArrayLike, band: str, *, per_day: int
+) -> AdaptiveComfort:
+    """Operative temperatures [H] against a band that follows the weather as its standard says.
+
+    Args: outdoor_c: [H] of whole days with so many values each.
+    """
+    mean = running_mean_en16798 if band.startswith("EN 16798-1") else running_mean
+    return adaptive_comfort(operative_c, mean(outdoor_c, per_day=per_day), band)
+
+
+def degree_hours(operative_c: ArrayLike, above_c: float, *, step_h: float) -> float:
+    """Kelvin above a limit times hours, of operative temperatures [H]."""
+    return float(np.maximum(np.asarray(operative_c) - above_c, 0.0).sum() * step_h)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from scipy import sparse
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
-from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, flat
+from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, add_seen, flat
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
@@ -271,23 +271,20 @@ class FivePhasePictures:
         m, noise, rest = self._matrices, self._matrices.noise, self._lighting[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength).reshape(rest.shape)
-        more = None
+        rows = m.indirect.with_rows(noise.indirect).of_rows(self._reflected[:, batch])
+        rows += m.lit.with_rows(noise.lit).of_rows(rest + scattered)
         if self._elements is not None and noise.elements is not None:
-            more = self._sun.on_elements(noise.elements, suns, strength)
-        values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
-        m.indirect.with_rows(noise.indirect).add_to(values, self._reflected[:, batch], more)
-        beam = None
+            rows += self._sun.on_elements(noise.elements, suns, strength).T
         if self._light is not None:
-            beam = self._light.noise(self._sky[:, batch], self._faces[:, batch]).T
-        m.lit.with_rows(noise.lit).add_to(values, rest + scattered, beam)
+            rows += self._light.noise(self._sky[:, batch], self._faces[:, batch])
+        values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
+        m.lit.add_rows(values, rows)
         return values
 
     def _values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Luminance [h, n] without the sun's disc."""
         rows, values = self.by_rows(batch)
-        m = self._matrices.lit
-        for hour, found in zip(values, rows, strict=True):
-            hour += found[m.row] * m.share
+        self._matrices.lit.add_rows(values, rows)
         return values
 
     def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -295,13 +292,12 @@ class FivePhasePictures:
         m, rest = self._matrices, self._lighting[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength)
-        windows = m.seen @ self._scattered[:, batch]
+        values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
+        add_seen(values, m.seen, self._scattered[:, batch])
         seen = self._outdoors
         if seen is not None:
             sky = self._sky[:, batch]
-            windows += seen.sky @ sky
-        values = np.ascontiguousarray(windows.T, dtype=np.float32)
-        if seen is not None:
+            add_seen(values, seen.sky, sky)
             seen.sun.add_to(values, suns, strength, seen.reflected @ sky)
             if seen.rough is not None:
                 seen.rough.add_to(values, suns, strength)
