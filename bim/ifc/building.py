@@ -104,6 +104,7 @@ def read_ifc(
             source, rooms.read, spaces, glass, problems, repeated=[r.guid for r in rooms.repeated]
         ),
         map_georeference(source.model, source.placed),
+        source.placed.matrix(),
     )  # fmt: skip
 
 

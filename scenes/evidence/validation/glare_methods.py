@@ -68,6 +68,7 @@ class GlareCase:
     sky: AnnualSky
     times: tuple[str, ...]
     raised: tuple[float, ...] = (0.0,)  # [m] eyes of the measurement above the view's, for a mean
+    sun: str = "source"  # the disc in the measurement: apart as in the methods, or in its pixels
 
 
 def measured(
@@ -80,13 +81,17 @@ def measured(
         raised = replace(scene, view=replace(scene.view, position=tuple(eye)))
         light, row = measurement(raised, case.exterior, sampling).light(case.sky), []
         for hour in range(len(case.sky.lit)):
-            picture = light.picture(hour, seed=SEED)
-            found = evaluate(picture, geometry)
+            picture = light.picture(hour, seed=SEED, disc=False)
+            whole = light.with_disc(picture, hour)
+            if case.sun == "source":
+                found = evaluate(picture, geometry, disc=light.disc(hour))
+            else:
+                found = evaluate(whole, geometry)
             row.append((found.dgp, found.Ev))
             if pictures is not None:
                 title = f"{case.name}, {case.times[hour]}: DGP {found.dgp:.3f}"
                 name = f"{case.name.replace(' ', '_')}_{hour:02d}.png"
-                write_falsecolour(pictures / name, picture, title=title)
+                write_falsecolour(pictures / name, whole, title=title)
         rows.append(row)
     dgp, lux = np.mean(rows, axis=0).T
     return dgp, lux
