@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.images.view import View, rays
-from mitsuba_cfs.trace.sampling import pixel_places
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.trace.sampling import spread_rays
 
 EDGE_PLACES = 8  # in a pixel at an edge: what is lit of it is known to a tenth
 
@@ -38,6 +38,4 @@ def edge_pixels(
 
 def places_in_pixels(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
     """Directions [k * EDGE_PLACES, 3] of places spread over each of some pixels [k]."""
-    dx, dy = np.tile(pixel_places(EDGE_PLACES), (len(pixels), 1)).T
-    row, column = np.divmod(np.repeat(pixels, EDGE_PLACES), view.width)
-    return rays(view, (column + dx) / view.width, 1.0 - (row + dy) / view.height)[0]
+    return spread_rays(view, pixels, EDGE_PLACES)[0]
