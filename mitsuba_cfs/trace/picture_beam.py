@@ -22,13 +22,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
-from mitsuba_cfs.images.view import View, rays
+from mitsuba_cfs.images.view import View
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.picture_rows import PictureRows
 from mitsuba_cfs.trace.picture_sharing import tile_size
-from mitsuba_cfs.trace.sampling import column, lattice_2d, pixel_places, tables, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d, spread_rays, tables, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
 from mitsuba_cfs.trace.sun_discs import Scattering
 
@@ -199,11 +199,7 @@ class _Look:
         """What rays of pixels meet: place, normal, luminance by irradiance; if it is a window."""
         inside, samples = self._inside, self._samples
         eye = inside.place(self._view.position)
-        dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
-        pixel = np.repeat(pixels, samples)
-        x = (pixel % self._view.width + dx) / self._view.width
-        y = 1.0 - (pixel // self._view.width + dy) / self._view.height
-        directions, exists = rays(self._view, x, y)
+        directions, exists = spread_rays(self._view, pixels, samples)
         way, shown = vectors(directions), column(exists, mi.Bool)
         ray = mi.Ray3f(eye, way)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=True, active=shown)

@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.images.view import View, pixel_directions, rays
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
@@ -212,10 +212,8 @@ class _Kernel:
         """The pixels' own light [n], and the light of their rays that is to be shared."""
         n = self._samples
         number = np.repeat(pixels, n)
-        places = np.mod(self._places + shifts[:, None], 1.0).reshape(-1, 2)
-        x = (number % self._view.width + places[:, 0]) / self._view.width
-        y = 1.0 - (number // self._view.width + places[:, 1]) / self._view.height
-        directions, exists = rays(self._view, x, y)
+        across, down = np.mod(self._places + shifts[:, None], 1.0).reshape(-1, 2).T
+        directions, exists = pixel_rays(self._view, number, across, down)
         way = vectors(directions)
         path = mi.UInt32(number.astype(np.uint32)) * n + dr.arange(mi.UInt32, len(number)) % n
         generator = path_generator(path, self._key)
