@@ -99,7 +99,8 @@ def beam_light(
     look = _Look(inside, outside, scattering, bins, view, samples)
     found, seen, carrying = look.rows(rows, np.arange(len(rows.pixels)), shape, seed)
     # a slit of sky beside or below what stands outdoors may carry most of a row's light
-    few = np.repeat((carrying > 0) & (carrying < FEW), 2)
+    lit = np.diff(found.indptr).reshape(-1, 2).any(axis=1)
+    few = np.repeat(lit & (carrying < FEW), 2)
     again = np.flatnonzero(few[rows.half])
     look = _Look(inside, outside, scattering, bins, view, MORE * samples)
     more, seen[again], _ = look.rows(rows, again, shape, seed)
