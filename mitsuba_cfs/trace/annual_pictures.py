@@ -113,16 +113,7 @@ def view_matrices(
     if options.get("max_depth", 2) > 1:
         area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
         elements, close = sun_elements(tracer, area, view, pixels, half, tile, seed=seed)
-    least = 0.5 / options.get("samples", 32)
-    smooth = shared.smoothing(share, least)
-    # sharper for the windows' light, which changes fastest where other surfaces are close
-    sharper = smooth if close is None else shared.smoothing(share, least, close)
-    mean, noise = shared.of_halves(share, least)
-    for start in range(0, shape[1], KLEMS_FULL.size):
-        part = slice(start, start + KLEMS_FULL.size)
-        for rows, means in zip(sums, (smooth, sharper), strict=True):
-            of_halves = np.array(rows[:, part])
-            rows[:m, part], rows[m:, part] = (means @ (a @ of_halves) for a in (mean, noise))
+    mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     found = (None, None)
     if elements is not None:
         found = tuple(elements.of_rows(a, smooth) for a in (mean, noise))
@@ -146,6 +137,30 @@ def _summed(
         seen.append(sparse.csr_array(shown))
         start += len(block)
     return sparse.csr_array(sparse.vstack(seen))
+
+
+def _smooth(
+    sums: Sequence[NDArray[np.float32]],
+    shared: PictureRows,
+    share: NDArray[np.float32],
+    least: float,
+    close: NDArray[np.bool_] | None,
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
+    """Turn sums by halves [2 m, N] into rows [m] and, below them, their noise [m], both smoothed.
+
+    Returns: from halves to rows and to their noise [m, 2 m], and the first sums' smoothing [m, m].
+    """
+    smooth = shared.smoothing(share, least)
+    # sharper for the windows' light, which changes fastest where other surfaces are close
+    sharper = smooth if close is None else shared.smoothing(share, least, close)
+    mean, noise = shared.of_halves(share, least)
+    m = len(shared.keys)
+    for start in range(0, sums[0].shape[1], KLEMS_FULL.size):
+        part = slice(start, start + KLEMS_FULL.size)
+        for rows, means in zip(sums, (smooth, sharper), strict=True):
+            of_halves = np.array(rows[:, part])
+            rows[:m, part], rows[m:, part] = (means @ (a @ of_halves) for a in (mean, noise))
+    return mean, noise, smooth
 
 
 def _add_rows(rows: NDArray, row: NDArray[np.int64], values: NDArray) -> None:
