@@ -42,8 +42,7 @@ def test_layers_are_rated_by_the_standard(tmp_path):
     write_bsdf_xml(BsdfFile({"Visible": sheet, "Solar": sheet}, name="sheet"), path)
     path.with_suffix(".toml").write_text(LAYERS)
     rows = {
-        row["method"]: row
-        for row in rated_state(path, place=None, glazing=None, kappa=0.4).rows()
+        row["method"]: row for row in rated_state(path, place=None, glazing=None, kappa=0.4).rows()
     }
     wanted = rows["ISO 52022-3, reference"]
     text = solar_sentence(read_system(path))
