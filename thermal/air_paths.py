@@ -30,6 +30,8 @@ class AirPaths(NamedTuple):
     fan: NDArray[np.float64]  # [Z, 3] recovery, bypass above, least temperature
     bridges: NDArray[np.float64]  # [Z] [W/K]
     transfer: NDArray[np.int64]  # [Q, 2] zone that gives air, zone that takes it
+    beside: NDArray[np.int64]  # [D] zone of each opening to a neighbour of known temperature
+    buoyant: NDArray[np.float64]  # [D] its flow each way at |dT| = T [m3/s]
 
 
 class Emitters(NamedTuple):
@@ -50,6 +52,7 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
         for name in (one.source, one.target):
             require(name in index, "air between zones", f"no zone {name!r} is simulated")
     pairs = [(index[one.source], index[one.target]) for one in transfers]
+    openings = [(z, one) for z, zone in enumerate(zones) for one in zone.beside]
     return AirPaths(
         leak=np.array(
             [(*x.factors, x.stack, x.stack_exponent, x.wind, x.wind_exponent) for x in leaks]
@@ -64,6 +67,8 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
         fan=np.array([(x.recovery, x.bypass_above_c, x.least_c) for x in fans]),
         bridges=np.array([zone.bridges for zone in zones]),
         transfer=np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        beside=np.array([z for z, _ in openings], dtype=np.int64),
+        buoyant=np.array([one.buoyant for _, one in openings], dtype=np.float64),
     )  # fmt: skip
 
 

@@ -214,6 +214,7 @@ def _work(net: Network, zones: int) -> records.Workspace:
         flow=np.zeros(zones),
         supply=np.zeros((zones, 3)),
         carried=np.zeros(zones),
+        passed=np.zeros(zones),
         slab=np.zeros(zones),
         source=np.zeros(m),
         still=np.zeros(m),

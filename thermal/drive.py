@@ -37,6 +37,7 @@ def drive_of(
         states.append(_states(zone, sun, hours))
     fans = [zone.supply or SupplyAir(0.0) for zone in zones]
     slabs = [zone.slab or HeatedSlab("", 1.0) for zone in zones]
+    beside = [one for zone in zones for one in zone.beside]
     drive = records.Drive(
         inner=np.ascontiguousarray(np.concatenate(inner, axis=1)),
         outer=np.ascontiguousarray(np.concatenate(outer, axis=1)),
@@ -50,6 +51,14 @@ def drive_of(
         supply_c=_set_points([_supplied(f) for f in fans], hours, steps, missing=True),
         airing=_hourly([z.airing.share if z.airing else 0.0 for z in zones], hours, "windows"),
         transfer=_hourly([one.flow for one in transfers], hours, "air between zones"),
+        beside=np.stack(
+            [
+                _hourly([getattr(one, key) for one in beside], hours, "air beside")
+                for key in ("flow", "share")
+            ],
+            axis=2,
+        ),
+        beside_c=_set_points([one.beside_c for one in beside], hours, steps),
         heating_c=_set_points([z.loads.heating_c for z in zones], hours, steps),
         cooling_c=_set_points([z.loads.cooling_c for z in zones], hours, steps),
         limit=np.array([[z.loads.heating_limit, z.loads.cooling_limit] for z in zones]),

@@ -42,6 +42,7 @@ def _account(
         warmer = weather.outdoor[t] - state.air[z]
         terms[z, on.GAINS] += drive.convective[hour, z] + drive.radiant[hour, z]
         terms[z, on.AIR] += heat * work.flow[z] * warmer + work.carried[z]
+        terms[z, on.AIR] -= work.passed[z] * state.air[z]
         terms[z, on.LOADS] += state.load[z]
         terms[z, on.SUPPLY] += work.supply[z, 1] - work.supply[z, 0] * state.air[z]
         terms[z, on.BRIDGES] += net.paths.bridges[z] * warmer

@@ -57,6 +57,8 @@ class Drive(NamedTuple):
     supply_c: NDArray[np.float64]  # [T, Z] its temperature; NaN: outdoor air
     airing: NDArray[np.float64]  # [H, Z] share of the windows that may be opened
     transfer: NDArray[np.float64]  # [H, Q] air from zone to zone [m3/s]
+    beside: NDArray[np.float64]  # [H, D, 2] air to neighbours [m3/s], open share of the opening
+    beside_c: NDArray[np.float64]  # [T, D] the neighbours' air
     heating_c: NDArray[np.float64]  # [T, Z] set point
     cooling_c: NDArray[np.float64]  # [T, Z]
     limit: NDArray[np.float64]  # [Z, 2] heating and cooling power [W]
@@ -89,7 +91,8 @@ class Workspace(NamedTuple):
     radiant_seen: NDArray[np.float64]
     flow: NDArray[np.float64]  # [Z] outdoor air but that of fans [m3/s]
     supply: NDArray[np.float64]  # [Z, 3] fans: conductance [W/K], it times temperature, coil [W]
-    carried: NDArray[np.float64]  # [Z] heat of the air that comes from other zones [W]
+    carried: NDArray[np.float64]  # [Z] heat of the air from other zones and neighbours [W]
+    passed: NDArray[np.float64]  # [Z] conductance of the air to the neighbours [W/K]
     slab: NDArray[np.float64]  # [Z] power of the slab [W]
     source: NDArray[np.float64]  # [M] heat set free at the nodes [W/m2]
     still: NDArray[np.float64]  # [M] node temperatures that the step before alone would give

@@ -254,7 +254,18 @@ def _assemble_air(
         work.air[z, 0] = store + outdoor + work.supply[z, 0]
         work.air[z, 1] = store * work.old_air[z] + outdoor * weather.outdoor[t]
         work.air[z, 1] += work.supply[z, 1] + drive.convective[hour, z]
-        work.carried[z] = 0.0
+        work.carried[z], work.passed[z] = 0.0, 0.0
+    for q in range(net.paths.beside.size):
+        z, beyond = net.paths.beside[q], drive.beside_c[t, q]
+        mean = 0.5 * (state.air[z] + beyond) + 273.15
+        apart = abs(state.air[z] - beyond) / mean
+        driven = drive.beside[hour, q, 1] * net.paths.buoyant[q] * np.sqrt(apart)
+        thinner = (weather.outdoor[t] + 273.15) / mean  # than outdoor air
+        exchanged = heat * thinner * (drive.beside[hour, q, 0] + driven)
+        work.air[z, 0] += exchanged
+        work.air[z, 1] += exchanged * beyond
+        work.carried[z] += exchanged * beyond
+        work.passed[z] += exchanged
     for q in range(net.paths.transfer.shape[0]):
         y, z = net.paths.transfer[q]
         carried = heat * drive.transfer[hour, q]

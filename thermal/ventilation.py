@@ -18,6 +18,8 @@ DOE2 = (0.0, 0.0, 0.224, 0.0)  # EnergyPlus Input Output Reference, ZoneInfiltra
 BLAST = (0.606, 0.03636, 0.1177, 0.0)
 DISCHARGE, PRESSURE = 0.67, 0.75  # of open windows: EN 16798-7:2017, B.1.2.1 and B.1.3.4
 WIND, STACK = 0.001, 0.0035  # [1/(m/s)], [(m/s)/(m K)]: EN 16798-7:2017, table 11
+DOOR_DISCHARGE = 0.65  # of an open doorway; measured ones lie between 0.4 and 0.8
+GRAVITY = 9.81  # [m/s2]
 REFERENCE_DENSITY = 1.204  # [kg/m3] of EN 16798-7, 20 degC
 
 
@@ -151,3 +153,30 @@ class AirTransfer:
         item = f"air from {self.source} to {self.target}"
         require(self.source != self.target, item, "expected two zones")
         require(bool(np.all(np.asarray(self.flow) >= 0)), item, "negative flow")
+
+
+@dataclass(frozen=True, slots=True)
+class NeighbourAir:
+    """Air exchanged, as much each way, with a neighbour of known temperature: an open door."""
+
+    beside_c: NDArray[np.float64] | float  # [H] or [T] of the neighbour's air
+    flow: NDArray[np.float64] | float = 0.0  # [H] each way whatever the temperatures [m3/s]
+    buoyant: float = 0.0  # each way at |dT| = T, see `large_opening` [m3/s]
+    share: NDArray[np.float64] | float = 1.0  # [H] of the opening that is open
+
+    def __post_init__(self) -> None:
+        least = min(np.min(self.flow), self.buoyant, np.min(self.share))
+        require(bool(least >= 0), "air beside", f"expected no negative flow, got {least:g}")
+
+
+def large_opening(width: float, height: float, *, discharge: float = DOOR_DISCHARGE) -> float:
+    """Air each way through a tall opening at |dT| = T [m3/s]: q = C_D/3 W sqrt(g H^3 dT/T).
+
+    Warm air leaves above, as much cool air comes below the neutral height, the middle.
+
+    Args: width, height: W and H of the opening [m]; discharge: C_D.
+
+    Source: Brown and Solvason 1962, "Natural convection through rectangular openings in partitions
+        1: vertical partitions", Int. J. Heat Mass Transfer 5, 859-868.
+    """
+    return discharge / 3.0 * width * float(np.sqrt(GRAVITY * height**3))

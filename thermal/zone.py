@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal.blackbox import Fenestration
 from thermal.emitters import HeatedSlab, IdealLoads
 from thermal.errors import require, require_range
-from thermal.ventilation import Leakage, SupplyAir, WindowAiring
+from thermal.ventilation import Leakage, NeighbourAir, SupplyAir, WindowAiring
 
 ROUGHNESS = {  # DOE-2 roughness multiplier R_f; EnergyPlus Engineering Reference
     "very rough": 2.17,
@@ -146,6 +146,7 @@ class Zone:
     other_air_ach: NDArray[np.float64] | float = 0.0  # [H] [1/h] outdoor air that nothing changes
     supply: SupplyAir | None = None
     airing: WindowAiring | None = None
+    beside: tuple[NeighbourAir, ...] = ()  # air exchanged with neighbours of known temperature
     bridges: float = 0.0  # thermal bridges, air to outdoors: sum of psi l and chi [W/K]
     slab: HeatedSlab | None = None
 

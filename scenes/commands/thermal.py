@@ -33,7 +33,12 @@ def command(study: Path, out: Path, figures: bool, quick: bool) -> None:
     from scenes.result_folder import ResultFolder
 
     parsed = read_study(study, quick=quick)
-    inputs = (study, parsed.weather, parsed.building, *(one.bsdf for one in parsed.system))
+    inputs = (
+        study,
+        parsed.weather,
+        parsed.building,
+        *(one.bsdf for one in parsed.system if one.bsdf),
+    )
     folder = ResultFolder(out, "thermal", inputs=inputs)
     files = read_files(parsed, study)  # before anything heavy is loaded
     from scenes.commands.compiling import compiled_beside

@@ -7,7 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from mitsuba_cfs.bsdf.spectral_pane import read_spectral_pane, spectral_glazing
+from mitsuba_cfs.bsdf.spectral_pane import (
+    SpectralPane,
+    read_spectral_pane,
+    spectral_glazing,
+)
 from scenes import plausible
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.gases import GAS_NAMES
@@ -52,6 +56,7 @@ class GlazingLayerTable(TomlTable):
     emissivity: Both | None = None  # of a shade: of its material
     infrared_transmittance: Share | None = None
     solar: tuple[Share, Share, Share] | None = None  # transmittance, reflectance front and back
+    visible: tuple[Share, Share, Share] | None = None  # the same; without: as the sun's
     slats: SlatTable | None = None
     threads: CellTable | None = None
     holes: CellTable | None = None
@@ -64,14 +69,20 @@ class GlazingLayerTable(TomlTable):
         kinds = [name for name in ("pane", *SHADES) if getattr(self, name) is not None]
         if len(kinds) > 1:
             raise ValueError(f"{kinds[0]} and {kinds[1]} exclude each other")
-        shade = bool(kinds) and kinds[0] in SHADES
+        shade = self.is_shade
         if not kinds and self.thickness is None:
             raise ValueError("expected a pane (a file, or its thickness) or one of " + _listed())
-        if shade and self.solar is not None:
-            raise ValueError("solar: is of panes; what a shade absorbs follows from the BSDF")
+        for key in ("solar", "visible") if shade else ():
+            if getattr(self, key) is not None:
+                raise ValueError(f"{key}: is of panes; what a shade absorbs follows from the BSDF")
         if not shade and any(self.edges):
             raise ValueError("edges: are of shades: " + _listed())
         return self
+
+    @property
+    def is_shade(self) -> bool:
+        """Whether the layer is no pane."""
+        return any(getattr(self, name) is not None for name in SHADES)
 
     def layer(self) -> GlazingLayer:
         """The layer; `DataError` for a pane's file that cannot be read."""
@@ -104,9 +115,13 @@ class GlazingLayerTable(TomlTable):
             )
         return GlazingLayer(solar=self.solar, **given)
 
-    def _of_file(self) -> GlazingLayer:
+    def spectral(self) -> SpectralPane:
+        """The pane of the file, as it is turned."""
         pane = read_spectral_pane(self.pane)
-        pane = pane.turned() if self.turned else pane
+        return pane.turned() if self.turned else pane
+
+    def _of_file(self) -> GlazingLayer:
+        pane = self.spectral()
         sun = spectral_glazing([pane])["Solar"]
         values = (sun.transmittance, sun.reflectance_front, sun.reflectance_back)
         return GlazingLayer(

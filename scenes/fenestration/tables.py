@@ -118,6 +118,18 @@ class WindowHeatTable(ClosureTable):
 
 
 class StateTable(WindowHeatTable):
-    """One shading state: a BSDF file and what else was measured."""
+    """One shading state: a BSDF file, or `layers` of panes alone, and what else was measured."""
 
-    bsdf: Path
+    bsdf: Path | None = None
+
+    @model_validator(mode="after")
+    def _has_optics(self) -> StateTable:
+        if self.bsdf is None and not self.layers:
+            raise ValueError("bsdf: is missing; only panes, as `layers`, go without one")
+        for number, layer in enumerate(self.layers if self.bsdf is None else ()):
+            if layer.is_shade:
+                raise ValueError(f"layers.{number}: a shade's light needs a `bsdf` of the system")
+            if layer.pane is None and layer.solar is None:
+                message = "its transmittance and reflectances are missing, and there is no `bsdf`"
+                raise ValueError(f"layers.{number}.solar: {message}")
+        return self

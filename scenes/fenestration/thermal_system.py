@@ -116,7 +116,7 @@ def _diffuse(solar: KlemsBsdf, block: NDArray[np.float64]) -> float:
     return float(weight @ solar.direct_hemispherical(block) / weight.sum())
 
 
-def checked_system(system: FenestrationSystem, path: Path) -> ThermalSystem:
+def checked_system(system: FenestrationSystem, path: Path | None) -> ThermalSystem:
     """The thermal data of a system.
 
     Args: path: the file that U and g are wrong in, for the message.

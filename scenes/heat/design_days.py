@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
 from scenes.room.zone import RoomZone, climate, per_window
-from thermal.balance import simulate_zones
+from thermal.balance import BalanceOptions, simulate_zones
 from thermal.climate import Climate, no_sun
 from thermal.ventilation import AirTransfer
 from thermal.zone import Gains, Zone
@@ -31,6 +31,7 @@ def design_loads(
     step_s: float,
     air_links: FloatArray | None = None,
     transfers: Sequence[AirTransfer] = (),
+    terrain: str = "suburbs",
 ) -> pd.DataFrame:
     """The greatest loads of rooms, each day repeated until it ends as it began, without limits.
 
@@ -38,10 +39,11 @@ def design_loads(
 
     Returns: a row a room and case: day, outdoor mean and extreme [degC], peak [W] and its hour.
     """
-    whole, hours, day_rows = climate(weather), len(weather.times), round(24 / weather.step_h)
+    whole, hours, day_rows = climate(weather), len(weather.times), weather.per_day
     zones = [_unlimited(room.zone) for room in rooms]
     row_s = 3600.0 * weather.step_h
     options = {"step_s": min(step_s, row_s), "row_s": row_s, "air_links": air_links}
+    options["options"] = BalanceOptions(terrain=terrain)
     cold = float(np.percentile(weather.dry_bulb_c, COLD)) if outdoor_c is None else outdoor_c
     first = np.arange(day_rows)
     used = day_rows * _aired_day(zones, hours, day_rows) + first

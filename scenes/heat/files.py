@@ -49,7 +49,7 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
     by = "[[system]] of the study,"
     systems = tuple(read_state(table, table.bsdf, by=by) for table in study.system)
     for one, table in zip(systems, study.system, strict=True):
-        checked_system(one, table.bsdf)
+        checked_system(one, table.bsdf or file)
     return HeatFiles(weather, systems, Given(systems, ask="a [[system]]"))
 
 

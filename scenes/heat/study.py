@@ -148,12 +148,15 @@ def _balanced(
         groups = [(rooms, {"air_links": links, "transfers": transfers})]
     results, moist, design = [], [], []
     for number, (together, air) in enumerate(groups):
-        found = balances(together, weather, step_s, progress=progress, **air)
+        place = {"terrain": study.terrain}
+        found = balances(together, weather, step_s, progress=progress, **air, **place)
         results += found
         moist += room_humidity(together, found, weather, **air)
         if study.design is not None:
             cold = study.design.outdoor_c
-            design.append(design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air))
+            design.append(
+                design_loads(together, weather, outdoor_c=cold, step_s=step_s, **air, **place)
+            )
         progress("heat balance", (number + 1) / len(groups))
     table = pd.concat(design, ignore_index=True) if design else None
     return _Balanced(rooms, results, moist, notes, table)

@@ -156,7 +156,8 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
     study = schedules_there(validated(StudyFile, read_table(path), path), path)
     here = path.parent
     systems = tuple(
-        s.placed(here).model_copy(update={"bsdf": _there(here, s.bsdf, path)}) for s in study.system
+        s.placed(here).model_copy(update={"bsdf": s.bsdf and _there(here, s.bsdf, path)})
+        for s in study.system
     )
     found = {"weather": _there(here, study.weather, path), "system": systems}
     if quick:

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from scenes import plausible
 from scenes.room.schedules import Hours, OrSchedule
 from scenes.toml_file import Positive, Share, TomlTable
-from thermal.ventilation import BLAST, DOE2, Leakage, aim2, sherman_grimsrud
+from thermal.ventilation import BLAST, DOE2, DOOR_DISCHARGE, Leakage, aim2, sherman_grimsrud
 
 NAMED = {"constant": (1.0, 0.0, 0.0, 0.0), "doe-2": DOE2, "blast": BLAST}
 
@@ -69,6 +69,26 @@ class OpenedTable(TomlTable):
         return self
 
 
+class NeighbourAirTable(TomlTable):
+    """Air exchanged with a neighbour of known temperature, as much each way."""
+
+    temperature_c: Annotated[float | str, OrSchedule(plausible.TEMPERATURE)]
+    # of an opening through which warm air leaves above and cool air comes below: an open door
+    width: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    height: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    discharge: Annotated[Positive, Field(le=1)] = DOOR_DISCHARGE
+    open: Annotated[float | str, OrSchedule(plausible.SHARE)] = 1.0  # share of its width
+    m3_h: Annotated[float | str, OrSchedule(plausible.FLOW)] = 0.0  # whatever the temperatures
+
+    @model_validator(mode="after")
+    def _has_a_size_or_a_flow(self) -> NeighbourAirTable:
+        if (self.width is None) != (self.height is None):
+            raise ValueError("width and height belong together")
+        if self.width is None and self.m3_h == 0.0:
+            raise ValueError("give `width` and `height` of an opening, or `m3_h`")
+        return self
+
+
 class AirTable(TomlTable):
     """Outdoor air."""
 
@@ -88,6 +108,7 @@ class AirTable(TomlTable):
     least_supply_c: Annotated[float, plausible.TEMPERATURE] | None = None  # heated to that
     supply_c: Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)] = None
     fan_w_m3_s: Annotated[float, plausible.FAN] = 0.0  # electricity of the fan
+    neighbour: tuple[NeighbourAirTable, ...] = ()  # rooms that are not simulated
     # each way through every open door between coupled rooms [m3/s]; 0: the doors are shut
     door_m3_s: Annotated[float, plausible.DOOR_FLOW] = 0.0
 

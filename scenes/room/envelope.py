@@ -45,7 +45,12 @@ def enveloped(
         [face for face, at in zip(space.faces, room.surface_of_face, strict=True) if at == number]
         for number in range(len(room.zone.surfaces))
     ]
-    surfaces = list(room.zone.surfaces)
+    surfaces = [
+        one if one.outside != "outdoor" or own[0].kind == "window frame" else replace(
+            one, absorptance_out=envelope.outside_absorptance,
+            roughness=envelope.outside_roughness,
+        ) for one, own in zip(room.zone.surfaces, faces, strict=True)
+    ]  # fmt: skip
     try:
         if envelope.frame_u is not None:
             layer = Layer(1.0, 1.0 / (1.0 / envelope.frame_u - FILMS), 0.0, 0.0)

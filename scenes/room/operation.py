@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mitsuba_cfs.errors import DataError
+from scenes.fenestration.pane_system import system_of_panes
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.tables import StateTable
 from scenes.room.operation_tables import OperationTables
@@ -28,8 +29,10 @@ class Operation:
     def files(self) -> tuple[Path, ...]:
         """The BSDF files and the tables of schedules that it names."""
         tables = (one.csv for one in self.tables.schedules.values())
-        named = [self.file.parent / table.bsdf for table in self.tables.system]
-        return (*named, *(path for path in tables if path is not None))
+        states = [table.placed(self.file.parent) for table in self.tables.system]
+        panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
+        named = [None if table.bsdf is None else self.file.parent / table.bsdf for table in states]
+        return tuple(path for path in (*named, *panes, *tables) if path is not None)
 
 
 def read_operation(path: str | PathLike[str]) -> Operation:
@@ -41,12 +44,13 @@ def read_operation(path: str | PathLike[str]) -> Operation:
     tables = schedules_there(validated(OperationTables, read_table(path), path), path)
     systems = []
     for number, one in enumerate(tables.system):
-        place = path.parent / one.bsdf
-        if not place.is_file():
+        place = None if one.bsdf is None else path.parent / one.bsdf
+        if place is not None and not place.is_file():
             raise DataError(f"no such file: {one.bsdf}", file=path, field=f"system.{number}.bsdf")
         system = read_state(one.placed(path.parent), place, by=f"[[system]] of {path.name},")
         if any(system.name == other.name for other in systems):
-            system = replace(system, name=place.stem)
+            name = f"{system.name} ({number + 1})" if place is None else place.stem
+            system = replace(system, name=name)
         systems.append(system)
     return Operation(path, tables, tuple(systems))
 
@@ -63,12 +67,17 @@ def schedules_there(tables: Tables, path: Path) -> Tables:
     return tables.model_copy(update={"schedules": found})
 
 
-def read_state(table: StateTable, path: Path, *, by: str = "") -> FenestrationSystem:
+def read_state(table: StateTable, path: Path | None, *, by: str = "") -> FenestrationSystem:
     """The system of a shading state from its BSDF file, with U, g and closure of its table.
 
-    Args: by: what names the file, for the system's source.
+    Args: path: None: its panes say its optics; by: what names the file, for the system's source.
     """
-    system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
+    if path is None:
+        system = replace(system_of_panes(table.layers), source=f"{by} layers".strip())
+    else:
+        system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
+    if table.layers:  # they say U and g too: those of the file beside are of another model
+        system = replace(system, u_value=table.u_value, g_value=table.g_value, g_by_patch=None)
     by_patch = table.g_by_patch()
     return replace(
         system,

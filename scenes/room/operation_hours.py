@@ -22,9 +22,11 @@ from thermal.emitters import HeatedSlab, IdealLoads
 from thermal.errors import ThermalInputError
 from thermal.ventilation import (
     Leakage,
+    NeighbourAir,
     SupplyAir,
     WindowAiring,
     cross_flow,
+    large_opening,
     single_sided,
     stack_height,
 )
@@ -103,7 +105,7 @@ class OperationHours:
         return self._while_occupied("gains", "lighting_w_m2") * floor_area
 
     def outdoor_air(self) -> dict[str, Any]:
-        """Outdoor air but that of opened windows, by the names of a zone's fields."""
+        """Air from outdoors but through windows, and neighbours', by a zone's fields."""
         night, air = self._of("air", "night_ach"), self.tables.air
         if not isinstance(night, np.ndarray):
             night = night * working_hours(self.weather, *air.night)
@@ -120,7 +122,19 @@ class OperationHours:
             "leakage": replace(leaks, factors=air.infiltration_factors),
             "other_air_ach": night,
             "supply": fan,
+            "beside": tuple(map(self._beside, range(len(air.neighbour)))),
         }
+
+    def _beside(self, number: int) -> NeighbourAir:
+        """The air exchanged with one of the neighbours."""
+        table, place = self.tables.air.neighbour[number], f"air.neighbour.{number}"
+        beyond, share, flow = (
+            self.value(table, key, place) for key in ("temperature_c", "open", "m3_h")
+        )
+        buoyant = 0.0
+        if table.width is not None:
+            buoyant = large_opening(table.width, table.height, discharge=table.discharge)
+        return NeighbourAir(beyond, flow / 3600.0, buoyant, share)
 
     def airing(self, windows: Sequence[WindowElement]) -> WindowAiring | None:
         """How the windows of a room are opened; None where they are not."""

@@ -124,6 +124,9 @@ class OperationTables(TomlTable):
     envelope: EnvelopeTable = EnvelopeTable()
     comfort: ComfortTable = ComfortTable()
     plant: PlantTable = PlantTable()
+    terrain: Literal["country", "suburbs", "city"] = (
+        "suburbs"  # what the weather station's wind becomes
+    )
     rooms: tuple[RoomsTable, ...] = ()  # the first that names a room holds for it
     schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
     calendar: CalendarTable = CalendarTable()

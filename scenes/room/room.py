@@ -56,7 +56,7 @@ from scenes.room.humidity import felt_by, room_humidity
 from scenes.room.inner_glass import borrowed_share, inner_glass
 from scenes.room.operation import Operation
 from scenes.room.operation_hours import OperationHours
-from scenes.room.operation_tables import ComfortTable, OperationTables
+from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.solar import RoomSun
@@ -383,13 +383,15 @@ class RoomSimulation:
     def thermal(self) -> tuple[ThermalResult, ZoneResult]:
         """Temperatures and comfort, and the balance they come from."""
         step_s = self.options.heat_step_s
-        (balance,) = balances([self.zone], self.weather, step_s, progress=self.progress)
+        tables = self.operation or OperationTables()
+        (balance,) = balances(
+            [self.zone], self.weather, step_s, terrain=tables.terrain, progress=self.progress
+        )
         self.progress("heat", 1.0)
         table = fenestration_table(self.windows, self.thermals)
         (humidity,) = room_humidity([self.zone], [balance], self.weather)
-        person = ComfortTable() if self.operation is None else self.operation.comfort
         return thermal_result(
-            self.zone, balance, self.weather, felt_by(person, balance, humidity), table
+            self.zone, balance, self.weather, felt_by(tables.comfort, balance, humidity), table
         ), balance
 
     def operation_result(self, balance: ZoneResult) -> OperationResult:

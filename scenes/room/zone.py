@@ -18,7 +18,7 @@ from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import Occupancy
-from thermal.balance import ZoneResult, simulate_zones
+from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.errors import ThermalInputError
 from thermal.gains import dimmed_share, split_gains
@@ -74,6 +74,7 @@ def balances(
     *,
     air_links: FloatArray | None = None,
     transfers: Sequence[AirTransfer] = (),
+    terrain: str = "suburbs",
     progress: Progress = silent,
 ) -> list[ZoneResult]:
     """The years of rooms that exchange heat through their partitions and doors."""
@@ -83,7 +84,7 @@ def balances(
     row_s = 3600.0 * weather.step_h
     found = simulate_zones(
         zones, climate(weather), suns, step_s=min(step_s, row_s), row_s=row_s,
-        air_links=air_links, transfers=transfers,
+        air_links=air_links, transfers=transfers, options=BalanceOptions(terrain=terrain),
     )  # fmt: skip
     return list(found)
 

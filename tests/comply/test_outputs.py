@@ -30,11 +30,13 @@ from scenes.result_folder import ResultFolder
 from scenes.run.building import read_building
 from scenes.run.inputs import read_weather
 
-RULE = """
+HEAD = """
 title = "View and sun"
 edition = "2026 <draft>"
 source = ["mine"]
 grid = {height = 0.8, margin = 0.5}
+"""
+VIEW = """
 [[criterion]]
 key = "view"
 title = "View & distance"
@@ -42,6 +44,8 @@ clause = "clause 7.1"
 [[criterion.level]]
 name = "met"
 needs = [{what = "view", angle_deg = 14, distance = 6, layers = 1, at_least = 0.75}]
+"""
+SUN = """
 [[criterion]]
 key = "sun"
 title = "Sun"
@@ -51,6 +55,8 @@ occupied = true
 name = "met"
 needs = [{what = "sun_hours", at_least = 1.5}]
 """
+RULE = HEAD + VIEW + SUN
+STRICT = HEAD + SUN.replace("1.5", "6.0")
 
 
 @pytest.fixture(scope="module")
@@ -178,21 +184,6 @@ def test_topics_are_of_rooms_that_miss_something(result, tmp_path):
     title, text = found["Meeting room-guid"]
     assert title == "Meeting room: 2 criteria not met"
     assert "clause 7.2" in text and "0.00 h, ≥ 1.5 h for met" in text
-
-
-STRICT = """
-title = "Strict"
-edition = "1"
-source = ["made"]
-grid = {height = 0.8, margin = 0.5}
-[[criterion]]
-key = "sun"
-title = "Sun"
-clause = "1.1"
-[[criterion.level]]
-name = "met"
-needs = [{what = "sun_hours", at_least = 6.0}]
-"""
 
 
 def found_again(bcf: Path, file: Path) -> dict[str, tuple[str, np.ndarray]]:

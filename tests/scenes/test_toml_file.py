@@ -34,7 +34,7 @@ GOOD = {"weather": "a.epw", "building": "a.ifc", "system": [{"bsdf": "a.xml"}]}
         ),
         ({"loads": {"xyz": 1}}, "s.toml: loads.xyz: no such key; there are heating_c, cooling_c"),
         ({"couple": 7}, "s.toml: couple: expected true or false, got 7"),
-        ({"system": [{}]}, "s.toml: system.0.bsdf: is missing"),
+        ({"system": [{}]}, "s.toml: system.0: bsdf: is missing"),
         ({"air": {"night": [6, 6]}}, "s.toml: air.night: expected two different hours"),
         ({"air": {"night": [24, 6]}}, "s.toml: air.night: expected two different hours"),
     ],

@@ -18,10 +18,12 @@ from thermal.ventilation import (
     DOE2,
     AirTransfer,
     Leakage,
+    NeighbourAir,
     SupplyAir,
     WindowAiring,
     aim2,
     cross_flow,
+    large_opening,
     sherman_grimsrud,
     single_sided,
     stack_height,
@@ -87,6 +89,36 @@ def test_supply_air_by_its_temperature(fan, expected):
     np.testing.assert_allclose(result.fan_air, 2.0 * VOLUME / 3600.0)
     heated = 7.0 if fan.least_c > 0 else 0.0
     np.testing.assert_allclose(result.coil, HEAT * 2.0 * VOLUME / 3600 * heated, rtol=1e-9)
+
+
+def test_open_door_carries_what_brown_and_solvason_say():
+    """q = C/3 W sqrt(g H^3 dT/T) each way, of air at the mean temperature: both signs of dT."""
+    door = large_opening(0.9, 2.0)
+    assert door == pytest.approx(0.65 / 3 * 0.9 * np.sqrt(9.81 * 8.0))
+    for beyond in (17.0, 24.0):
+        mean = 0.5 * (20.0 + beyond) + 273.15
+        heat = 101325.0 / (287.055 * mean) * AIR_HEAT
+        q = 0.65 / 3 * 0.9 * np.sqrt(9.81 * 8.0 * abs(20.0 - beyond) / mean)
+        zone = sealed(loads=KEPT, beside=(NeighbourAir(beyond, buoyant=door),))
+        assert load(zone) == pytest.approx(heat * q * (20.0 - beyond), rel=1e-9)
+        given = NeighbourAir(beyond, flow=0.05, buoyant=door, share=0.5)
+        zone = sealed(loads=KEPT, beside=(given, NeighbourAir(20.0, flow=1.0)))
+        assert load(zone) == pytest.approx(heat * (0.05 + q / 2) * (20 - beyond), rel=1e-9)
+
+
+@pytest.mark.parametrize("power", [20.0, 2000.0])
+def test_room_that_floats_beside_an_open_door_finds_its_excess(power):
+    """P = rho c C/3 W sqrt(g H^3 / T) dT^1.5, though the flow hangs on what it makes."""
+    door = large_opening(0.9, 2.0)
+    beside = (NeighbourAir(np.full(24, 18.0), buoyant=door),)
+    zone = sealed(gains=Gains(convective=power), beside=beside)
+    result = simulate(zone, climate(24, outdoor=OUT), no_sun(24, 2, 0), options=OPTIONS)
+    excess = result.air_c[-1] - 18.0
+    mean = 18.0 + excess / 2 + 273.15
+    heat = 101325.0 / (287.055 * mean) * AIR_HEAT
+    assert heat * door * np.sqrt(excess / mean) * excess == pytest.approx(power, rel=1e-6)
+    assert np.abs(result.residual).max() < 1e-6
+    np.testing.assert_allclose(result.heat_flow["air exchange"], -power, rtol=1e-6)
 
 
 def test_windows_flow_as_en_16798_7_says():

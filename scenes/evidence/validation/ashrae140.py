@@ -73,7 +73,7 @@ def compare(reference: Path, only: Sequence[str] = ()) -> pd.DataFrame:
         if only and name not in only:
             continue
         result, light = run_case(case, climate, steps)
-        rows += [_row(name, k, v, ranges) for k, v in figures(name, result).items()]
+        rows += judged_figures(name, figures(name, result), ranges)
         rows += _transmitted_rows(name, case, light, ranges)
     if not only or "960" in only:
         back, sunspace = ashrae140_sunspace.run(climate, steps, OPTIONS, 3600.0 / STEPS)
@@ -81,6 +81,12 @@ def compare(reference: Path, only: Sequence[str] = ()) -> pd.DataFrame:
         floating = figures("960FF", sunspace)
         rows += [_row("960 Sunspace", k, v, ranges) for k, v in floating.items()]
     return pd.DataFrame([row for row in rows if row])
+
+
+def judged_figures(name: str, found: dict[str, float], ranges: dict) -> list[dict[str, object]]:
+    """A row for each output of a case that the standard's tables have."""
+    rows = (_row(name, output, value, ranges) for output, value in found.items())
+    return [row for row in rows if row]
 
 
 def _row(name: str, output: str, value: float, ranges: dict) -> dict[str, object]:

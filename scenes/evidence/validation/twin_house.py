@@ -64,6 +64,7 @@ def write_inputs(data: pd.DataFrame, folder: Path) -> Path:
             "L": data["L"].to_numpy(),
             "cellar": data["cellar"].to_numpy(),
             "attic": data["attic"].to_numpy(),
+            "corridor": data["corridor"].to_numpy(),
             "east": (0.5 * (data["child"] + data["corridor"])).to_numpy(),
             "north": (0.58 * data["kitchen"] + 0.42 * data["doorway"]).to_numpy(),
             "heater_w_m2": (data["heater"].clip(lower=0) / FLOOR).to_numpy(),

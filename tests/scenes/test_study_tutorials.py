@@ -1,0 +1,124 @@
+"""The study files of docs/tutorials read; and (slow) what they say beside other programs."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mitsuba_cfs.errors import DataError
+from scenes.cli import run as main
+from scenes.evidence.validation import ashrae140_studies, energyplus_study
+from scenes.evidence.validation.ashrae140 import RANGES
+from scenes.evidence.validation.ashrae140_sun import ANGLES, glass
+from scenes.fenestration.layer_tables import GlazingLayerTable
+from scenes.fenestration.pane_system import system_of_panes
+from scenes.fenestration.thermal_system import thermal_system
+from scenes.heat.study_file import StudyFile, read_study
+from scenes.room.operation import read_state
+
+REPOSITORY = Path(__file__).parents[2]
+TUTORIALS = REPOSITORY / "docs" / "tutorials"
+WHOLE = ("energyplus_room", "office_heated_slab", "office_schedules")  # all their files are here
+CLEAR = {"thickness": 0.003048, "solar": (0.834, 0.075, 0.075)}
+PANES = (CLEAR | {"gap": {"width": 0.012}}, CLEAR)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_tutorial_reads(name: str) -> None:
+    study = read_study(TUTORIALS / f"{name}.toml")
+    assert study.weather.is_file()
+
+
+@pytest.mark.parametrize(
+    "file", sorted(ashrae140_studies.STUDIES.glob("*.toml")), ids=lambda f: f.stem
+)
+def test_case_of_the_standard_reads(file: Path, tmp_path: Path) -> None:
+    (tmp_path / ashrae140_studies.WEATHER).write_text("")
+    study = read_study(Path(shutil.copy(file, tmp_path)))
+    floating = file.stem.endswith("FF")
+    assert (study.loads.heating_c is None) == floating and study.terrain == "country"
+    assert study.system[0].bsdf is None
+
+
+def test_panes_alone_are_a_system() -> None:
+    """At the normal by the formula of two panes; oblique near that without polarisation."""
+    layers = [GlazingLayerTable.model_validate(pane) for pane in PANES]
+    found = system_of_panes(layers)
+    tau, rho = 0.834, 0.075
+    direct = found.solar.direct_hemispherical(found.solar.transmission_front)
+    assert direct[0] == pytest.approx(tau**2 / (1 - rho**2), abs=2e-4)
+    theirs = np.interp(np.radians(50), ANGLES, glass("double").tau)
+    assert found.angular.transmitted(np.radians(50)) == pytest.approx(theirs, abs=0.015)
+    assert any("no visible values" in note for note in found.notes)
+    seen = system_of_panes([
+        GlazingLayerTable.model_validate(pane | {"visible": (0.9, 0.08, 0.08)}) for pane in PANES
+    ])  # fmt: skip
+    assert not seen.notes
+    visible = seen.visible.direct_hemispherical(seen.visible.transmission_front)
+    assert visible[0] == pytest.approx(0.9**2 / (1 - 0.08**2), abs=2e-4)
+
+
+def test_layers_of_a_study_go_before_u_and_g_of_the_file_beside() -> None:
+    study = read_study(TUTORIALS / "energyplus_room.toml")
+    (table,) = study.system
+    heat = thermal_system(read_state(table, table.bsdf))
+    assert heat.fenestration.u_value == pytest.approx(0.985, abs=0.002)  # beside: 0.884
+    assert heat.g_value[0] == pytest.approx(0.201, abs=0.001)  # beside: 0.2093
+
+
+@pytest.mark.parametrize(
+    ("system", "said"),
+    [
+        ({}, "bsdf"),
+        ({"layers": [{"openness": 0.03}]}, "layers.0"),
+        ({"layers": [{"thickness": 0.004}]}, "layers.0.solar"),
+    ],
+)
+def test_what_a_system_lacks_is_named(system: dict, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        StudyFile.model_validate({"weather": "x.epw", "building": "x.ifc", "system": [system]})
+
+
+def test_terrain_and_outside_faces_are_checked(tmp_path: Path) -> None:
+    text = (TUTORIALS / "energyplus_room.toml").read_text()
+    path = tmp_path / "study.toml"
+    for old, new, field in (
+        ('"suburbs"', '"forest"', "terrain"),
+        ("outside_absorptance = 0.5", "outside_absorptance = 50", "outside_absorptance"),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(DataError, match=field):
+            read_study(path)
+
+
+@pytest.mark.slow
+def test_blind_by_its_layers_meets_the_bars() -> None:
+    """The bars of the external blind: air 0.5 K, window 0.7 K; from the file alone."""
+    found = energyplus_study.differences(energyplus_study.study_hours(), "blind")
+    assert (found["RMSE [K]"] < [0.5, 0.7]).all()
+
+
+@pytest.mark.slow
+def test_cases_of_the_standard_lie_in_the_range_of_its_programs(reference_data, tmp_path) -> None:
+    reference = reference_data / "ashrae140"
+    if not (reference / RANGES).is_file():
+        pytest.skip("ASHRAE 140's figures (../shared/reference/ashrae140) are not here")
+    found = ashrae140_studies.compare(reference, tmp_path)
+    assert len(found) == 14 and found["inside"].all(), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WHOLE)
+def test_tutorial_runs_as_a_user_runs_it(name: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert main(["thermal", str(TUTORIALS / f"{name}.toml"), "--out", str(out)]) == 0
+    record = json.loads((out / "run.json").read_text())
+    hours = pd.read_csv(next(out.rglob("hours.csv")))
+    assert record["notes"] and len(hours) == 8760
+    if name == "office_heated_slab":
+        assert hours["heated_slab_w"].max() > 100 and (out / "design_days.csv").is_file()
