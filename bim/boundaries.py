@@ -13,6 +13,7 @@ from bim.defaults import (
     EMISSIVITY,
     GLASS_REFLECTANCE,
     ROOM_REFLECTANCE,
+    air_layer,
     default_construction,
 )
 from bim.model import Construction, Face, MaterialLayer, Window
@@ -23,7 +24,6 @@ from bim.surroundings import Beyond, Span
 from mitsuba_cfs.gloss import Gloss
 
 SHALLOWEST_GAP = 0.01  # air between two elements from this on is a layer [m]
-GAP_RESISTANCE = 0.18  # of an unventilated air layer of 25 mm and more: EN ISO 6946:2017 [m2 K/W]
 THICKEST_SPAN = 1.0  # a ray that runs longer in one element runs along it, not through [m]
 
 
@@ -158,7 +158,7 @@ def construction_of(
         start = max(span.start, reach) if outwards else span.start
         if outwards and start - reach > SHALLOWEST_GAP:
             gap = start - reach
-            outwards.append(MaterialLayer("air layer", gap, gap / GAP_RESISTANCE, 1.23, 1008.0))
+            outwards.append(air_layer(gap))
         record = records[span.element]
         outwards += _layers(record, span.stop - start, normal)
         names.append(record.name)

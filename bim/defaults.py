@@ -13,6 +13,8 @@ insulation of the first energy standards; each use is reported as a problem of t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from bim.model import Construction, MaterialLayer
 from mitsuba_cfs.gloss import pane
 
@@ -32,6 +34,7 @@ GLASS_REFLECTANCE = 0.15
 CLEAR_GLAZING = pane(transmissivity=0.985, panes=2)  # what that glazing mirrors, 0.15 straight on
 EMISSIVITY = 0.9
 FRAME_FRACTION = 0.3  # of the opening: EN ISO 10077-1:2017, annex (typical window, 30 % frame)
+GAP_RESISTANCE = 0.18  # of an unventilated air layer of 25 mm and more: EN ISO 6946:2017 [m2 K/W]
 LOWEST_REFLECTANCE, HIGHEST_REFLECTANCE = 0.02, 0.9  # black paint; fresh white paint
 
 PLASTER = MaterialLayer("gypsum plaster", 0.015, 0.57, 1300.0, 1000.0)
@@ -52,6 +55,17 @@ CEILING_SLAB = Construction("default ceiling slab", (SCREED, CONCRETE))
 ROOF = Construction("default roof", (INSULATION, CONCRETE, PLASTER))
 DOOR = Construction("default door", (TIMBER,))
 WINDOW_FRAME = Construction("default window frame", (FRAME,))
+
+
+def resistance_layer(name: str, resistance: float, thickness: float = 0.0) -> MaterialLayer:
+    """A layer of which a model states the resistance [m2 K/W] alone, as insulation of it."""
+    thickness = thickness or EPS.conductivity * resistance
+    return replace(EPS, name=name, thickness=thickness, conductivity=thickness / resistance)
+
+
+def air_layer(thickness: float, name: str = "air layer") -> MaterialLayer:
+    """An unventilated air layer of a wall [m]."""
+    return MaterialLayer(name, thickness, thickness / GAP_RESISTANCE, 1.23, 1008.0)
 
 
 def default_construction(kind: str, adjacency: str) -> Construction:

@@ -1,7 +1,7 @@
-"""Booleans and distances of solids, worked out in a process that may die.
+"""Solids, their booleans and distances, worked out in a process that may die.
 
 The library of solids has ended whole processes by a signal on meshes that passed every check.  Here
-such a mesh costs its own room, or the distance of its own pair of walls.
+such a mesh costs its own room, wall or pair, and no more.
 """
 
 from __future__ import annotations
@@ -9,15 +9,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 
+from bim.apertures import shadow
 from bim.model import Problem
+from bim.planes import Plane, plane_through
 from bim.rooms import Attachment, Piece, RoomSolid, room_pieces, room_solid
-from bim.solids import PackedSolid, packed, unpacked
+from bim.solids import PackedSolid, Solid, packed, prism, solid_of, triangles_of, union, unpacked
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.processes import ProcessEnded, each_apart
 
 LIMIT_S = 180.0  # for all rooms of a building, and for all its walls
+FLATTEST = 0.1  # a space that is lower has no outline to extrude [m]
+Body = NDArray[np.float64]  # [N, 3, 3] triangles [m]
+Packed = tuple[PackedSolid, str]  # and what had to be done to get it
+Outline = tuple[shapely.Geometry, Plane, float, float]  # of a prism: see `bim.solids.prism`
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +51,86 @@ def gaps_between(
 ) -> list[list[float] | ProcessEnded]:
     """Distances [m] of each wall to its neighbours, at most `widest`."""
     return each_apart(_gaps, [(one, list(near), widest) for one, near in walls], limit_s=LIMIT_S)
+
+
+def solids_of(bodies: Sequence[Body]) -> list[Solid | ProcessEnded | None]:
+    """`bim.solids.solid_of` of each body."""
+    return [_solid_here(one) for one in each_apart(_solid, list(bodies), limit_s=LIMIT_S)]
+
+
+def spaces_of(bodies: Sequence[Body]) -> list[Solid | ProcessEnded | None]:
+    """The solid of each space as drawn; its outline extruded as a last resort."""
+    return [_solid_here(one) for one in each_apart(_space, list(bodies), limit_s=LIMIT_S)]
+
+
+def shared_volumes(
+    solids: Sequence[tuple[PackedSolid, Sequence[PackedSolid]]],
+) -> list[list[float] | ProcessEnded]:
+    """Volumes [m3] that each solid shares with its neighbours."""
+    return each_apart(_shared, [(one, list(near)) for one, near in solids], limit_s=LIMIT_S)
+
+
+def united(solids: Sequence[PackedSolid], ways: Sequence[Outline]) -> PackedSolid | None:
+    """Solids and the prisms between them as one; None where they stay apart.
+
+    Raises: `RoomError` where their union ends its process.
+    """
+    (found,) = each_apart(_united, [(list(solids), list(ways))], limit_s=LIMIT_S)
+    if isinstance(found, ProcessEnded):
+        raise RoomError(str(found))
+    return found
+
+
+def opened(bodies: Sequence[tuple[Body, Sequence[Outline]]]) -> list[Body | ProcessEnded | None]:
+    """Bodies with prisms cut out; None for what is no closed solid, or nothing any more."""
+    return each_apart(_opened, [(one, list(holes)) for one, holes in bodies], limit_s=LIMIT_S)
+
+
+def _solid_here(found: Packed | ProcessEnded | None) -> Solid | ProcessEnded | None:
+    return Solid(unpacked(found[0]), found[1]) if isinstance(found, tuple) else found
+
+
+def _solid(body: Body) -> Packed | None:
+    solid = solid_of(body)
+    return None if solid is None else (packed(solid.manifold), solid.repair)
+
+
+def _space(body: Body) -> Packed | None:
+    solid = _solid(body)
+    low, high = float(body[..., 2].min()), float(body[..., 2].max())
+    if solid is not None or high - low < FLATTEST:
+        return solid
+    plane = plane_through(np.array([*body[0, 0, :2], low]), np.array([0.0, 0.0, 1.0]))
+    outline = prism(shadow(body, plane), plane, 0.0, high - low)
+    done = "replaced by its outline extruded over its height"
+    return None if outline is None else (packed(outline), done)
+
+
+def _shared(item: tuple[PackedSolid, list[PackedSolid]]) -> list[float]:
+    one, near = item
+    body = unpacked(one)
+    return [float((body ^ unpacked(other)).volume()) for other in near]
+
+
+def _united(item: tuple[list[PackedSolid], list[Outline]]) -> PackedSolid | None:
+    solids, ways = item
+    prisms = [prism(*way) for way in ways]
+    body = union([*map(unpacked, solids), *(way for way in prisms if way is not None)])
+    return packed(body.as_original()) if len(body.decompose()) == 1 else None
+
+
+def _opened(item: tuple[Body, list[Outline]]) -> Body | None:
+    body, holes = item
+    solid = solid_of(body)
+    if solid is None:
+        return None
+    rest = solid.manifold
+    for hole in holes:
+        cutter = prism(*hole)
+        if cutter is not None:
+            rest = rest - cutter
+    triangles, _ = triangles_of(rest)
+    return triangles if len(triangles) else None
 
 
 def _boundary(

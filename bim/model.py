@@ -237,6 +237,7 @@ class Building:
     file: Path | None = None  # that it was read from
     account: Account | None = None  # what of the file came through; None where there is no file
     georeference: Georeference | None = None  # where it lies on a map, as its file states it
+    from_model: NDArray[np.float64] | None = None  # [4, 4] of its file's own axes [m] to these
 
     @property
     def windows(self) -> tuple[Window, ...]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
+from itertools import count
 from typing import Protocol, TypeVar
 
 SHOWN = 8  # names that a message lists
@@ -110,10 +112,14 @@ def folder_names(items: Sequence[Named]) -> list[str]:
 
 
 def numbered(names: Iterable[str]) -> list[str]:
-    """Names with a number behind those that come again."""
-    seen: dict[str, int] = {}
-    result = []
+    """Names with a number behind those that come again, so that no two are the same."""
+    names = list(names)
+    given = set(names)
+    numbers: dict[str, Iterator[int]] = defaultdict(lambda: count(2))
+    result: dict[str, None] = {}
     for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        result.append(name if seen[name] == 1 else f"{name} {seen[name]}")
-    return result
+        found = name
+        while found in result or (found != name and found in given):
+            found = f"{name} {next(numbers[name])}"
+        result[found] = None
+    return list(result)

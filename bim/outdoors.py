@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
+from bim.guarded import Outline, opened
 from bim.model import Element, Problem, Space, Window
 from bim.planes import area_vectors, merged_polygons, plane_through
 from bim.rays import hemisphere, ray_mesh
-from bim.solids import prism, solid_of, triangles_of
+from mitsuba_cfs.processes import ProcessEnded
 
 COVERED = 0.9  # share of rays stopped at once that makes a window blind
 AT_ONCE = 0.35  # what stops rays this near before the glass lies on the window [m]
@@ -21,6 +22,7 @@ SITE_CLASSES = ("IfcSite", "IfcGeographicElement")
 RAYS = 36
 FACE = 0.99  # cosine to the biggest part of a pane from which another is of its faces
 BEFORE_GLASS = 0.5  # what is nearer to a window's plane is of its own facade [m]
+NOTHING = np.empty((0, 3, 3))
 GRAZING = 0.3  # cosine: flatter rays meet the reveals of every window
 
 
@@ -47,15 +49,20 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
                     covers.setdefault(index, []).append(window)
         if not covers:
             break
+        bodies = _opened([(elements[index], covers[index]) for index in covers])
+        cut = dict(zip(covers, bodies, strict=True))
         for index in sorted(covers, reverse=True):
-            element, windows = elements[index], covers[index]
-            opened = _opened(element, windows)
-            done = "cut open there" if opened is not None else "left out"
+            element, body = elements[index], cut[index]
             what = (
-                f"{element.ifc_class} {element.name}: covers the glass of {len(windows)} window(s)"
+                f"{element.ifc_class} {element.name}: covers the glass of "
+                f"{len(covers[index])} window(s)"
             )
+            if isinstance(body, np.ndarray):
+                elements[index], done = replace(element, triangles=body), "cut open there"
+            else:
+                del elements[index]
+                done = "left out" if body is None else f"left out: {body}"
             problems.append(Problem(element.guid, what, done))
-            elements[index : index + 1] = [] if opened is None else [opened]
     return Outdoors(tuple(elements), tuple(problems))
 
 
@@ -131,21 +138,25 @@ def _covering(window: Window, own: set[str], elements, mesh, owner) -> set[int]:
     return {int(i) for i, n in zip(index, counts, strict=True) if n > 0.2 * len(cover)}
 
 
-def _opened(element: Element, windows: Sequence[Window]) -> Element | None:
-    """The element with a hole before each window; None for thin or open ones: they are left out."""
+def _opened(
+    covering: Sequence[tuple[Element, Sequence[Window]]],
+) -> list[NDArray[np.float64] | ProcessEnded | None]:
+    """Each body with a hole before its windows; None for thin or open ones, which are left out."""
     walls = ("IfcWall", "IfcRoof", "IfcSlab", "IfcCovering", *SITE_CLASSES)
-    solid = solid_of(element.triangles)
-    if solid is None or not element.ifc_class.startswith(walls):
-        return None
-    body = solid.manifold
+    return opened([
+        (element.triangles if element.ifc_class.startswith(walls) else NOTHING, _holes(windows))
+        for element, windows in covering
+    ])  # fmt: skip
+
+
+def _holes(windows: Sequence[Window]) -> list[Outline]:
+    """What is cut out before windows."""
+    found = []
     for window in windows:
         plane = plane_through(window.triangles[0, 0], window.normal)
-        for polygon in merged_polygons(plane.to_plane(window.triangles)[..., :2]):
-            hole = prism(polygon, plane, -CUT_DEPTH, CUT_DEPTH)
-            if hole is not None:
-                body = body - hole
-    triangles, _ = triangles_of(body)
-    return replace(element, triangles=triangles) if len(triangles) else None
+        panes = merged_polygons(plane.to_plane(window.triangles)[..., :2])
+        found += [(pane, plane, -CUT_DEPTH, CUT_DEPTH) for pane in panes]
+    return found
 
 
 def lifted_sites(

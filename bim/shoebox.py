@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -86,34 +86,17 @@ def shoebox(
         facets += _side_facets(side, plane, size, holes, recess)
     meshes = conforming_triangles([part.facet for part in facets])
 
+    stated = _Stated(reflectance, reflectance_solar, adjacency, constructions, gloss, emissivity)
+    glazed = {w.side for w in windows}
     faces: list[Face] = []
     apertures: dict[int, Window] = {}
     for part, triangles in zip(facets, meshes, strict=True):
-        side, kind = part.side, part.kind
-        if kind == "glass":
+        if part.kind == "glass":
             apertures[part.window] = _window(name, part, triangles, windows[part.window])
             continue
-        glazed = any(w.side == side for w in windows)
-        exposed = glazed and kind != "reveal"  # reveals lie inside the wall
-        beyond = _pick(adjacency, side, kind, "outside" if exposed else "adiabatic")
-        construction = _pick(constructions, side, kind, default_construction(kind, beyond))
-        visible = _pick(reflectance, side, kind, ROOM_REFLECTANCE[kind])
-        solar = _pick(reflectance_solar, side, kind, visible)
-        label = side if part.window < 0 else f"{side} {kind} {len(faces)}"
-        faces.append(
-            Face(
-                label,
-                kind,
-                triangles,
-                beyond,
-                construction,
-                visible,
-                solar,
-                emissivity,
-                element=f"{name}-{side}",
-                gloss=_pick(gloss, side, kind, None),
-            )
-        )
+        label = part.side if part.window < 0 else f"{part.side} {part.kind} {len(faces)}"
+        face = stated.face(label, part, triangles, glazed=part.side in glazed)
+        faces.append(replace(face, element=f"{name}-{part.side}"))
     volume = width * depth * height
     recesses = sum(w.width * w.height for w in windows) * recess
     space = Space(
@@ -127,6 +110,34 @@ def shoebox(
         volume,
     )
     return Building(name, (space,), tuple(elements), (), latitude_deg, longitude_deg)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stated:
+    """What is said of a box's parts, by side or kind."""
+
+    reflectance: Mapping[str, float] | None
+    reflectance_solar: Mapping[str, float] | None
+    adjacency: Mapping[str, str] | None
+    constructions: Mapping[str, Construction] | None
+    gloss: Mapping[str, Gloss] | None
+    emissivity: float
+
+    def face(
+        self, label: str, part: SideFacet, triangles: NDArray[np.float64], *, glazed: bool
+    ) -> Face:
+        """A part as the face of a room; glazed: whether its side has windows."""
+        side, kind = part.side, part.kind
+        exposed = glazed and kind != "reveal"  # reveals lie inside the wall
+        beyond = _pick(self.adjacency, side, kind, "outside" if exposed else "adiabatic")
+        construction = _pick(self.constructions, side, kind, default_construction(kind, beyond))
+        visible = _pick(self.reflectance, side, kind, ROOM_REFLECTANCE[kind])
+        solar = _pick(self.reflectance_solar, side, kind, visible)
+        gloss = _pick(self.gloss, side, kind, None)
+        return Face(
+            label, kind, triangles, beyond, construction, visible, solar, self.emissivity,
+            gloss=gloss,
+        )  # fmt: skip
 
 
 def _window(

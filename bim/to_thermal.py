@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Construction, Face, Space, centroid
+from bim.names import numbered
 from thermal.blackbox import Fenestration
 from thermal.emitters import IdealLoads
 from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone
@@ -99,7 +100,7 @@ def coupled_rooms(
     Returns: the rooms, their zones under names that differ, and a sentence for every surface
         whose other face was not found.
     """
-    names = _unique([room.zone.name for room in rooms])
+    names = numbered([room.zone.name for room in rooms])
     index = {space.guid: number for number, space in enumerate(spaces)}
     surfaces = [list(room.zone.surfaces) for room in rooms]
     notes = []
@@ -231,7 +232,7 @@ def _outdoor_point(face: Face) -> NDArray[np.float64]:
 def _windows(
     space: Space, fenestration: Fenestration | None, ground_level: float
 ) -> list[WindowElement]:
-    labels = _unique([window.name or window.guid for window in space.windows])
+    labels = numbered([window.name or window.guid for window in space.windows])
     windows = []
     for window, label in zip(space.windows, labels, strict=True):
         corners = window.triangles.reshape(-1, 3)
@@ -248,13 +249,3 @@ def _windows(
             )
         )
     return windows
-
-
-def _unique(labels: Sequence[str]) -> list[str]:
-    """Labels with a number behind those that come again."""
-    seen: dict[str, int] = {}
-    found = []
-    for label in labels:
-        seen[label] = seen.get(label, 0) + 1
-        found.append(label if seen[label] == 1 else f"{label} ({seen[label]})")
-    return found

@@ -57,10 +57,6 @@ class Surfaces:
         """Numbers of the surfaces that have a gloss."""
         return [i for i, gloss in enumerate(self.gloss) if gloss and max(gloss.specular) > 0]
 
-    def without_diffuse(self) -> Surfaces:
-        """The same surfaces, of which only the gloss reflects."""
-        return replace(self, reflectance=np.zeros_like(self.reflectance))
-
     def some(self, chosen: NDArray[np.bool_]) -> Surfaces:
         """Some of the triangles; the surfaces keep their numbers."""
         return replace(

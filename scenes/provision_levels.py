@@ -11,7 +11,6 @@ from mitsuba_cfs.metrics.en17037 import MINIMUM_AREA, TARGET_AREA, DaylightProvi
 from scenes.toml_file import read_table
 
 RULE = Path(str(files(__package__) / "comply" / "rules" / "en17037.toml"))
-NONE = "none"  # not even the lowest level
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,14 +57,6 @@ def operative_temperature(
     return (mrt + weight * air) / (1.0 + weight)
 
 
-def operative_from_films(
-    air_c: ArrayLike, mrt_c: ArrayLike, convective: ArrayLike, radiative: ArrayLike = 4.7
-) -> NDArray[np.float64]:
-    """Operative temperature (h_r T_r + h_c T_a)/(h_r + h_c); films in W/(m2 K)."""
-    h_c, h_r = np.asarray(convective, dtype=float), np.asarray(radiative, dtype=float)
-    return (h_r * np.asarray(mrt_c) + h_c * np.asarray(air_c)) / (h_r + h_c)
-
-
 def running_mean(
     outdoor_c: ArrayLike, *, alpha: float = 0.7, days: int = 7, per_day: int = 24
 ) -> NDArray[np.float64]:
@@ -83,11 +75,6 @@ def running_mean_en16798(outdoor_c: ArrayLike, *, per_day: int = 24) -> NDArray[
     """Running mean [H] [degC] of seven days with the weights of EN 16798-1, eq. (B.2)."""
     weights = np.array([1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2])
     return _days_before(_daily_means(outdoor_c, per_day), weights / 3.8, per_day)
-
-
-def prevailing_mean(outdoor_c: ArrayLike, *, days: int = 30) -> NDArray[np.float64]:
-    """Plain mean [H] [degC] of the days before (ASHRAE 55 allows 7 to 30; EnergyPlus uses 30)."""
-    return _days_before(_daily_means(outdoor_c, 24), np.full(days, 1.0 / days), 24)
 
 
 def _daily_means(outdoor_c: ArrayLike, per_day: int) -> NDArray[np.float64]:
@@ -109,6 +96,7 @@ class AdaptiveComfort:
     """Hours against one adaptive band."""
 
     band: str
+    outdoor_mean_c: NDArray[np.float64]  # [H] that the limits follow
     low_c: NDArray[np.float64]  # [H] operative temperature limits
     high_c: NDArray[np.float64]  # [H]
     applicable: NDArray[np.bool_]  # [H] the outdoor mean lies in the standard's range
@@ -132,7 +120,24 @@ def adaptive_comfort(
     low, high = comfort - below, comfort + above
     applicable = (mean >= lowest) & (mean <= highest)
     excess = np.maximum(operative - high, 0.0) + np.minimum(operative - low, 0.0)
-    return AdaptiveComfort(band, low, high, applicable, applicable & (excess == 0.0), excess)
+    within = applicable & (excess == 0.0)
+    return AdaptiveComfort(band, mean, low, high, applicable, within, excess)
+
+
+def comfort_by_outdoors(
+    operative_c: ArrayLike, outdoor_c: ArrayLike, band: str, *, per_day: int
+) -> AdaptiveComfort:
+    """Operative temperatures [H] against a band that follows the weather as its standard says.
+
+    Args: outdoor_c: [H] of whole days with so many values each.
+    """
+    mean = running_mean_en16798 if band.startswith("EN 16798-1") else running_mean
+    return adaptive_comfort(operative_c, mean(outdoor_c, per_day=per_day), band)
+
+
+def degree_hours(operative_c: ArrayLike, above_c: float, *, step_h: float) -> float:
+    """Kelvin above a limit times hours, of operative temperatures [H]."""
+    return float(np.maximum(np.asarray(operative_c) - above_c, 0.0).sum() * step_h)
 
 
 @dataclass(frozen=True, slots=True)

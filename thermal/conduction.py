@@ -60,19 +60,6 @@ def wall_grid(layers: Sequence[Layer], *, cell: float = CELL) -> WallGrid:
     return WallGrid(np.array(conductance), np.array(capacity), np.array(width))
 
 
-def half_of_symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
-    """The inner half of a symmetric partition, to be used as "adiabatic" at its mid-plane."""
-    total = sum(layer.thickness for layer in layers) / 2
-    kept: list[Layer] = []
-    for layer in reversed(layers):
-        if total <= 1e-12:
-            break
-        part = min(layer.thickness, total)
-        kept.append(Layer(part, layer.conductivity, layer.density, layer.heat_capacity))
-        total -= part
-    return tuple(reversed(kept))
-
-
 def u_value(layers: Sequence[Layer], *, r_outer: float = 0.04, r_inner: float = 0.13) -> float:
     """Steady U-value [W/(m2 K)] between two films [m2 K/W] (ISO 6946)."""
     return 1.0 / (r_outer + sum(layer.resistance for layer in layers) + r_inner)

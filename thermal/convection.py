@@ -12,9 +12,6 @@ from thermal.records import INLINED
 
 MINIMUM = 0.1  # EnergyPlus' lower limit of an inside film
 
-# Walton 1983 "simple" inside films: vertical, and horizontal enhanced and reduced
-CONSTANT_INSIDE = (3.076, 4.040, 0.948)
-
 # DOE-2 / MoWiTT: (a, b) of h = a V^b, windward and leeward
 DOE2_WINDWARD, DOE2_LEEWARD = (3.26, 0.89), (3.55, 0.617)
 

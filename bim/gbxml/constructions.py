@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from functools import cached_property
 
+from bim.defaults import EPS, resistance_layer
 from bim.gbxml.document import Document
 from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues, SurfaceFinish
-
-NO_MASS_CONDUCTIVITY = (
-    0.04  # of a layer that states its resistance alone: an insulation's [W/(m K)]
-)
-NO_MASS = (20.0, 1450.0)  # its density, heat capacity: bim.defaults.EPS
 
 
 class Constructions:
@@ -71,6 +68,7 @@ class Constructions:
         return found
 
     def _layer(self, material: ElementTree.Element) -> MaterialLayer:
+        name = _name(material)
         fields = ("Thickness", "Conductivity", "Density", "SpecificHeat")
         thickness, conductivity, density, capacity = (
             self.document.quantity(material, field) for field in fields
@@ -80,11 +78,11 @@ class Constructions:
             if not resistance:
                 message = "expected Thickness and Conductivity, or R-value"
                 raise self.document.fault(message, material)
-            thickness = thickness or NO_MASS_CONDUCTIVITY * resistance
-            conductivity = thickness / resistance
-        default = NO_MASS
-        return MaterialLayer(
-            _name(material), thickness, conductivity, density or default[0], capacity or default[1]
+            layer = resistance_layer(name, resistance, thickness)
+        else:
+            layer = replace(EPS, name=name, thickness=thickness, conductivity=conductivity)
+        return replace(
+            layer, density=density or layer.density, heat_capacity=capacity or layer.heat_capacity
         )
 
     def window(self, opening: ElementTree.Element) -> GlazingValues:

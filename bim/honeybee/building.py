@@ -115,7 +115,7 @@ class _Reader:
         openings += [self._opening(one, face, room) for one in face.doors or ()]
         part = PARTS.get(face.face_type, "")
         field = _set_field(condition, energy=True)
-        name = self.energy.name(face.properties.energy, room.properties.energy, part, field)
+        name = self.energy.objects.name(face.properties.energy, room.properties.energy, part, field)
         if face.face_type == "AirBoundary":
             name = None
         kind = KINDS.get(face.face_type, "")
@@ -146,7 +146,8 @@ class _Reader:
         """What modifiers say of light and the construction of heat."""
         opaque = None if construction is None else self.energy.opaque(construction)
         field = _set_field(one.boundary_condition, energy=False)
-        modifier = self.light.name(one.properties.radiance, room.properties.radiance, part, field)
+        own, of_room = one.properties.radiance, room.properties.radiance
+        modifier = self.light.objects.name(own, of_room, part, field)
         material = None if modifier is None else self.light.material(modifier)
         if material is None or not material.is_opaque or material.kind == "trans":
             return _by_construction(opaque)
@@ -165,7 +166,7 @@ class _Reader:
         rings = one.geometry.rings(self.scale)
         part, fields = _opening_set(one, face)
         own, of_room = one.properties, room.properties
-        name = self.energy.name(own.energy, of_room.energy, part, f"{fields}_construction")
+        name = self.energy.objects.name(own.energy, of_room.energy, part, f"{fields}_construction")
         if not one.is_glass:
             finish = self._finish(one, room, name, part)
             return DrawnOpening(one.identifier, one.label, rings[0], finish)
@@ -177,7 +178,8 @@ class _Reader:
         if name is not None and self.energy.has_shade(name):
             what = f"{one.label}: shades and states of construction {name} are not read"
             self.problems.append(Problem(one.identifier, what, "its glazing without them"))
-        modifier = self.light.name(own.radiance, of_room.radiance, part, f"{fields}_modifier")
+        field = f"{fields}_modifier"
+        modifier = self.light.objects.name(own.radiance, of_room.radiance, part, field)
         glazing = self._by_modifier(one, values or GlazingValues(name=name or ""), modifier)
         states = self._states(one, modifier, glazing)
         return DrawnOpening(one.identifier, one.label, rings[0], glazing=glazing, states=states)
@@ -222,8 +224,8 @@ class _Reader:
 
     def _orphan(self, face: RoomFace, kind: str) -> Iterator[Element]:
         rings = face.geometry.rings(self.scale)
-        name = self.light.name(face.properties.radiance, {}, PARTS.get(face.face_type, ""),
-                               "exterior_modifier")  # fmt: skip
+        part = PARTS.get(face.face_type, "")
+        name = self.light.objects.name(face.properties.radiance, {}, part, "exterior_modifier")
         yield from self._element(face.identifier, face.label, kind, triangles_of_rings(rings), name)
 
     def _shades(
@@ -244,7 +246,7 @@ class _Reader:
             part, field = "shade_set", "exterior_modifier"
             if shade.is_detached and room is None:
                 part, field = "", "context_modifier"
-            name = self.light.name(shade.properties.radiance, room_light, part, field)
+            name = self.light.objects.name(shade.properties.radiance, room_light, part, field)
             kind = "IfcBuildingElementProxy" if shade.is_detached else "IfcShadingDevice"
             yield from self._element(shade.identifier, shade.label, kind, triangles, name)
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from bim.defaults import air_layer, resistance_layer
 from bim.honeybee.library import NamedObjects
 from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues
@@ -23,11 +24,6 @@ from thermal.errors import ThermalInputError
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit
 from thermal.iso15099 import NFRC, iso15099_g_values, iso15099_u_value
 
-NO_MASS_CONDUCTIVITY = (
-    0.04  # of a layer that states its resistance alone: an insulation's [W/(m K)]
-)
-NO_MASS_DENSITY, NO_MASS_CAPACITY = 20.0, 1450.0  # [kg/m3], [J/(kg K)]: bim.defaults.EPS
-AIR_LAYER = (1.23, 1008.0)  # density, heat capacity of an air layer, as bim.boundaries
 GASES = {"Air": "air", "Argon": "argon", "Krypton": "krypton", "Xenon": "xenon"}
 GAPS = ("EnergyWindowMaterialGas", "EnergyWindowMaterialGasMixture")
 SHADED = ("WindowConstructionShade", "WindowConstructionDynamic")
@@ -52,17 +48,6 @@ class EnergyLibrary:
         self.objects = NamedObjects(energy, ("materials", "constructions"), "construction", file)
         self._opaque: dict[str, OpaqueValues] = {}
         self._windows: dict[str, GlazingValues] = {}
-
-    def name(
-        self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str
-    ) -> str | None:
-        """Name of a surface's construction; None where nothing states one.
-
-        Args: part, field: where a construction set has it, such as "wall_set".
-        """
-        if isinstance(own.get("construction"), str):
-            return own["construction"]
-        return self.objects.name_by_set(room, part, field)
 
     def _construction(self, name: str) -> dict[str, Any]:
         return self.objects.find("constructions", name) or {}
@@ -103,12 +88,10 @@ class EnergyLibrary:
     def _layer(self, material: Mapping[str, Any]) -> MaterialLayer:
         name, kind = str(material["identifier"]), material.get("type")
         if kind == "EnergyMaterialNoMass":
-            thickness = NO_MASS_CONDUCTIVITY * self.objects.number(material, "r_value", least=1e-5)
-            rest = (NO_MASS_CONDUCTIVITY, NO_MASS_DENSITY, NO_MASS_CAPACITY)
-            return MaterialLayer(name, thickness, *rest)
+            return resistance_layer(name, self.objects.number(material, "r_value", least=1e-5))
         if kind == "EnergyWindowMaterialGas":  # an air layer of a wall, such as honeybee's default
             thickness = self.objects.number(material, "thickness", 0.0125, least=1e-4)
-            return MaterialLayer(name, thickness, thickness / 0.18, *AIR_LAYER)
+            return air_layer(thickness, name)
         fields = ("thickness", "conductivity", "density", "specific_heat")
         return MaterialLayer(name, *(self.objects.number(material, f, least=1e-9) for f in fields))
 

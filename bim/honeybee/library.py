@@ -26,15 +26,22 @@ class NamedObjects:
         inner = {kind: self._listed(self._global, kind) for kind in kinds}
         self._objects = {kind: inner[kind] | self._listed(properties, kind) for kind in kinds}
         self._sets = self._listed(properties, f"{sets}_sets")
-        self._sets_field = f"{sets}_set"
+        self._noun = sets
 
     def find(self, kind: str, name: str) -> dict[str, Any] | None:
         """The object of that identifier."""
         return self._objects[kind].get(name)
 
-    def name_by_set(self, room: Mapping[str, Any], part: str, field: str) -> str | None:
-        """What the room's set, else the global one, names for a part; part "": the set itself."""
-        for one in (self._sets.get(str(room.get(self._sets_field)), {}), self._global):
+    def name(
+        self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str
+    ) -> str | None:
+        """What a surface names itself, else its room's set, else the global one; None if none does.
+
+        Args: part, field: where a set has it, such as "wall_set"; part "": in the set itself.
+        """
+        if isinstance(own.get(self._noun), str):
+            return own[self._noun]
+        for one in (self._sets.get(str(room.get(f"{self._noun}_set")), {}), self._global):
             inner = one.get(part) if part else one
             found = inner.get(field) if isinstance(inner, dict) else None
             if isinstance(found, str):

@@ -38,17 +38,6 @@ class ModifierLibrary:
         self._materials: dict[str, RadianceMaterial] = {}
         self._states: dict[str, ShadingState] = {}
 
-    def name(
-        self, own: Mapping[str, Any], room: Mapping[str, Any], part: str, field: str
-    ) -> str | None:
-        """Name of a surface's modifier; None where nothing states one.
-
-        Args: part, field: where a modifier set has it, such as "wall_set".
-        """
-        if isinstance(own.get("modifier"), str):
-            return own["modifier"]
-        return self.objects.name_by_set(room, part, field)
-
     def material(self, name: str) -> RadianceMaterial | None:
         """The Radiance material of a modifier; None where the file has none of that name."""
         if name not in self._materials:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -83,20 +84,11 @@ def read_ifc(
     around = _surroundings(mesh, source.walls, records, source.ground)
     own = [[a for a in glass.attachments if a.room == r.guid] for r in records]
     boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, own, strict=True)])
-    spaces = []
-    for index, (record, boundary) in enumerate(zip(records, boundaries, strict=True)):
+    spaces: list[Space] = []
+    for index, boundary in enumerate(boundaries):
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
-        try:
-            if isinstance(boundary, RoomError):
-                raise boundary
-            space, more = _space(
-                index, boundary, records, around, elements=elements, finishes=finishes
-            )
-        except RoomError as error:
-            what = f"room {record.solid.name}: its boundary cannot be built"
-            problems.append(Problem(record.solid.guid, what, f"left out: {error}", "room"))
-            continue
-        spaces.append(space)
+        found, more = _space(index, boundary, records, around, elements=elements, finishes=finishes)
+        spaces += found
         problems += more
     problems += boundary_problems(source, spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
@@ -112,6 +104,7 @@ def read_ifc(
             source, rooms.read, spaces, glass, problems, repeated=[r.guid for r in rooms.repeated]
         ),
         map_georeference(source.model, source.placed),
+        source.placed.matrix(),
     )  # fmt: skip
 
 
@@ -177,6 +170,25 @@ def _surroundings(
 
 
 def _space(
+    index: int,
+    boundary: RoomBoundary | RoomError,
+    records: Sequence[SpaceRecord],
+    around: Surroundings,
+    **bounding: Any,
+) -> tuple[list[Space], list[Problem]]:
+    """The room of a record, none where its boundary cannot be built; as `_closed_space`."""
+    try:
+        if isinstance(boundary, RoomError):
+            raise boundary
+        space, problems = _closed_space(index, boundary, records, around, **bounding)
+    except RoomError as error:
+        solid = records[index].solid
+        what = f"room {solid.name}: its boundary cannot be built"
+        return [], [Problem(solid.guid, what, f"left out: {error}", "room")]
+    return [space], problems
+
+
+def _closed_space(
     index: int,
     boundary: RoomBoundary,
     records: Sequence[SpaceRecord],

@@ -9,11 +9,11 @@ import ifcopenshell
 import numpy as np
 
 from bim.apertures import main_direction
-from bim.guarded import gaps_between
+from bim.guarded import gaps_between, solids_of
 from bim.ifc.shapes import Shape
 from bim.model import Problem
 from bim.planes import area_vectors
-from bim.solids import PackedSolid, Solid, packed, solid_of
+from bim.solids import PackedSolid, Solid, packed
 from mitsuba_cfs.processes import ProcessEnded
 
 SAME_PLACE = 0.002  # boxes that agree to this are one element drawn twice [m]
@@ -22,15 +22,14 @@ FLAT, UPRIGHT = 0.5, 1.5  # a slab is lower than this, a wall higher [m]
 WIDEST_JOINT, CLOSEST = 0.05, 0.001  # walls this far apart were meant to meet [m]
 ACROSS = 0.7  # cosine between the normals of walls that meet at a corner at the most
 SOLID_CLASSES = ("IfcWall", "IfcSlab", "IfcRoof")
+Solids = Mapping[int, Solid | ProcessEnded | None]  # by STEP number
 
 
 def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Problem]:
     """Repeated GlobalIds, elements without a body, drawn twice, of a wrong class, open, apart."""
-    solids = {
-        shape.step_id: solid_of(shape.triangles)
-        for shape in shapes
-        if shape.ifc_class.startswith(SOLID_CLASSES)
-    }
+    checked = [shape for shape in shapes if shape.ifc_class.startswith(SOLID_CLASSES)]
+    found = solids_of([shape.triangles for shape in checked])
+    solids = {shape.step_id: solid for shape, solid in zip(checked, found, strict=True)}
     return [
         *repeated_guids(model),
         *without_body(model),
@@ -98,7 +97,7 @@ def wrong_classes(shapes: Sequence[Shape]) -> list[Problem]:
     return problems
 
 
-def open_bodies(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> list[Problem]:
+def open_bodies(shapes: Sequence[Shape], solids: Solids) -> list[Problem]:
     """Walls, slabs and roofs whose body is not a closed solid, or only after a repair."""
     problems = []
     for shape in shapes:
@@ -106,8 +105,9 @@ def open_bodies(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> 
             continue
         solid = solids[shape.step_id]
         label = f"{shape.ifc_class} {shape.name}"
-        if solid is None:
-            what = f"{label}: its body is no closed solid"
+        if solid is None or isinstance(solid, ProcessEnded):
+            why = " is no closed solid" if solid is None else f": {solid}"
+            what = f"{label}: its body{why}"
             problems.append(Problem(shape.guid, what, "its surfaces are used as they are"))
         elif solid.repair not in ("", "welded"):
             what = f"{label}: its body is not sound ({solid.repair})"
@@ -115,13 +115,13 @@ def open_bodies(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> 
     return problems
 
 
-def walls_apart(shapes: Sequence[Shape], solids: Mapping[int, Solid | None]) -> list[Problem]:
+def walls_apart(shapes: Sequence[Shape], solids: Solids) -> list[Problem]:
     """Walls across each other that nearly meet; leaves of one wall, side by side, are none."""
     walls = []
     for shape in shapes:
         solid = solids.get(shape.step_id)
         normal = main_direction(shape.triangles) if shape.ifc_class.startswith("IfcWall") else None
-        if solid is not None and normal is not None:
+        if isinstance(solid, Solid) and normal is not None:
             box = solid.manifold.bounding_box()
             body = packed(solid.manifold)
             walls.append((shape, body, normal, np.array(box[:3]), np.array(box[3:])))

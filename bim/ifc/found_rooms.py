@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.enclosure import GAP, LIMIT_S, Enclosed, first_rooms_enclosed
+from bim.guarded import solids_of
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.model import Problem
 from bim.rooms import room_solid
-from bim.solids import solid_of
+from bim.solids import Solid
 from mitsuba_cfs.processes import ProcessEnded, answer_apart
 
 BOUNDING = (
@@ -103,8 +104,8 @@ class _Search:
                     break
                 continue
             self._say_what_is_less(found)
-            solids = [solid_of(room) for room in found.rooms]
-            return number, [solid.manifold for solid in solids if solid is not None]
+            solids = solids_of(found.rooms)
+            return number, [solid.manifold for solid in solids if isinstance(solid, Solid)]
         return -1, []
 
     def _told(self, line: str) -> None:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import manifold3d
-
 from bim.apertures import Filling, aperture_of
+from bim.guarded import Outline, united
 from bim.ifc.corrections import corrections_file
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.model import Problem
 from bim.names import found_by_name
 from bim.rooms import OVERLAP, Attachment, attachments_of, room_solid
-from bim.solids import prism, union
-from mitsuba_cfs.errors import DataError
+from bim.solids import packed, unpacked
+from mitsuba_cfs.errors import DataError, RoomError
 
 THROUGH = 0.02  # an opening that stops this near a room's face goes through the wall [m]
 
@@ -26,7 +25,7 @@ class Passage:
 
     opening: str  # GUID
     rooms: frozenset[str]  # GUIDs of the two
-    solid: manifold3d.Manifold  # fills the opening from one room into the other
+    outline: Outline  # of what fills the opening from one room into the other
 
 
 def passages(source: Source, records: Sequence[SpaceRecord]) -> list[Passage]:
@@ -62,10 +61,8 @@ def _passage(one: Attachment, others: list[Attachment]) -> Passage | None:
     # this room lies below the plane, the other one above
     if heights.min() > one.nearest + THROUGH or heights.max() < -other.nearest - THROUGH:
         return None
-    solid = prism(one.region, plane, one.deepest - OVERLAP, -other.deepest + OVERLAP)
-    if solid is None:
-        return None
-    return Passage(one.aperture.filling.guid, frozenset((one.room, other.room)), solid)
+    outline = one.region, plane, one.deepest - OVERLAP, -other.deepest + OVERLAP
+    return Passage(one.aperture.filling.guid, frozenset((one.room, other.room)), outline)
 
 
 def joined_rooms(
@@ -76,9 +73,13 @@ def joined_rooms(
     records, problems = list(records), []
     for names in source.corrections.join:
         parts = list({r.guid: r for r in (_named(records, n, source) for n in names)}.values())
-        one = _joined(parts, ways) if len(parts) > 1 else None
+        why = "nothing opens between them"
+        try:
+            one = _joined(parts, ways) if len(parts) > 1 else None
+        except RoomError as error:
+            one, why = None, str(error)
         if one is None:
-            what = f"rooms {', '.join(names)}: nothing opens between them"
+            what = f"rooms {', '.join(names)}: {why}"
             problems.append(Problem(source.corrections.file or "join", what, "not joined"))
             continue
         records = [r for r in records if r not in parts] + [one]
@@ -129,16 +130,16 @@ def _is_unique(records: Sequence[SpaceRecord], name: str) -> bool:
 def _joined(parts: list[SpaceRecord], ways: list[Passage]) -> SpaceRecord | None:
     """One room of several; None where they stay apart."""
     guids = {part.solid.guid for part in parts}
-    solids = [part.solid.manifold for part in parts]
-    solids += [way.solid for way in ways if way.rooms <= guids]
-    body = union(solids)
-    if len(body.decompose()) != 1:
+    solids = [packed(part.solid.manifold) for part in parts]
+    found = united(solids, [way.outline for way in ways if way.rooms <= guids])
+    if found is None:
         return None
+    body = unpacked(found)
     first = parts[0]
     name = " + ".join(part.name for part in parts)
     areas, volumes = ([getattr(p, key) for p in parts] for key in ("stated_area", "stated_volume"))
     return SpaceRecord(
-        room_solid(first.solid.guid, name, body.as_original()), name,
+        room_solid(first.solid.guid, name, body), name,
         " + ".join(part.long_name for part in parts if part.long_name), first.storey,
         body.volume(), None if None in areas else sum(areas),
         None if None in volumes else sum(volumes),

@@ -33,6 +33,12 @@ class Placed:
         """Model points [..., 3] [m] in the world."""
         return self.scale * points @ self.rotation.T - self.offset
 
+    def matrix(self) -> NDArray[np.float64]:
+        """The way from model to world [4, 4]."""
+        found = np.eye(4)
+        found[:3, :3], found[:3, 3] = self.scale * self.rotation, -self.offset
+        return found
+
 
 def in_world(shapes: dict[int, Shape], rotation: NDArray[np.float64]) -> Placed:
     """Shapes turned to true north, scaled if the unit is plainly wrong, moved near the origin."""

@@ -20,6 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bim.guarded import solids_of
 from bim.ifc.glass_of_rooms import GlassOfRooms
 from bim.ifc.project import psets_of
 from bim.ifc.quantities import BASE_SETS
@@ -29,7 +30,7 @@ from bim.ifc.spaces import SpaceRecord
 from bim.model import Problem
 from bim.room_tops import Body, raised_body
 from bim.rooms import room_solid
-from bim.solids import solid_of, triangles_of
+from bim.solids import triangles_of
 from mitsuba_cfs.processes import ProcessEnded, answer_apart
 
 LIDS = ("IfcSlab", "IfcRoof", "IfcCovering", "IfcPlate", "IfcCurtainWall")
@@ -111,7 +112,9 @@ def _raised(
         return record, str(error)
     if isinstance(body, str):
         return record, body
-    solid = solid_of(body)
+    (solid,) = solids_of([body])
+    if isinstance(solid, ProcessEnded):
+        return record, str(solid)
     gain = float(body[..., 2].max() - record.solid.high[2])
     if solid is None or gain < LOWEST_GAIN:
         return record, "its ceiling is drawn"

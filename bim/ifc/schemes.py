@@ -15,8 +15,11 @@ from collections.abc import Callable, Sequence
 import ifcopenshell
 import numpy as np
 
+from bim.guarded import shared_volumes
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
 from bim.model import Problem
+from bim.solids import packed
+from mitsuba_cfs.processes import ProcessEnded
 
 SAME_ROOM = 0.5  # share of the smaller of two spaces from which they are one room
 FILLED = 0.8  # share of a space from which others stand in its place
@@ -30,9 +33,8 @@ def one_of_each(
     model: ifcopenshell.file, records: Sequence[SpaceRecord]
 ) -> tuple[list[SpaceRecord], list[SpaceRecord], list[Problem]]:
     """The spaces with each room once, those left out for that, and what overlaps still."""
-    shared = shared_volumes(records)
+    shared, problems = shared_by_pair(records)
     left = set(range(len(records)))
-    problems = []
     for name, key in (("PredefinedType", _predefined), ("ObjectType", _object), ("group", _group)):
         gone, chosen = _by_scheme(model, records, _same(records, shared, left), key)
         if gone:
@@ -56,17 +58,27 @@ def one_of_each(
     return kept, [record for i, record in enumerate(records) if i not in left], problems
 
 
-def shared_volumes(records: Sequence[SpaceRecord]) -> Shared:
-    """Volume [m3] that each pair of spaces shares, where it is any."""
-    found = {}
-    for i, a in enumerate(records):
-        for j, b in enumerate(records[i + 1 :], i + 1):
-            if np.any(a.solid.low > b.solid.high) or np.any(b.solid.low > a.solid.high):
-                continue
-            volume = (a.solid.manifold ^ b.solid.manifold).volume()
-            if volume > 0:
-                found[i, j] = volume
-    return found
+def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Problem]]:
+    """Volume [m3] that each pair of spaces shares, where it is any, and what was not worked out."""
+    near = {
+        i: [
+            j for j, b in enumerate(records[i + 1 :], i + 1)
+            if np.all(a.solid.low <= b.solid.high) and np.all(b.solid.low <= a.solid.high)
+        ]
+        for i, a in enumerate(records)
+    }  # fmt: skip
+    bodies = {i: packed(records[i].solid.manifold) for i in near}
+    items = [(bodies[i], [bodies[j] for j in others]) for i, others in near.items() if others]
+    volumes = iter(shared_volumes(items))
+    found, problems = {}, []
+    for i, others in near.items():
+        shared = next(volumes) if others else []
+        if isinstance(shared, ProcessEnded):
+            what = f"space {records[i].solid.name}: what it shares with others: {shared}"
+            problems.append(Problem(records[i].guid, what, "taken as nothing"))
+            continue
+        found |= {(i, j): volume for j, volume in zip(others, shared, strict=True) if volume > 0}
+    return found, problems
 
 
 def _same(records: Sequence[SpaceRecord], shared: Shared, left: set[int]) -> list[tuple[int, int]]:

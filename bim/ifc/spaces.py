@@ -10,17 +10,17 @@ import ifcopenshell.util.element
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.apertures import shadow
+from bim.guarded import spaces_of
 from bim.ifc.project import psets_of, storey_of
 from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
 from bim.model import Problem
 from bim.names import label_of
-from bim.planes import Facet, plane_through
+from bim.planes import Facet
 from bim.rays import RayMesh
 from bim.rooms import RoomSolid, room_solid
-from bim.solids import prism, solid_of
 from bim.surroundings import sample_points
+from mitsuba_cfs.processes import ProcessEnded
 
 SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3]
 UNCOVERED = 0.7  # share of the ceiling under the open sky from which a space has no roof
@@ -64,7 +64,11 @@ def read_spaces(
     records: list[SpaceRecord] = []
     problems: list[Problem] = []
     seen: set[str] = set()
-    for space in model.by_type("IfcSpace"):
+    spaces = model.by_type("IfcSpace")
+    drawn = {space.id(): shapes[space.id()] for space in spaces if space.id() in shapes}
+    bodies = spaces_of([shape.triangles for shape in drawn.values()])
+    solids = dict(zip(drawn, bodies, strict=True))
+    for space in spaces:
         label = label_of(space.Name or "", space.LongName or "", space.GlobalId)
         guid = space.GlobalId
         if guid in seen:
@@ -78,32 +82,31 @@ def read_spaces(
                 Problem(guid, f"space {label}: is marked as external", "left out", "room")
             )
             continue
-        shape = shapes.get(space.id())
-        if shape is None:
+        if space.id() not in solids:
             problems.append(Problem(guid, f"space {label}: has no geometry", "left out", "room"))
             continue
-        solid, repair = closed_space(shape.triangles)
-        if solid is None:
-            what = f"space {label}: its geometry encloses no volume"
-            problems.append(Problem(guid, what, "left out", "room"))
+        solid = solids[space.id()]
+        if solid is None or isinstance(solid, ProcessEnded):
+            why = "its geometry encloses no volume" if solid is None else f"its geometry: {solid}"
+            problems.append(Problem(guid, f"space {label}: {why}", "left out", "room"))
             continue
-        if solid.volume() < SMALLEST_SPACE:
-            what = f"space {label}: holds {solid.volume():.3f} m3 only"
+        if solid.volume < SMALLEST_SPACE:
+            what = f"space {label}: holds {solid.volume:.3f} m3 only"
             problems.append(Problem(guid, what, "no room: left out", "room"))
             continue
-        if repair:
-            problems.append(Problem(guid, f"space {label}: its shell was not sound", repair))
+        if solid.repair:
+            problems.append(Problem(guid, f"space {label}: its shell was not sound", solid.repair))
         area, volume = stated_quantities(psets, scales)
-        volume, slip = checked_volume(volume, solid.volume(), psets, scales.length)
+        volume, slip = checked_volume(volume, solid.volume, psets, scales.length)
         if slip:
             problems.append(Problem(guid, f"space {label}: {slip}", "the drawn one is used"))
         records.append(
             SpaceRecord(
-                room_solid(guid, label, solid),
+                room_solid(guid, label, solid.manifold),
                 space.Name or space.LongName or space.GlobalId,
                 space.LongName or "",
                 storey_of(space),
-                solid.volume(),
+                solid.volume,
                 area,
                 volume,
                 _type_name(space),
@@ -126,19 +129,6 @@ def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict]) -> 
         getattr(space, "PredefinedType", None),
     )
     return common.get("IsExternal") is True or "EXTERNAL" in kinds
-
-
-def closed_space(triangles: NDArray[np.float64]):
-    """Manifold of a space and the repair ("" if none); its outline extruded as a last resort."""
-    solid = solid_of(triangles)
-    if solid is not None:
-        return solid.manifold, solid.repair
-    low, high = triangles[..., 2].min(), triangles[..., 2].max()
-    if high - low < 0.1:
-        return None, ""
-    plane = plane_through(np.array([*triangles[0, 0, :2], low]), np.array([0.0, 0.0, 1.0]))
-    manifold = prism(shadow(triangles, plane), plane, 0.0, high - low)
-    return manifold, "replaced by its outline extruded over its height"
 
 
 def enclosed_spaces(

@@ -16,7 +16,6 @@ from bim.radiance.primitives import Primitive
 
 SIDES = 32  # of a circle
 SUBDIVISIONS = 2  # of an icosahedron: 320 triangles
-FLATNESS = 1e-3  # of a polygon's corners from its plane, as a share of its size
 
 INWARD = {"bubble": "sphere", "tube": "cylinder", "cup": "cone"}
 ARGUMENTS = {"sphere": 4, "cylinder": 7, "cone": 8, "ring": 8}

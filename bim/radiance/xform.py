@@ -25,7 +25,6 @@ class Xform:
     modifier: str | None = None  # in place of the objects' own
     prefix: str = ""
     is_inverted: bool = False  # surfaces are turned round
-    is_array: bool = False
 
 
 def read_xform(words: tuple[str, ...]) -> Xform:
@@ -57,7 +56,7 @@ def read_xform(words: tuple[str, ...]) -> Xform:
         else:
             raise ValueError(f"option {option} is not known")
     copies = tuple(_copies(stages))
-    return Xform(copies, words[at:], modifier, prefix, inverted, any(s[0] == "-a" for s in stages))
+    return Xform(copies, words[at:], modifier, prefix, inverted)
 
 
 def _copies(stages: list[tuple[str, int, list[NDArray[np.float64]]]]) -> Iterator[NDArray]:

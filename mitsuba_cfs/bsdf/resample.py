@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.tensor_peak import without_beam
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 
 BLOCKS = ("transmission_front", "transmission_back", "reflection_front", "reflection_back")
@@ -19,17 +20,22 @@ def klems_of(bsdf: Bsdf, basis: KlemsBasis = KLEMS_FULL, *, samples: int = 64) -
         f[o, i] = mean of f(omega_o, omega_i) over both patches, weighted by their cosines
 
     Each column is scaled to the share of light that the block sends on from its patch, which is
-    known better than the mean of so many pairs.
+    known better than the mean of so many pairs.  The through beam of a tree, whose cells lie across
+    patches, is all on the diagonal: there the matrix methods look for what goes straight on.
 
     Args: samples: pairs of directions for each pair of patches.
     """
     if isinstance(bsdf, KlemsBsdf) and bsdf.basis_in == bsdf.basis_out == basis:
         return bsdf.filled()
-    return KlemsBsdf(basis, basis, **{name: _block(bsdf, name, basis, samples) for name in BLOCKS})
+    rest = without_beam(bsdf) if isinstance(bsdf, TensorTreeBsdf) else bsdf
+    blocks = {name: _block(bsdf, rest, name, basis, samples) for name in BLOCKS}
+    return KlemsBsdf(basis, basis, **blocks)
 
 
-def _block(bsdf: Bsdf, name: str, basis: KlemsBasis, samples: int) -> NDArray[np.float64]:
-    """One block [K out, K in] [1/sr]."""
+def _block(
+    bsdf: Bsdf, rest: Bsdf, name: str, basis: KlemsBasis, samples: int
+) -> NDArray[np.float64]:
+    """One block [K out, K in] [1/sr]; `rest`: the same without its beam."""
     from scipy.stats import qmc  # half a second, for trees only
 
     transmits, front = name.startswith("transmission"), name.endswith("front")
@@ -42,12 +48,17 @@ def _block(bsdf: Bsdf, name: str, basis: KlemsBasis, samples: int) -> NDArray[np
         outgoing = _directions(basis, patches, u_out, v_out) * [-1, 1, -1]
         if front != transmits:  # it leaves outdoors
             outgoing[:, 2] *= -1
-        values = bsdf_values(bsdf, np.tile(incident, (K, 1)), np.repeat(outgoing, K, axis=0))
+        values = bsdf_values(rest, np.tile(incident, (K, 1)), np.repeat(outgoing, K, axis=0))
         total += values.reshape(K, K)
         towards.append(incident)
-    share = direct_hemispherical(bsdf, name, np.concatenate(towards)).reshape(samples, K).sum(0)
-    sampled = basis.projected_solid_angles() @ total
-    return total / samples * np.divide(share, sampled, out=np.ones(K), where=sampled > 0)
+    incident, omega = np.concatenate(towards), basis.projected_solid_angles()
+    whole, share = (
+        direct_hemispherical(b, name, incident).reshape(samples, K).mean(axis=0)
+        for b in (bsdf, rest)
+    )
+    sampled = omega @ total
+    scattered = total * np.divide(share, sampled, out=np.ones(K), where=sampled > 0)
+    return scattered + np.diag((whole - share) / omega)
 
 
 def _directions(

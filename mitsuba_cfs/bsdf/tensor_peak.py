@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.evaluate import tree_position
-from mitsuba_cfs.bsdf.tensor_tree import TensorTree, square_to_disk
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, square_to_disk
 
 WITHIN = 8.0  # times: leaves of a peak are no darker than so much below the mean of its brighter
 CONTRAST = 2.0  # times what surrounds it, from which such leaves are a peak
@@ -52,6 +52,15 @@ def through_peak(tree: TensorTree) -> tuple[TensorTree, NDArray[np.float64]]:
     values = tree.values.copy()
     values[leaf[excess > 0]] -= excess[excess > 0]
     return replace(tree, values=values), np.where(amount < LEAST, 0.0, amount).reshape(shape)
+
+
+def without_beam(bsdf: TensorTreeBsdf) -> TensorTreeBsdf:
+    """The trees without what goes straight on."""
+    trees = {
+        name: through_peak(tree)[0] if name.startswith("transmission") else tree
+        for name, tree in bsdf.blocks().items()
+    }
+    return TensorTreeBsdf(**trees)
 
 
 def _leaves_ahead(tree: TensorTree) -> NDArray[np.int64]:

@@ -59,21 +59,13 @@ class PictureMatrix:
         """The same pixels of other rows."""
         return PictureMatrix(rows, self.row, self.share)
 
-    def add_to(
-        self,
-        values: NDArray[np.float32],
-        luminance: NDArray[np.float32],
-        more: NDArray[np.float32] | None = None,
-    ) -> None:
-        """Add the pixels' luminance to values [h, n] under patch luminances [N, h].
-
-        Args: more: [m, h] luminance of the rows besides.
-        """
-        of_rows = self.of_rows(luminance)
-        if more is not None:
-            of_rows += more.T
+    def add_rows(self, values: NDArray[np.float32], of_rows: NDArray[np.float32]) -> None:
+        """Add the luminance [h, m] of the rows to the pixels' values [h, n], by their shares."""
+        of_pixels = np.empty(len(self.row), dtype=np.float32)  # one for all hours
         for hour, found in zip(values, of_rows, strict=True):
-            hour += found[self.row] * self.share
+            np.take(found, self.row, out=of_pixels, mode="clip")  # "raise" would copy
+            of_pixels *= self.share
+            hour += of_pixels
 
     def of_rows(self, luminance: NDArray[np.float32]) -> NDArray[np.float32]:
         """Luminance [h, m] of the rows under patch luminances [N, h]."""
@@ -169,9 +161,8 @@ class ThreePhasePictures:
 
     def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `Pictures`."""
-        luminance = flat(self.luminance, self.seen.shape[1])[:, batch]
-        values = np.ascontiguousarray((self.seen @ luminance).T, dtype=np.float32)
-        self.reflected.add_to(values, luminance)
+        of_rows, values = self.by_rows(batch)
+        self.reflected.add_rows(values, of_rows)
         return values
 
     @property
@@ -182,7 +173,8 @@ class ThreePhasePictures:
     def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """See `Pictures`."""
         luminance = flat(self.luminance, self.seen.shape[1])[:, batch]
-        own = np.ascontiguousarray((self.seen @ luminance).T, dtype=np.float32)
+        own = np.zeros((len(batch), len(self.pixels)), dtype=np.float32)
+        add_seen(own, self.seen, luminance)
         return self.reflected.of_rows(luminance), own
 
     def without_disc(
@@ -196,7 +188,8 @@ class ThreePhasePictures:
         values = np.zeros((len(batch), len(self.pixels)), dtype=np.float32)
         if self.unlike is not None:
             luminance = flat(self.luminance, self.seen.shape[1])[:, batch]
-            self.reflected.with_rows(self.unlike).add_to(values, luminance)
+            rows = self.reflected.with_rows(self.unlike).of_rows(luminance)
+            self.reflected.add_rows(values, rows)
         return values
 
 
@@ -277,6 +270,16 @@ def full_picture(
     picture = np.zeros(view.height * view.width, dtype=np.float32)
     picture[pixels] = values
     return picture.reshape(view.height, view.width)
+
+
+def add_seen(
+    values: NDArray[np.float32], shares: sparse.csr_array, luminance: NDArray[np.float32]
+) -> None:
+    """Add what pixels show of patches to values [h, n]; shares [n, N], luminance [N, h]."""
+    some = np.flatnonzero(np.diff(shares.indptr))  # most pixels show none
+    shown = np.ascontiguousarray((shares[some] @ luminance).T)
+    for hour, found in zip(values, shown, strict=True):
+        hour[some] += found
 
 
 def flat(window_luminance: ArrayLike, columns: int) -> NDArray[np.float32]:

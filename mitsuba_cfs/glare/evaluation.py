@@ -156,21 +156,14 @@ def evaluate(
         picture = np.where(seen(geometry, options.field_of_view), picture, 0.0)
     task = mean if options.task is None else task_luminance(picture, geometry, options.task)
     threshold = _threshold(options, task)
-    sources, zones = _sources(picture, geometry, threshold, options)
-    # evalglare rounds to four bytes before it cuts off: a whole number stays one
-    pixel = sources.x.astype(np.float32).astype(int), sources.y.astype(np.float32).astype(int)
-    direction = geometry.directions[pixel]
-    position = _positions(options, geometry, pixel, direction)
+    lux = 0.0
     if disc is not None:
         lux = disc.luminance * disc.solid_angle * float(disc.direction @ geometry.forward)
         Ev, mean = Ev + lux, mean + disc.luminance * disc.solid_angle / geometry.total_solid_angle
         largest = max(largest, disc.luminance)
         if disc.luminance <= threshold or not _in_field(disc, geometry, options):
             disc = None
-    if disc is not None:
-        sources, zones = with_disc(sources, disc, lux, geometry), np.append(zones, 0)
-        own = position_index(disc.direction[None], geometry.view, model=options.position_model)
-        direction, position = np.vstack([direction, disc.direction]), np.append(position, own)
+    sources, zones, direction, position = _placed(picture, geometry, threshold, options, disc, lux)
     sigma = view_angles(direction, geometry.view)[0]
     direct = float(sources.illuminance.sum())
     background = _background(options, geometry, sources, Ev, direct, mean)
@@ -203,6 +196,31 @@ def evaluate(
         dgr=rating,
         contrast=contrast,
         disc=disc,
+    )
+
+
+def _placed(
+    picture: NDArray,
+    geometry: GlareView,
+    threshold: float,
+    options: GlareOptions,
+    disc: SunDisc | None,
+    lux: float,
+) -> tuple[Sources, NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Sources, and zone, direction and position index of each [n]; the disc of lux [lx] is last."""
+    sources, zones = _sources(picture, geometry, threshold, options)
+    # evalglare rounds to four bytes before it cuts off: a whole number stays one
+    pixel = sources.x.astype(np.float32).astype(int), sources.y.astype(np.float32).astype(int)
+    direction = geometry.directions[pixel]
+    position = _positions(options, geometry, pixel, direction)
+    if disc is None:
+        return sources, zones, direction, position
+    own = position_index(disc.direction[None], geometry.view, model=options.position_model)
+    return (
+        with_disc(sources, disc, lux, geometry),
+        np.append(zones, 0),
+        np.vstack([direction, disc.direction]),
+        np.append(position, own),
     )
 
 

@@ -74,10 +74,6 @@ class GlareView:
         x, y = np.unravel_index(nearest, self.valid.shape)
         return int(x), int(y)
 
-    def direction_at(self, x: int, y: int) -> NDArray[np.float64]:
-        """Unit vector [3] of a pixel in scan order."""
-        return self.directions[x, y]
-
     def angle_between(self, x: int, y: int, other_x: int, other_y: int) -> float:
         """Angle [rad] between two pixels in scan order."""
         dot = self.directions[x, y] @ self.directions[other_x, other_y]

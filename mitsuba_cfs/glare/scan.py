@@ -85,9 +85,9 @@ def label_bright(luminance, valid, directions, threshold, radius, reach, follow)
     for x in range(nx):
         last = 0
         for y in range(ny):
-            if not valid[x, y]:
-                continue
-            if luminance[x, y] > threshold:
+            if luminance[x, y] > threshold:  # few are: asked first
+                if not valid[x, y]:
+                    continue
                 label = last
                 if last == 0 or not follow:
                     label = search(
@@ -98,7 +98,7 @@ def label_bright(luminance, valid, directions, threshold, radius, reach, follow)
                     label = count
                 labels[x, y] = label
                 last = label
-            else:
+            elif last > 0 and valid[x, y]:
                 last = 0
     return labels, count
 

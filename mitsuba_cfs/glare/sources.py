@@ -55,13 +55,15 @@ def glare_sources(
     labels, count = scan.label_bright(
         luminance, valid, directions, threshold, radius, reach, step > 1.0
     )
-    peaks = peak if step >= 1.0 and count else None
+    if not count:
+        return Sources(labels, *np.empty((6, 0)))
+    peaks = peak if step >= 1.0 else None
     bright = int(np.count_nonzero(luminance >= peaks)) if peaks is not None else 0
     sums = scan.sum_sources(labels, luminance, omega, count + 1 + bright)
     fixed = (luminance, omega, valid, directions, radius, reach)
     if step > 1.0:
         scan.merge_sources(labels, sums, *fixed, 1, count, True)
-    if smoothing and step >= 1.0 and count:
+    if smoothing and step >= 1.0:
         size, circle = sums[: count + 1], step / 1.75
         scan.smooth(labels, labels.copy(), size, luminance, omega, valid, float(np.float32(circle)))
     if bright:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +39,8 @@ def write_exr(
     if comment:
         about["COMMENT"] = comment
     stream = mi.MemoryStream()  # Mitsuba's own file says nothing of a full disk
-    bitmap.write(stream, mi.Bitmap.FileFormat.OpenEXR)
+    with _a_second_thread():
+        bitmap.write(stream, mi.Bitmap.FileFormat.OpenEXR)
     write_bytes(path, stream.raw_buffer())
 
 
@@ -46,7 +50,8 @@ def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | Non
     if not Path(path).is_file():
         raise DataError("cannot be read (no such file)", file=path)
     try:
-        bitmap = mi.Bitmap(str(path), mi.Bitmap.FileFormat.OpenEXR)
+        with _a_second_thread():
+            bitmap = mi.Bitmap(str(path), mi.Bitmap.FileFormat.OpenEXR)
     except RuntimeError as error:
         raise DataError(f"not an EXR picture ({error})", file=path) from None
     values = np.array(bitmap.convert(component_format=mi.Struct.Type.Float32))
@@ -54,3 +59,16 @@ def read_exr(path: str | PathLike[str]) -> tuple[NDArray[np.float32], View | Non
     about = bitmap.metadata()
     view = parse_view(about["VIEW"], width, height) if "VIEW" in about else None
     return (values[..., 0] if values.shape[2:] == (1,) else values), view
+
+
+@contextmanager
+def _a_second_thread() -> Iterator[None]:
+    """OpenEXR, in Mitsuba, waits for ever for a thread besides the caller's; one core has none."""
+    count = dr.thread_count()
+    if count < 2:
+        dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        if count < 2:
+            dr.set_thread_count(count)

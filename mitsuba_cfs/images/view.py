@@ -138,6 +138,17 @@ def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[
     return directions, exists
 
 
+def pixel_rays(
+    view: View, pixels: NDArray[np.int64], across: ArrayLike, down: ArrayLike
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Unit vectors [..., 3] through places in pixels, and where there is one, as of `rays`.
+
+    Args: pixels: [...] row * width + column; across, down: [...] from their left, top corner, 0..1.
+    """
+    x = (pixels % view.width + np.asarray(across, float)) / view.width
+    return rays(view, x, 1.0 - (pixels // view.width + np.asarray(down, float)) / view.height)
+
+
 # Projections: coordinates x, y from the centre to the parts of the ray along right, up and forward,
 # where there is one, and the lengths of right and up.  What they give need only broadcast.
 

@@ -45,6 +45,10 @@ class SystemOptics(Protocol):
     def reflection(self) -> NDArray[np.float64] | None:
         """Radiance back into the room for radiance from it [K out, K in]; None: black."""
 
+    @property
+    def outdoor_reflection(self) -> NDArray[np.float64] | None:
+        """The same outdoors."""
+
 
 States = Sequence[SystemOptics]  # of a window group, such as from open to closed
 
@@ -88,16 +92,25 @@ class BsdfOptics:
     @cached_property
     def reflection(self) -> NDArray[np.float64] | None:
         """See `SystemOptics`."""
-        full, mirror = self._coarse.filled(), None
-        if self._angular is not None and self._angular.reflectance_back is not None:
+        return self._reflected("back")
+
+    @cached_property
+    def outdoor_reflection(self) -> NDArray[np.float64] | None:
+        """See `SystemOptics`."""
+        return self._reflected("front")
+
+    def _reflected(self, side: str) -> NDArray[np.float64] | None:
+        """Radiance that a side reflects [K out, K in]."""
+        full, mirror, name = self._coarse.filled(), None, f"reflectance_{side}"
+        if self._angular is not None and getattr(self._angular, name) is not None:
             full = without_peaks(full, "reflection")
-            values = self._angular.reflectance_back
+            values = getattr(self._angular, name)
             mirror = np.diag(self._angular.patch_means(full.basis_in, values, 1.0))
-        back = full.reflection_back
-        if back is None:
+        block = getattr(full, f"reflection_{side}")
+        if block is None:
             return mirror
-        back = back * full.basis_in.projected_solid_angles()
-        return back if mirror is None else back + mirror
+        block = block * full.basis_in.projected_solid_angles()
+        return block if mirror is None else block + mirror
 
 
 class AngularOptics:
@@ -159,6 +172,10 @@ class AngularOptics:
         back = np.tile(even, (KLEMS_FULL.size, 1)) * KLEMS_FULL.projected_solid_angles()
         return back + np.diag(self._patch_means(self._mirrored))
 
+    @property
+    def outdoor_reflection(self) -> None:
+        """See `SystemOptics`; what the front reflects is not among the shares."""
+
     def _klems(self) -> KlemsBsdf:
         """What is scattered, from either side, and what the room's side reflects."""
         passed, back = (
@@ -184,6 +201,7 @@ class GivenOptics:
     scattering: Scattering | None = None
     paths: PathOptics | None = None
     reflection: NDArray[np.float64] | None = None  # [K, K]
+    outdoor_reflection: NDArray[np.float64] | None = None  # [K, K]
 
 
 def hourly_states(state: ArrayLike | None, groups: int, hours: int) -> NDArray[np.int64]:

@@ -7,23 +7,22 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from mitsuba_cfs import phases
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.methods.group_light import SensorLight, WindowLight
 from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.phase_error import matrix_variance
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
-from mitsuba_cfs.methods.straight_views import StraightViews
+from mitsuba_cfs.methods.straight_views import StraightViews, sun_beam
 from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.annual_pictures import FivePhasePictures
-from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
+from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.picture_beam import BeamLight, beam_light
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients, outdoors
@@ -74,6 +73,9 @@ class PhaseSystems:
         found = np.einsum("sqk,qkp->sp", view, through, optimize=True)
         if self.mirrored.reflects(optics):
             found += self.mirrored.sensors(optics) @ through.reshape(-1, through.shape[-1])
+        if self.mirrored.reflects_outdoors(optics):
+            before = self.mirrored.outdoors(optics, self.mirrored.shares(optics))
+            found += before @ daylight.reshape(-1, daylight.shape[-1])
         for g in range(len(self.systems)):
             found += self.straight.coefficients(g, min(state, len(self.systems[g]) - 1))
         return found[: len(self.traced.scene.points)]
@@ -151,27 +153,10 @@ class PhaseLight:
             if self._traced.five_phase:
                 D = [self._traced.direct_daylight[q].astype(np.float32)] * len(states)
                 sun = phases.room_side_radiance(T, D, sky.sun.astype(np.float32))
-                beams = [self._beams(q, optics) for optics in states]
+                beams = [sun_beam(self._traced, q, optics, self.sky) for optics in states]
             lights = zip(whole, sun, beams, strict=True)
             found.append([WindowLight(w, s, *both) for w, s, both in lights])
         return found
-
-    def _beams(self, q: int, optics: SystemOptics) -> tuple[NDArray[np.float32] | None, ...]:
-        """The sun's beam of a part by its patches and at its own angle; None without a beam."""
-        ways, sky = [optics.scattering], self.sky
-        patches = patch_beams(ways, KLEMS_FULL)
-        if not patches.any():
-            return None, None
-        at_sun = through_beams(self._traced.parts.groups[q : q + 1], ways, sky.direction)
-        traced, T = self._traced, [held_beams(optics.transmission, patches[0], KLEMS_FULL)]
-        daylight = traced.straight_daylight[q : q + 1]
-        by_patch, by_angle = phases.sun_beams(T, at_sun, daylight, sky.sun)
-        if traced.straight_daylight is not traced.direct_daylight:  # out of a mirror, by patches
-            daylight = traced.direct_daylight[q : q + 1]
-            straight = by_patch
-            by_patch, _ = phases.sun_beams(T, at_sun, daylight, sky.sun)
-            by_angle = by_angle + (by_patch - straight)
-        return by_patch[0].astype(np.float32), by_angle[0].astype(np.float32)
 
     @cached_property
     def sensors(self) -> list[list[SensorLight]]:
@@ -237,9 +222,13 @@ class PhaseLight:
             luminance = phases.room_side_radiance(T, daylight, sky.whole[:, hours])
         else:
             luminance = self._window_luminance("whole", rows, hours)
-            optics = self.filled.optics(state)
-            if self.filled.mirrored.reflects(optics):
-                luminance = luminance + self.filled.mirrored.windows(optics, luminance)
+            optics, mirrored = self.filled.optics(state), self.filled.mirrored
+            if mirrored.reflects_outdoors(optics):
+                through = block_diag(*(o.transmission for o in optics))
+                added = self._by_outdoors(optics, through, hours)
+                luminance = luminance + added.reshape(luminance.shape)
+            if mirrored.reflects(optics):
+                luminance = luminance + mirrored.windows(optics, luminance)
         if not traced.five_phase:
             return matrices.three_phase(luminance)
         sun, seen = self.filled.seen_sun(tuple(int(j) for j in state))
@@ -348,16 +337,29 @@ class PhaseLight:
         return np.maximum(diffuse, 0.0) + sum(self._chosen(g, "sun", row) for g, row in rows)
 
     def _reflected(self, state: State | None) -> NDArray[np.float64] | float:
-        """What the windows reflect of the room's light to sensors and eye [S + 1, L]."""
+        """What the windows reflect, into the room and outdoors, to sensors and eye [S + 1, L]."""
         rows, mirrored, found = self._state(state), self.filled.mirrored, None
         for kind, hours in combinations(rows):
-            optics = self.filled.optics(kind)
+            optics, added = self.filled.optics(kind), []
             if mirrored.reflects(optics):
                 window = self._window_luminance("whole", rows[:, hours], hours)
-                added = mirrored.sensors(optics) @ window.reshape(-1, len(hours))
-                found = np.zeros((len(added), rows.shape[1])) if found is None else found
-                found[:, hours] = added
+                added.append(mirrored.sensors(optics) @ window.reshape(-1, len(hours)))
+            if mirrored.reflects_outdoors(optics):
+                added.append(self._by_outdoors(optics, mirrored.shares(optics), hours))
+            if added:
+                found = np.zeros((len(added[0]), rows.shape[1])) if found is None else found
+                found[:, hours] = sum(added)
         return 0.0 if found is None else found
+
+    def _by_outdoors(
+        self, optics: Sequence[SystemOptics], shares: NDArray, hours: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """What shares [n, Q * K] of what windows reflect outdoors and get back are [n, h]."""
+        shares, daylight = self.filled.mirrored.outdoors(optics, shares), self._traced.daylight
+        found = shares @ daylight.values.reshape(shares.shape[1], -1) @ self.sky.whole[:, hours]
+        if self._reflected_sun is not None:
+            found += self._reflected_sun.before(shares, hours)
+        return found
 
     def _chosen(self, g: int, name: str, row: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """What a group gives [S, L] in the state of each hour [L]."""

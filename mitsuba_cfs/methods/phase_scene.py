@@ -21,13 +21,13 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
 from mitsuba_cfs.trace.borrowed_daylight import borrowed_daylight
-from mitsuba_cfs.trace.borrowed_view import borrowed_view
+from mitsuba_cfs.trace.borrowed_view import LendingRoom, RoomBehind, borrowed_view
 from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.view_matrix import view_matrix
-from mitsuba_cfs.trace.window_exchange import window_exchange
+from mitsuba_cfs.trace.window_exchange import outdoor_exchange, window_exchange
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
 
 BATCHES = 8  # independent repetitions that the standard errors come from
@@ -70,7 +70,8 @@ class PhaseScene:
             cache=self.cache,
             progress=self.progress if progress is None else progress,
         )
-        for name in ("parts", "daylight", "direct_daylight", "straight_daylight"):
+        outdoors = ("daylight", "direct_daylight", "straight_daylight", "outdoor_exchange")
+        for name in ("parts", *outdoors):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
         return other
@@ -160,6 +161,20 @@ class PhaseScene:
         ).values
 
     @cached_property
+    def outdoor_exchange(self) -> NDArray[np.float64]:
+        """X [Q, K, Q * K]: what the windows that look outdoors see of what they light there."""
+        parts = self.parts.groups[: self.parts.outdoors(self.scene)]
+        return outdoor_exchange(
+            self.scene.exterior,
+            parts,
+            samples=max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8),
+            max_depth=OUTDOOR_DEPTH,
+            stopping=Stopping(batches=2),
+            seed=self.sampling.seed,
+            cache=self.cache,
+        )
+
+    @cached_property
     def view(self) -> ViewMatrices:
         """V of the view's pixels."""
         return self._view(INDOOR_DEPTH)
@@ -175,24 +190,35 @@ class PhaseScene:
         return GlareView(self.scene.view)
 
     @cached_property
-    def beyond(self) -> list[tuple[tuple[WindowGroup, ...], NDArray[np.float64]]]:
-        """Of each room beyond its windows' parts [Q] and their T D [Q, K, P]."""
-        rooms: dict[int, tuple[tuple[WindowGroup, ...], NDArray[np.float64]]] = {}
+    def beyond(self) -> list[LendingRoom]:
+        """The room beyond each group that looks into one, with T D of its windows' parts."""
+        rooms: dict[int, LendingRoom] = {}
         for beyond in self.scene.beyond:
             if id(beyond.scene) not in rooms:
                 room = PhaseScene(beyond.scene, self.sampling, five_phase=False, cache=self.cache)
-                pairs = zip(room.parts.group, room.daylight.values, strict=True)
-                through = np.stack([beyond.transmission[n] @ d for n, d in pairs])
-                rooms[id(beyond.scene)] = room.parts.groups, through
+                rooms[id(beyond.scene)] = room.lit(beyond.transmission)
         return [rooms[id(beyond.scene)] for beyond in self.scene.beyond]
+
+    def lit(self, transmission: Sequence[NDArray[np.float64]]) -> LendingRoom:
+        """The room with T of its groups [G][K, K], as a room beside it sees it."""
+        scene, parts = self.scene, self.parts
+        pairs = zip(parts.group, self.daylight.values, strict=True)
+        behind = [
+            RoomBehind(int(parts.of(g)[0]), len(parts.of(g)), one.beam, room)
+            for g, one, room in zip(
+                range(len(scene.outdoor_groups), len(scene.groups)), scene.beyond, self.beyond,
+                strict=True,
+            )
+        ]  # fmt: skip
+        through = np.stack([transmission[n] @ d for n, d in pairs])
+        return LendingRoom(scene.interior, parts.groups, through, tuple(behind))
 
     def borrowed_view(self, g: int, samples: int, stopping: Stopping) -> Estimate:
         """B [S, P] of a group that looks into another room."""
         i = g - len(self.scene.outdoor_groups)
-        (groups, through), beyond = self.beyond[i], self.scene.beyond[i]
         return borrowed_view(
-            (self.scene.interior, self.scene.groups), g, beyond.beam,
-            (beyond.scene.interior, groups), through, self.scene.sensors(),
+            (self.scene.interior, self.scene.groups), g, self.scene.beyond[i].beam,
+            self.beyond[i], self.scene.sensors(),
             samples=samples, max_depth=INDOOR_DEPTH, stopping=stopping,
             seed=self.sampling.seed, cache=self.cache,
         )  # fmt: skip
@@ -213,12 +239,11 @@ class PhaseScene:
         """D [Q, K, P] of each group that looks into another room."""
         first, chosen = len(self.scene.outdoor_groups), self.sampling
         found = []
-        for g, beyond in enumerate(self.scene.beyond, first):
-            room, through = self.beyond[g - first]
+        for g, room in enumerate(self.beyond, first):
             inner = [self.parts.groups[q] for q in self.parts.of(g)]
             found.append(
                 borrowed_daylight(
-                    beyond.scene.interior, room, through, inner,
+                    room.surfaces, room.groups, room.luminance, inner,
                     samples=max(chosen.patch_samples // INNER_SHARE // BATCHES, 1),
                     max_depth=INDOOR_DEPTH, stopping=Stopping(batches=BATCHES), seed=chosen.seed,
                     cache=self.cache,

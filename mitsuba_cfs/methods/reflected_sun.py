@@ -162,6 +162,18 @@ class ReflectedSunLight:
         mean = sum(self._windows(b)[..., some].sum(axis=-1) for b in range(BATCHES)) / BATCHES
         return mean - self._reflected_daylight() @ self._sky.sun[:, hours].sum(axis=1)
 
+    def before(self, shares: Array, hours: NDArray[np.int64]) -> Array:
+        """The same of each of some hours [h], as rows of shares [n, Q * K] have it [n, h]."""
+        found, number = np.zeros((len(shares), len(hours))), np.full(len(self._sky.illuminance), -1)
+        number[self._shining] = np.arange(len(self._shining))
+        some = number[hours][number[hours] >= 0]
+        if not self._found.outdoors_reflects or not len(some):
+            return found
+        windows = sum(self._windows(b)[..., some] for b in range(BATCHES)) / BATCHES
+        found[:, number[hours] >= 0] = shares @ windows.reshape(shares.shape[1], -1)
+        by_patches = shares @ self._reflected_daylight().reshape(shares.shape[1], -1)
+        return found - times_sky(by_patches, self._sky.sun[:, hours])
+
     def _batch(self, number: int, g: int, j: int, *, beam: bool) -> Array:
         """The light of the sensors in the hours with sun [S, h]."""
         found = self._found

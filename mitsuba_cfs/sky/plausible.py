@@ -52,7 +52,7 @@ def whole_days(weather: Weather) -> Days | None:
     The radiation is the global horizontal, or where there is none the direct normal and diffuse
     together: no sun position must enter it.
     """
-    steps = round(24 / weather.step_h)
+    steps = weather.per_day
     _, index, count = np.unique(
         weather.midpoints.normalize().asi8, return_index=True, return_counts=True
     )

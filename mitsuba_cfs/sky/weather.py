@@ -96,6 +96,11 @@ class Weather:
         return (self.first_weekday + days.day_of_year.to_numpy().astype(np.int64) - 1) % 7
 
     @property
+    def per_day(self) -> int:
+        """Time steps of a day."""
+        return round(24 / self.step_h)
+
+    @property
     def midpoints(self) -> pd.DatetimeIndex:
         """Middle of each interval [H], local standard time."""
         return self.times - pd.Timedelta(hours=self.step_h / 2)

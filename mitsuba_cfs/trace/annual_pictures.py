@@ -21,7 +21,7 @@ from scipy import sparse
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
-from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, flat
+from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, add_seen, flat
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
@@ -113,16 +113,7 @@ def view_matrices(
     if options.get("max_depth", 2) > 1:
         area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
         elements, close = sun_elements(tracer, area, view, pixels, half, tile, seed=seed)
-    least = 0.5 / options.get("samples", 32)
-    smooth = shared.smoothing(share, least)
-    # sharper for the windows' light, which changes fastest where other surfaces are close
-    sharper = smooth if close is None else shared.smoothing(share, least, close)
-    mean, noise = shared.of_halves(share, least)
-    for start in range(0, shape[1], KLEMS_FULL.size):
-        part = slice(start, start + KLEMS_FULL.size)
-        for rows, means in zip(sums, (smooth, sharper), strict=True):
-            of_halves = np.array(rows[:, part])
-            rows[:m, part], rows[m:, part] = (means @ (a @ of_halves) for a in (mean, noise))
+    mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     found = (None, None)
     if elements is not None:
         found = tuple(elements.of_rows(a, smooth) for a in (mean, noise))
@@ -146,6 +137,30 @@ def _summed(
         seen.append(sparse.csr_array(shown))
         start += len(block)
     return sparse.csr_array(sparse.vstack(seen))
+
+
+def _smooth(
+    sums: Sequence[NDArray[np.float32]],
+    shared: PictureRows,
+    share: NDArray[np.float32],
+    least: float,
+    close: NDArray[np.bool_] | None,
+) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array]:
+    """Turn sums by halves [2 m, N] into rows [m] and, below them, their noise [m], both smoothed.
+
+    Returns: from halves to rows and to their noise [m, 2 m], and the first sums' smoothing [m, m].
+    """
+    smooth = shared.smoothing(share, least)
+    # sharper for the windows' light, which changes fastest where other surfaces are close
+    sharper = smooth if close is None else shared.smoothing(share, least, close)
+    mean, noise = shared.of_halves(share, least)
+    m = len(shared.keys)
+    for start in range(0, sums[0].shape[1], KLEMS_FULL.size):
+        part = slice(start, start + KLEMS_FULL.size)
+        for rows, means in zip(sums, (smooth, sharper), strict=True):
+            of_halves = np.array(rows[:, part])
+            rows[:m, part], rows[m:, part] = (means @ (a @ of_halves) for a in (mean, noise))
+    return mean, noise, smooth
 
 
 def _add_rows(rows: NDArray, row: NDArray[np.int64], values: NDArray) -> None:
@@ -271,23 +286,20 @@ class FivePhasePictures:
         m, noise, rest = self._matrices, self._matrices.noise, self._lighting[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength).reshape(rest.shape)
-        more = None
+        rows = m.indirect.with_rows(noise.indirect).of_rows(self._reflected[:, batch])
+        rows += m.lit.with_rows(noise.lit).of_rows(rest + scattered)
         if self._elements is not None and noise.elements is not None:
-            more = self._sun.on_elements(noise.elements, suns, strength)
-        values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
-        m.indirect.with_rows(noise.indirect).add_to(values, self._reflected[:, batch], more)
-        beam = None
+            rows += self._sun.on_elements(noise.elements, suns, strength).T
         if self._light is not None:
-            beam = self._light.noise(self._sky[:, batch], self._faces[:, batch]).T
-        m.lit.with_rows(noise.lit).add_to(values, rest + scattered, beam)
+            rows += self._light.noise(self._sky[:, batch], self._faces[:, batch])
+        values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
+        m.lit.add_rows(values, rows)
         return values
 
     def _values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """Luminance [h, n] without the sun's disc."""
         rows, values = self.by_rows(batch)
-        m = self._matrices.lit
-        for hour, found in zip(values, rows, strict=True):
-            hour += found[m.row] * m.share
+        self._matrices.lit.add_rows(values, rows)
         return values
 
     def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -295,13 +307,12 @@ class FivePhasePictures:
         m, rest = self._matrices, self._lighting[:, batch]
         suns, strength = self._directions[batch], self._illuminance[batch]
         scattered = self._sun.scattered_luminance(suns, strength)
-        windows = m.seen @ self._scattered[:, batch]
+        values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
+        add_seen(values, m.seen, self._scattered[:, batch])
         seen = self._outdoors
         if seen is not None:
             sky = self._sky[:, batch]
-            windows += seen.sky @ sky
-        values = np.ascontiguousarray(windows.T, dtype=np.float32)
-        if seen is not None:
+            add_seen(values, seen.sky, sky)
             seen.sun.add_to(values, suns, strength, seen.reflected @ sky)
             if seen.rough is not None:
                 seen.rough.add_to(values, suns, strength)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import drjit as dr
 import mitsuba as mi
@@ -45,17 +45,7 @@ def cell_daylight(
     """
     tracer = kept_scene(surfaces, groups)
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
-    frames = np.concatenate(
-        [np.tile(g.frame, (len(c.area), 1, 1)) for g, c in zip(groups, cells, strict=True)]
-    )
-    corner, across, up = (
-        np.concatenate(values)
-        for values in (
-            [c.corner @ g.frame - tracer.centre for g, c in zip(groups, cells, strict=True)],
-            [c.sides[:, :1] * g.frame[0] for g, c in zip(groups, cells, strict=True)],
-            [c.sides[:, 1:] * g.frame[1] for g, c in zip(groups, cells, strict=True)],
-        )
-    )
+    frames, corner, across, up = _places(groups, cells, tracer.centre)
     C, K, P, n = len(corner), bins.size, sky.size, int(samples)
     tables = [vectors(v) for v in (corner, across, up)]
     axes = [vectors(frames[:, i]) for i in range(3)]
@@ -95,3 +85,17 @@ def cell_daylight(
         ),
     ).values  # fmt: skip
     return np.split(found, np.cumsum([len(c.area) for c in cells])[:-1])
+
+
+def _places(
+    groups: Sequence[WindowGroup], cells: Sequence[Cells], centre: NDArray[np.float64]
+) -> Iterator[NDArray[np.float64]]:
+    """Of all cells: frames [C, 3, 3], corners from the centre, and both sides [C, 3]."""
+    pairs = list(zip(groups, cells, strict=True))
+    for values in (
+        [np.tile(g.frame, (len(c.area), 1, 1)) for g, c in pairs],
+        [c.corner @ g.frame - centre for g, c in pairs],
+        [c.sides[:, :1] * g.frame[0] for g, c in pairs],
+        [c.sides[:, 1:] * g.frame[1] for g, c in pairs],
+    ):
+        yield np.concatenate(values)

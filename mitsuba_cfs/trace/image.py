@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
-from mitsuba_cfs.images.view import View, pixel_directions, rays
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
@@ -125,9 +125,7 @@ def _block(
     eye = tracer.place(view.position)
     number = column(pixels, mi.UInt32)
     for j, (dx, dy) in enumerate(pixel_places(samples)):
-        x = (pixels % view.width + dx) / view.width
-        y = 1.0 - (pixels // view.width + dy) / view.height
-        directions, exists = rays(view, x, y)
+        directions, exists = pixel_rays(view, pixels, dx, dy)
         add_picture_paths(
             tracer,
             bins,

@@ -22,18 +22,18 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
-from mitsuba_cfs.images.view import View, rays
+from mitsuba_cfs.images.view import View
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.picture_rows import PictureRows
 from mitsuba_cfs.trace.picture_sharing import tile_size
-from mitsuba_cfs.trace.sampling import column, lattice_2d, pixel_places, tables, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d, spread_rays, tables, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
 from mitsuba_cfs.trace.sun_discs import Scattering
 
-SAMPLES = 8  # of each pixel, each with a ray to a point of the windows and one by the cosine
-PATHS = 2**20  # of a view at most, but one of each pixel
+SAMPLES = 128  # of each tile, each with a ray to a point of the windows and one by the cosine
+PATHS = 2**22  # of a view at most, but one of each pixel
 RAYS = 2**19  # at once
 LEAST_SHARE = 0.02  # of a window patch that surfaces fill, below which few paths know their light
 
@@ -90,8 +90,9 @@ def beam_light(
         tile: as of `view_matrices`.
     """
     inside, outside = kept_scene(interior, groups), kept_scene(exterior, groups)
-    rows = PictureRows.of_view(inside, view, tile_size(view) if tile is None else tile)
-    samples = int(np.clip(PATHS // max(len(rows.pixels), 1), 1, SAMPLES))
+    tile = tile_size(view) if tile is None else tile
+    rows = PictureRows.of_view(inside, view, tile)
+    samples = int(np.clip(PATHS // max(len(rows.pixels), 1), 1, -(-SAMPLES // tile**2)))
     bins = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
     look = _Look(inside, outside, scattering, bins, view, samples)
     half, number = rows.half, rows.number
@@ -104,9 +105,9 @@ def beam_light(
         found = found + sparse.csr_array(sparse.coo_array(entries, shape=found.shape))
         share.append(opaque)
     seen, least = np.concatenate([np.empty(0, np.float32), *share]), 0.5 / samples
-    # by the tiles that touch alone: beside a window the light changes from tile to tile
-    smooth = rows.smoothing(seen, least, np.ones(len(rows.keys), dtype=bool))
-    mean, noise = (sparse.csr_array(smooth @ (a @ found)) for a in rows.of_halves(seen, least))
+    # rays enough and no smoothing: beside a window and below an overhang's edge a tile may have
+    # half the light of the next
+    mean, noise = (sparse.csr_array(a @ found) for a in rows.of_halves(seen, least))
     split = bins[1].size
     return BeamLight(
         transmittance, mean[:, :split], mean[:, split:], noise[:, :split], noise[:, split:]
@@ -177,11 +178,7 @@ class _Look:
         """What rays of pixels meet: place, normal, luminance by irradiance; if it is a window."""
         inside, samples = self._inside, self._samples
         eye = inside.place(self._view.position)
-        dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
-        pixel = np.repeat(pixels, samples)
-        x = (pixel % self._view.width + dx) / self._view.width
-        y = 1.0 - (pixel // self._view.width + dy) / self._view.height
-        directions, exists = rays(self._view, x, y)
+        directions, exists = spread_rays(self._view, pixels, samples)
         way, shown = vectors(directions), column(exists, mi.Bool)
         ray = mi.Ray3f(eye, way)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=True, active=shown)

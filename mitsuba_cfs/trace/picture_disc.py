@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.images.view import View, rays
+from mitsuba_cfs.images.view import View, pixel_rays
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 
 SUBPIXEL = np.radians(0.025)  # places on the sun's disc lie so close: the disc holds 360
@@ -67,9 +67,7 @@ def disc_rays(
     block = max(1, RAYS // count**2)  # a year of large pixels would fill the memory
     for start in range(0, len(pixels), block):
         number = pixels[start : start + block, None]
-        x = (number % view.width + dx) / view.width
-        y = 1.0 - (number // view.width + dy) / view.height
-        directions, exists = rays(view, x, y)
+        directions, exists = pixel_rays(view, number, dx, dy)
         cosine = np.einsum("ijk,ik->ij", directions, suns[start : start + block])
         pixel, place = np.nonzero(exists & (cosine >= np.cos(SUN_RADIUS)))
         owners.append(pixel + start)

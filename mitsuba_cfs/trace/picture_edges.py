@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.images.view import View, rays
-from mitsuba_cfs.trace.sampling import pixel_places
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.trace.sampling import spread_rays
 
 EDGE_PLACES = 8  # in a pixel at an edge: what is lit of it is known to a tenth
 
@@ -19,22 +19,23 @@ def edge_pixels(
     Args: pixels: [m] row * width + column; others count as their neighbours do.
     """
     row, column = np.divmod(pixels, view.width)
-    place = np.full((view.height + 2, view.width + 2), -1)
-    place[row + 1, column + 1] = np.arange(len(pixels))
-    crossed = np.zeros_like(lit)
-    for down, across in ((0, 1), (1, 0)):
-        other = place[row + 1 + down, column + 1 + across]
-        first = np.flatnonzero(other >= 0)
-        second = other[first]
-        unlike = lit[:, first] != lit[:, second]
-        crossed[:, first] |= unlike
-        crossed[:, second] |= unlike
-    hour, number = np.nonzero(crossed)
-    return hour, number
+    across = view.width + 2  # of a table with a border, so that every pixel has four neighbours
+    number_at = np.full((view.height + 2) * across, -1)
+    at = (row + 1) * across + column + 1
+    number_at[at] = np.arange(len(pixels))
+    found = []
+    for shown in lit:
+        number = np.flatnonzero(shown)  # of two that are unlike, one is lit: few are
+        crossed = [np.empty(0, dtype=np.int64)]
+        for step in (1, -1, across, -across):
+            other = number_at[at[number] + step]
+            unlike = (other >= 0) & ~shown[other]
+            crossed += [number[unlike], other[unlike]]
+        found.append(np.unique(np.concatenate(crossed)))
+    hour = np.repeat(np.arange(len(lit)), [len(numbers) for numbers in found])
+    return hour, np.concatenate([np.empty(0, dtype=np.int64), *found])
 
 
 def places_in_pixels(view: View, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
     """Directions [k * EDGE_PLACES, 3] of places spread over each of some pixels [k]."""
-    dx, dy = np.tile(pixel_places(EDGE_PLACES), (len(pixels), 1)).T
-    row, column = np.divmod(np.repeat(pixels, EDGE_PLACES), view.width)
-    return rays(view, (column + dx) / view.width, 1.0 - (row + dy) / view.height)[0]
+    return spread_rays(view, pixels, EDGE_PLACES)[0]

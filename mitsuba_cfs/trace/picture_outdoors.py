@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
-from mitsuba_cfs.images.view import View, pixel_directions, rays
+from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
@@ -30,7 +30,7 @@ from mitsuba_cfs.trace.sampling import (
     empty_sums,
     lattice_2d,
     path_generator,
-    pixel_places,
+    spread_rays,
     sums_of,
     tables,
     vectors,
@@ -127,11 +127,7 @@ def _through_windows(
     """Rays of a block's pixels that meet a window and go straight on."""
     eye = np.asarray(view.position) - inside.centre
     row = np.repeat(np.arange(len(pixels)), samples)
-    number = pixels[row]
-    dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
-    x = (number % view.width + dx) / view.width
-    y = 1.0 - (number // view.width + dy) / view.height
-    directions, exists = rays(view, x, y)
+    directions, exists = spread_rays(view, pixels, samples)
     start = np.tile(eye[:, None], len(row)).astype(np.float32)
     share = np.full(len(row), 1.0 / samples)
     lanes = Lanes(row, start, directions.T.astype(np.float32), share).some(np.flatnonzero(exists))

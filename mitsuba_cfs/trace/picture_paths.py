@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.images.view import View, pixel_directions, rays
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.lit_room import LitRoom, Sky
@@ -57,6 +57,7 @@ def point_in_time_picture(
     *,
     samples: int = 16,
     tile: int | None = None,
+    pixels: NDArray[np.int64] | None = None,
     max_depth: int = 24,
     seed: int = 0,
     disc: bool = True,
@@ -69,10 +70,11 @@ def point_in_time_picture(
         tile: pixels across of the squares that share slowly varying light, by default 0.9 degrees
             (2 pixels at least); 1: every pixel for itself, without smoothing, for a picture free
             of any assumption.
+        pixels: [n] row * width + column of those to trace, by default all that show something.
         disc: the sun's disc too; without it, it is to be rated apart (`path_disc.disc_seen`).
     """
     tile = tile_size(view) if tile is None else tile
-    shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
+    shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
     shifts = np.random.default_rng(seed).random((len(shown), 2))
     tiles, numbers = Tiles(tile, view.width), _Faces(room)
     picture = np.zeros(view.height * view.width)
@@ -82,13 +84,13 @@ def point_in_time_picture(
     pairs, rows = [], []
     size = max(1, BLOCK // samples)
     for start in range(0, len(shown), size):
-        pixels = shown[start : start + size]
-        sharp, shared = kernel.trace(pixels, shifts[start : start + size])
-        picture[pixels] = sharp
+        block = shown[start : start + size]
+        sharp, shared = kernel.trace(block, shifts[start : start + size])
+        picture[block] = sharp
         for light in shared:
-            pairs.append(light.by_pixel(pixels, samples))
-            rows.append(light.by_tile(pixels, samples, tiles))
-        progress("picture", (start + len(pixels)) / len(shown))
+            pairs.append(light.by_pixel(block, samples))
+            rows.append(light.by_tile(block, samples, tiles))
+        progress("picture", (start + len(block)) / len(shown))
     _add_shared(picture, tiles, pairs, rows, numbers.windows)
     add_mirrored_discs(picture, room, sky, view)
     if disc:
@@ -210,10 +212,8 @@ class _Kernel:
         """The pixels' own light [n], and the light of their rays that is to be shared."""
         n = self._samples
         number = np.repeat(pixels, n)
-        places = np.mod(self._places + shifts[:, None], 1.0).reshape(-1, 2)
-        x = (number % self._view.width + places[:, 0]) / self._view.width
-        y = 1.0 - (number // self._view.width + places[:, 1]) / self._view.height
-        directions, exists = rays(self._view, x, y)
+        across, down = np.mod(self._places + shifts[:, None], 1.0).reshape(-1, 2).T
+        directions, exists = pixel_rays(self._view, number, across, down)
         way = vectors(directions)
         path = mi.UInt32(number.astype(np.uint32)) * n + dr.arange(mi.UInt32, len(number)) % n
         generator = path_generator(path, self._key)

@@ -196,7 +196,8 @@ class PictureSun:
             if edges:
                 self._look_again(found, suns[part], strength[part])
             for row, hour_values in zip(lit[part], found, strict=True):
-                values[row, columns] += hour_values
+                some = np.flatnonzero(hour_values)  # the sun falls on few pixels
+                values[row, columns[some]] += hour_values[some]
 
     def _beam_on_surfaces(self, pixel, hour, suns, light) -> mi.Float:
         """Luminance of the surfaces where the windows' straight beam falls on them."""

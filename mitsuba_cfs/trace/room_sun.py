@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mitsuba_cfs.images.view import View, pixel_solid_angles, rays
+from mitsuba_cfs.images.view import View, pixel_solid_angles
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS, numbered
-from mitsuba_cfs.trace.sampling import column, lattice_2d, pixel_places, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d, spread_rays, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 
@@ -35,7 +35,7 @@ POINTS = 4  # on each, that the sun is taken at; one on those near a tile
 PATHS = 2**19  # of a view at most, but one of each pixel
 RAYS = 2**18  # at once
 NEAR_TILES = 12  # [tiles' widths] that a surface is near within, twice what smoothing spans
-NEAR_RAYS = 256  # of each tile to what is near
+NEAR_RAYS = 1024  # of each tile to what is near: narrow strips of sun beside a corner are small
 FINENESS = 0.5  # edge of an element near a tile over how near it is
 HALVINGS = 4  # of the elements' edge at most
 
@@ -154,10 +154,7 @@ class _Look:
     def _shown(self, pixels: NDArray[np.int64], samples: int) -> _Shown:
         tracer, view = self._tracer, self._view
         eye = tracer.place(view.position)
-        dx, dy = np.tile(pixel_places(samples), (len(pixels), 1)).T
-        number = np.repeat(pixels, samples)
-        x, y = (number % view.width + dx) / view.width, number // view.width + dy
-        directions, exists = rays(view, x, 1.0 - y / view.height)
+        directions, exists = spread_rays(view, pixels, samples)
         way = vectors(directions)
         ray = mi.Ray3f(eye, way)
         exist = column(exists, mi.Bool)

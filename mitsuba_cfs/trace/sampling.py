@@ -11,6 +11,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.images.view import View, pixel_rays
+
 SHIFT_ROUNDS = 8
 PADDED = 1 << 21  # sums from which on their number is what is asked for
 ALIGNMENT = 64  # of memory that kernels load whole vectors from [bytes]
@@ -155,3 +157,11 @@ def pixel_places(samples: int) -> NDArray[np.float64]:
     root = 1.324717957244746  # of x^3 = x + 1
     steps = np.arange(samples)[:, None] * np.array([1 / root, 1 / root**2])
     return np.mod(0.5 + steps, 1.0)
+
+
+def spread_rays(
+    view: View, pixels: NDArray[np.int64], samples: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Rays [n * samples, 3] evenly spread over each of some pixels [n], and where there is one."""
+    across, down = np.tile(pixel_places(samples), (len(pixels), 1)).T
+    return pixel_rays(view, np.repeat(pixels, samples), across, down)

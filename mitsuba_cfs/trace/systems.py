@@ -14,7 +14,7 @@ from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
 from mitsuba_cfs.bsdf.plugin import klems_plugin
-from mitsuba_cfs.bsdf.tensor_peak import through_peak as tree_peak
+from mitsuba_cfs.bsdf.tensor_peak import without_beam
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.trace.direct_sun import KlemsScattering, PluginScattering
@@ -49,7 +49,7 @@ def lit_system(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
     if angular is not None:
         return _specular_system(bsdf, angular)
     if isinstance(bsdf, TensorTreeBsdf):
-        return PathOptics(_loaded(tensor_tree_plugin(_without_beam(bsdf))), TreeBeam(bsdf))
+        return PathOptics(_loaded(tensor_tree_plugin(without_beam(bsdf))), TreeBeam(bsdf))
     front = through_peak(bsdf.filled().transmission_front, bsdf.basis_in)
     beam = PatchBeam(bsdf.basis_in, front.transmittance, specular_exponent(front, bsdf.basis_in))
     return PathOptics(_loaded(klems_plugin(without_peaks(bsdf, "transmission"))), beam)
@@ -76,7 +76,7 @@ def _specular_system(bsdf: Bsdf, angular: AngularTable) -> PathOptics:
         mirrors = [None, None]  # the data's, on both sides
     beam = AngularBeam(angular.by_cosine())
     if isinstance(bsdf, TensorTreeBsdf):
-        trees = _without_beam(bsdf)
+        trees = without_beam(bsdf)
         if "reflection" in kinds:
             trees = TensorTreeBsdf(
                 transmission_front=trees.transmission_front,
@@ -146,15 +146,6 @@ class TreeScattering(PluginScattering):
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
         return self._beam.at(sun)
-
-
-def _without_beam(bsdf: TensorTreeBsdf) -> TensorTreeBsdf:
-    """The trees without what goes straight on."""
-    trees = {
-        name: tree_peak(tree)[0] if name.startswith("transmission") else tree
-        for name, tree in bsdf.blocks().items()
-    }
-    return TensorTreeBsdf(**trees)
 
 
 def _loaded(entry: dict) -> mi.BSDF:

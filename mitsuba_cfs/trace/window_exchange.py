@@ -1,11 +1,14 @@
-"""What windows see of the room that they light themselves: for the light that they reflect."""
+"""What windows see of what they light themselves, either side: for the light that they reflect."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -71,3 +74,35 @@ def window_exchange(
             by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
+
+
+def outdoor_exchange(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    *,
+    samples: int = 128,
+    max_depth: int = 16,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
+) -> NDArray[np.float64]:
+    """Radiance that meets the windows from outdoors, per unit that they send there [G, K, G * K].
+
+        I[g, k] = sum over g', k' of X[g, k, g' k'] L[g', k']
+
+    for incident and outgoing patches of the front; arguments as for `window_exchange`.
+    """
+    found = window_exchange(
+        surfaces, [_turned(group) for group in groups], samples=samples, max_depth=max_depth,
+        stopping=stopping, seed=seed, cache=cache,
+    ).values  # fmt: skip
+    theta, phi = KLEMS_FULL.centres()
+    patch = KLEMS_FULL.index(theta, np.pi - phi)  # x of the turned windows is that of the others, -
+    columns = (np.arange(len(groups))[:, None] * KLEMS_FULL.size + patch).ravel()
+    return found[:, patch][:, :, columns]
+
+
+def _turned(group: WindowGroup) -> WindowGroup:
+    """The same windows looked at from the room: their exterior is on that side."""
+    turned = (replace(w, triangles=w.triangles[:, ::-1]) for w in group.windows)
+    return replace(group, windows=tuple(turned))

@@ -41,7 +41,6 @@ PERIOD = (LENGTH, LENGTH)
 BAND_OPTION = click.option(
     "--band", default="Visible", show_default=True, help="Of the file: Visible or Solar."
 )
-INCIDENT = {"type": ANGLES, "metavar": "THETA PHI", "help": "To the light; in degrees."}
 
 
 @click.group("bsdf")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from bim.model import Building, Space
+    from scenes.fenestration_exports import KnownFenestration
 
 PATTERNS = {  # of the files that an export writes
     "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml", "run.sh"),
@@ -178,21 +179,8 @@ def export(
     for field, path in files.items():
         if path is not None:
             check_file(path, field=field, inputs=[building])
-    formats: dict[Path, list[str]] = {}
-    for option, parent in (("--radiance", radiance), ("--mitsuba", mitsuba)):
-        if parent is not None:
-            formats.setdefault(parent, []).append(option)
-    folders = {
-        parent: ResultFolder(parent, "ifc export", adding=True, field=options[0])
-        for parent, options in formats.items()
-    }
-    from bim.gbxml.write import write_gbxml
-    from bim.honeybee.write import write_honeybee
+    folders = _folders({"--radiance": radiance, "--mitsuba": mitsuba})
     from bim.ifc.building import read_ifc
-    from bim.to_energyplus import write_epjson
-    from bim.to_gltf import write_gltf
-    from bim.to_mitsuba import write_mitsuba
-    from bim.to_radiance import write_radiance
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
     from scenes.run.inputs import named_spaces
@@ -201,6 +189,40 @@ def export(
         read = read_ifc(building, join=join, furniture=furniture, progress=progress)
     chosen = named_spaces(read, spaces, building)
     known = known_fenestration(chosen, building)
+    _export_folders(read, chosen, known, folders)
+    exported = replace(read, spaces=tuple(chosen))
+    assumed = _export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)
+    if gltf is not None:
+        from bim.to_gltf import write_gltf
+
+        write_gltf(exported, gltf)
+        click.echo(gltf)
+    notes = known.notes() if folders or epjson or honeybee or gbxml else ()
+    for note in (*notes, *assumed):
+        click.echo(f"note: {note}")
+
+
+def _folders(asked: Mapping[str, Path | None]) -> dict[Path, tuple[ResultFolder, list[str]]]:
+    """The folders to write, each with the options that name it: formats may share one."""
+    formats: dict[Path, list[str]] = {}
+    for option, parent in asked.items():
+        if parent is not None:
+            formats.setdefault(parent, []).append(option)
+    return {
+        parent: (ResultFolder(parent, "ifc export", adding=True, field=options[0]), options)
+        for parent, options in formats.items()
+    }
+
+
+def _export_folders(
+    read: Building,
+    chosen: Sequence[Space],
+    known: KnownFenestration,
+    folders: Mapping[Path, tuple[ResultFolder, list[str]]],
+) -> None:
+    """Write a folder for each room with a window into each folder of results."""
+    from bim.to_mitsuba import write_mitsuba
+    from bim.to_radiance import write_radiance
 
     def radiance_room(space: Space, building: Building, folder: Path) -> None:
         write_radiance(space, building, folder, filled=known.groups(space))
@@ -209,37 +231,38 @@ def export(
         write_mitsuba(space, building, folder, bsdfs=known.bsdfs())
 
     writers = {"--radiance": radiance_room, "--mitsuba": mitsuba_room}
-    for parent, folder in folders.items():
+    for parent, (folder, options) in folders.items():
         written: list[str] = []
-        kinds = {pattern for option in formats[parent] for pattern in PATTERNS[option]}
+        kinds = {pattern for option in options for pattern in PATTERNS[option]}
 
         def of_these(name: str, written=written, kinds=kinds) -> bool:
             file = Path(name).name
             return name.partition("/")[0] in written and any(fnmatch(file, k) for k in kinds)
 
         with folder.replaced(gone=of_these) as place:
-            written += _export_rooms(
-                read, chosen, place, [writers[option] for option in formats[parent]]
-            )
+            written += _export_rooms(read, chosen, place, [writers[one] for one in options])
         for name in written:
             click.echo(parent / name)
-    assumed: tuple[str, ...] = ()
-    states = any(path is not None for path in (epjson, honeybee, gbxml))  # U and g of windows
-    if states:
-        u_and_g, assumed = known.u_and_g()
-    for path, write in ((honeybee, write_honeybee), (gbxml, write_gbxml)):
+
+
+def _export_files(
+    building: Building, known: KnownFenestration, **files: Path | None
+) -> tuple[str, ...]:
+    """Write the models that state U and g of windows, by format; what of these is assumed."""
+    from bim.gbxml.write import write_gbxml
+    from bim.honeybee.write import write_honeybee
+    from bim.to_energyplus import write_epjson
+
+    if not any(files.values()):
+        return ()
+    writers = {"honeybee": write_honeybee, "gbxml": write_gbxml, "epjson": write_epjson}
+    u_and_g, assumed = known.u_and_g()
+    for name, write in writers.items():
+        path = files[name]
         if path is not None:
-            write(replace(read, spaces=tuple(chosen)), path, known=u_and_g)
+            write(building, path, known=u_and_g)
             click.echo(path)
-    if epjson is not None:
-        write_epjson(read, epjson, spaces=chosen, known=u_and_g)
-        click.echo(epjson)
-    if gltf is not None:
-        write_gltf(replace(read, spaces=tuple(chosen)), gltf)
-        click.echo(gltf)
-    notes = known.notes() if folders or states else ()
-    for note in (*notes, *assumed):
-        click.echo(f"note: {note}")
+    return assumed
 
 
 def _export_rooms(

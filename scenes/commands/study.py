@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +11,10 @@ from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import method_option, out_folder_option, write_ifc_option
+
+if TYPE_CHECKING:
+    from scenes.study.plan import StudyPlan
+    from scenes.study.study import StudyResult
 
 
 @click.command()
@@ -62,7 +67,6 @@ def command(
         check_dask()
     check_files(parsed)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.run.inputs import read_weather
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
     from scenes.study.study import run_study, write_study
@@ -72,11 +76,7 @@ def command(
     if parsed.quick:
         click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
-    for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
-        click.echo(f"auto: {why}")
-    for path in dict.fromkeys(case.weather.path for case in plan.cases):
-        for note in read_weather(path).notes:
-            click.echo(f"note: {note}")
+    _print_plan(plan)
     with ProgressBar() as progress:
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
@@ -85,12 +85,7 @@ def command(
     nothing = result.failed == len(result.results)
     report = None if nothing else lambda path: write_study_report(result, path)
     write_study(parsed, result, store, report)
-    click.echo(
-        f"{len(result.results)} cases: {result.reused} were there, {result.failed} failed, "
-        f"{result.seconds:.0f} s; table: {out / 'results.parquet'}"
-    )
-    if result.clock:
-        click.echo(f"auto: {result.clock}")
+    _print_outcome(result, out)
     failed, total = result.failed, len(result.results)
     if nothing:
         raise click.ClickException(f"{failed} of {total} cases failed: {result.first_error}")
@@ -104,6 +99,27 @@ def command(
             f"{failed} of {total} cases failed, the first: {result.first_error}; "
             f"the others are kept, and the same command tries these again"
         )
+
+
+def _print_plan(plan: StudyPlan) -> None:
+    """Why methods were chosen, and what was noticed of the weather."""
+    from scenes.run.inputs import read_weather
+
+    for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
+        click.echo(f"auto: {why}")
+    for path in dict.fromkeys(case.weather.path for case in plan.cases):
+        for note in read_weather(path).notes:
+            click.echo(f"note: {note}")
+
+
+def _print_outcome(result: StudyResult, out: Path) -> None:
+    """How many cases there are, and what they took."""
+    click.echo(
+        f"{len(result.results)} cases: {result.reused} were there, {result.failed} failed, "
+        f"{result.seconds:.0f} s; table: {out / 'results.parquet'}"
+    )
+    if result.clock:
+        click.echo(f"auto: {result.clock}")
 
 
 def _print_case(case, result, ready: int, total: int) -> None:

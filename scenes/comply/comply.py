@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from scenes.comply.light import lights_of, sensor_grid_of
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
+from scenes.comply.solar import solar_sentences
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
@@ -39,6 +41,10 @@ from scenes.run.building import read_building
 from scenes.run.inputs import named_spaces
 from scenes.run.rooms import RoomSeries
 
+# the parts of a room's light, as the dossier's last line names their seconds
+PARTS = TRACING, SUMS, GLARE, HEAT = (
+    "V and D", "light and blinds of every hour", "glare by pictures", "temperatures",
+)  # fmt: skip
 LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat"}), frozenset({"view", "sun"})
 
 
@@ -52,7 +58,7 @@ def check_building(
     files = files or read_files(options)
     if options.building is None:
         raise ValueError("a check of a file needs its building")
-    steps = part(progress, 0.1, 1.0)
+    start, steps = time.monotonic(), part(progress, 0.1, 1.0)
     building = read_building(
         options.building,
         join=options.join,
@@ -60,7 +66,9 @@ def check_building(
         apertures=options.apertures,
         progress=steps,
     )
-    return check_rooms(building, options, files, progress)
+    reading = round(time.monotonic() - start, 1)
+    result = check_rooms(building, options, files, progress)
+    return replace(result, seconds={"reading": reading, **result.seconds})
 
 
 def check_rooms(
@@ -116,7 +124,7 @@ class Check:
             self.systems = open_and_closed(systems, files.closed)
         self.building = traced_building(building, self.systems)
         self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
-        self.notes += files.weather.notes
+        self.notes += [*solar_sentences(self.systems), *files.weather.notes]
         self.hidden, self.glass = windows_without_view(windows, self.systems)
         self.calendar = calendar_of(files.weather)
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
@@ -172,7 +180,7 @@ class Check:
                 continue
             found[space.guid] = view, sun_exposure(space, self.outdoors, self.day)
         self.progress("view and sunlight", 1.0)
-        self.seconds["view and sunlight"] = round(time.monotonic() - start, 1)
+        self._took({"view and sunlight": time.monotonic() - start})
         return found, problems
 
     def lights(self, spaces: list[Space]) -> tuple[dict[str, RoomLights], list[Problem], list[str]]:
@@ -195,7 +203,8 @@ class Check:
             self.building, spaces, self.systems, options.room.sampling, cache, compute,
             moved_lights, options.building,
         ).results(self.progress)  # fmt: skip
-        self.seconds["light"] = round(time.monotonic() - start, 1)
+        left = time.monotonic() - start - sum(self.seconds.get(name, 0.0) for name in PARTS)
+        self._took({"what else light takes": max(left, 0.0)})
         return {result.space.guid: result for result in results}, problems, notes
 
     def _light(
@@ -214,11 +223,16 @@ class Check:
         }
         if self.moving and self.shaded:
             operated = operated or {0}
-        found = lights_of(room, operated)
+        room.timed(TRACING, lambda: room.traced.trace("sDGP"))
+        found = room.timed(SUMS, lambda: lights_of(room, operated))
         closed = next((one.closed for one in found if one.closed is not None), None)
         closed = closed if self.shaded else None
-        glare = self._glare(room, closed) if self.glaring else None
-        heat = room_heat(room, closed) if "heat" in self.parts else None
+        glare = heat = None
+        if self.glaring:
+            glare = room.timed(GLARE, lambda: self._glare(room, closed))
+        if "heat" in self.parts:
+            heat = room.timed(HEAT, lambda: room_heat(room, closed))
+        self._took(room.seconds)
         of_room = Findings(self.calendar, glare=glare, heat=heat)
         lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
         values = {
@@ -229,6 +243,11 @@ class Check:
         by_rule = {name: summaries[id(light)] for name, light in lights.items()}
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
+
+    def _took(self, seconds: Mapping[str, float]) -> None:
+        """Add what parts of the check took."""
+        for name, value in seconds.items():
+            self.seconds[name] = round(self.seconds.get(name, 0.0) + value, 1)
 
     def _glare(self, room: RoomSimulation, closed: NDArray[np.bool_] | None) -> SeatGlare:
         """Glare of a room's seats with its blinds closed [H, G]; None: open all year."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from scenes.comply.findings import Findings
 from scenes.comply.need import Need
-from thermal.comfort import adaptive_comfort, running_mean_en16798
+from thermal.comfort import comfort_by_outdoors, degree_hours
 
 
 class DegreeHours(Need):
@@ -31,9 +31,9 @@ class DegreeHours(Need):
         """Degree hours [K h]."""
         if room.heat is None:
             return None
-        above = np.maximum(room.heat.operative_c - self.above_c, 0.0)
-        counted = above if self.all_hours else above[room.heat.occupied]
-        return float(room.step_h * counted.sum())
+        operative_c = room.heat.operative_c
+        counted = operative_c if self.all_hours else operative_c[room.heat.occupied]
+        return degree_hours(counted, self.above_c, step_h=room.step_h)
 
 
 class ComfortShare(Need):
@@ -55,7 +55,7 @@ class ComfortShare(Need):
         """Share, 0 to 1, of the hours whose running mean outdoors is in the band's range."""
         if room.heat is None:
             return None
-        mean = running_mean_en16798(room.heat.outdoor_c)
-        found = adaptive_comfort(room.heat.operative_c, mean, self.band)
+        heat, per_day = room.heat, round(24 / room.step_h)
+        found = comfort_by_outdoors(heat.operative_c, heat.outdoor_c, self.band, per_day=per_day)
         counted = room.heat.occupied & found.applicable
         return float(np.mean(found.comfortable[counted])) if counted.any() else None

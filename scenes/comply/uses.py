@@ -20,8 +20,6 @@ WORDS = Path(str(files(__package__) / "uses.toml"))
 GERMAN = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 BEGINNING = 5  # letters from which on a word may also begin a longer one
 
-Texts = Mapping[str, Sequence[tuple[str, str]]]  # by GUID: where it is said, and the text
-
 
 class UseTable(TomlTable):
     """A use of rooms, and the words by which it is known."""

@@ -58,23 +58,29 @@ def rated_state(path: Path, *, place: str | None, glazing: str | None, kappa: fl
     """
     system = read_system(path)
     heat = checked_system(system, path)
-    tau, rho = (float(np.clip(v[0], 0.0, 1.0)) for v in (heat.transmittance, heat.reflectance))
     if place is not None and glazing is not None:
         known = REFERENCE_GLAZINGS[glazing]
+        tau, rho = (float(np.clip(v[0], 0.0, 1.0)) for v in (heat.transmittance, heat.reflectance))
         return RatedState(
             path, system, heat, tuple(shade_ratings(tau, rho, place, known, kappa=kappa))
         )
-    ratings = [
-        ThermalRating("heat balance", heat.fenestration.u_value, tau, float(heat.g_value[0]))
-    ]
+    try:
+        return RatedState(path, system, heat, tuple(system_ratings(system, heat)))
+    except ThermalInputError as error:
+        raise DataError(error.message, file=path.with_suffix(".toml")) from error
+
+
+def system_ratings(system: FenestrationSystem, heat: ThermalSystem) -> list[ThermalRating]:
+    """What the heat balance takes of a system, and the standards' ratings of known layers.
+
+    Raises: `ThermalInputError` for layers that do not go together.
+    """
+    tau, rho = (float(np.clip(v[0], 0.0, 1.0)) for v in (heat.transmittance, heat.reflectance))
+    found = [ThermalRating("heat balance", heat.fenestration.u_value, tau, float(heat.g_value[0]))]
     unit = None if system.closure is None else system.closure.unit
     if unit is not None:
-        try:
-            absorbed = sun_in_layers(unit, [tau], [rho], [0.0])[0]
-            ratings += layered_ratings(unit, tau, absorbed)
-        except ThermalInputError as error:
-            raise DataError(error.message, file=path.with_suffix(".toml")) from error
-    return RatedState(path, system, heat, tuple(ratings))
+        found += layered_ratings(unit, tau, sun_in_layers(unit, [tau], [rho], [0.0])[0])
+    return found
 
 
 def thermal_toml(state: RatedState) -> str:

@@ -39,7 +39,7 @@ def design_loads(
 
     Returns: a row a room and case: day, outdoor mean and extreme [degC], peak [W] and its hour.
     """
-    whole, hours, day_rows = climate(weather), len(weather.times), round(24 / weather.step_h)
+    whole, hours, day_rows = climate(weather), len(weather.times), weather.per_day
     zones = [_unlimited(room.zone) for room in rooms]
     row_s = 3600.0 * weather.step_h
     options = {"step_s": min(step_s, row_s), "row_s": row_s, "air_links": air_links}

@@ -8,13 +8,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.weather import Weather
 from thermal.balance import ZoneResult
-from thermal.comfort import (
-    ADAPTIVE_BANDS,
-    adaptive_comfort,
-    running_mean,
-    running_mean_en16798,
-    summarise,
-)
+from thermal.comfort import ADAPTIVE_BANDS, comfort_by_outdoors, degree_hours, summarise
 
 FloatArray = NDArray[np.float64]
 CATEGORIES = ("I", "II", "III")  # of ADAPTIVE_BANDS
@@ -50,11 +44,6 @@ def hourly_table(
     return pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
 
 
-def rows_per_day(weather: Weather) -> int:
-    """Time steps of a day."""
-    return round(24.0 / weather.step_h)
-
-
 def _in_hours(counts: NDArray[np.int64], weather: Weather) -> NDArray:
     """Counts of time steps as hours; whole ones stay whole."""
     return counts if weather.step_h == 1.0 else counts * weather.step_h
@@ -68,22 +57,23 @@ def comfort_summary(
     The adaptive categories count where the running mean lies in the standard's range; a category
     holds the hours of those before it.
     """
-    found = {}
-    mean = running_mean_en16798(weather.dry_bulb_c, per_day=rows_per_day(weather))
+    operative_c, step_h = result.operative_c, weather.step_h
+    steps = {}
     for name in CATEGORIES:
-        band = adaptive_comfort(result.operative_c, mean, f"EN 16798-1 {name}")
-        found[f"adaptive_{name}_h"] = np.count_nonzero(band.comfortable & occupied)
+        band = comfort_by_outdoors(
+            operative_c, weather.dry_bulb_c, f"EN 16798-1 {name}", per_day=weather.per_day
+        )
+        steps[f"adaptive_{name}_h"] = np.count_nonzero(band.comfortable & occupied)
     inside = band.applicable & occupied
-    found["adaptive_IV_h"] = np.count_nonzero(inside) - found["adaptive_III_h"]
+    steps["adaptive_IV_h"] = np.count_nonzero(inside) - steps["adaptive_III_h"]
     for name, limit in PMV_CATEGORIES.items():
-        found[f"pmv_{name}_h"] = np.count_nonzero((np.abs(pmv) < limit) & occupied)
-    warm = np.maximum(result.operative_c - WARM, 0.0)
-    found["above_26_h"] = np.count_nonzero((warm > 0) & occupied)
-    found["above_26_kh"] = warm[occupied].sum()
-    found["above_26_kh_all_hours"] = warm.sum()
-    found = {key: float(value) * weather.step_h for key, value in found.items()}
-    mean_vote = pmv[occupied].mean() if occupied.any() else pmv.mean()
-    return found | {"pmv_mean": float(mean_vote)}
+        steps[f"pmv_{name}_h"] = np.count_nonzero((np.abs(pmv) < limit) & occupied)
+    steps["above_26_h"] = np.count_nonzero((operative_c > WARM) & occupied)
+    return {key: float(count) * step_h for key, count in steps.items()} | {
+        "above_26_kh": degree_hours(operative_c[occupied], WARM, step_h=step_h),
+        "above_26_kh_all_hours": degree_hours(operative_c, WARM, step_h=step_h),
+        "pmv_mean": float(pmv[occupied].mean() if occupied.any() else pmv.mean()),
+    }
 
 
 def year_summary(
@@ -99,13 +89,11 @@ def year_summary(
         "operative_min_c": result.operative_c.min(),
         "operative_max_c": result.operative_c.max(),
     }
-    means = {
-        "ASHRAE": running_mean(weather.dry_bulb_c, per_day=rows_per_day(weather)),
-        "EN": running_mean_en16798(weather.dry_bulb_c, per_day=rows_per_day(weather)),
-    }
     months = {}
     for band in ADAPTIVE_BANDS:
-        comfort = adaptive_comfort(result.operative_c, means[band.split()[0]], band)
+        comfort = comfort_by_outdoors(
+            result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day
+        )
         counted = summarise(comfort, occupied, month)
         found[f"comfortable_h {band}"] = counted.comfortable * weather.step_h
         months[f"{band} [h]"] = _in_hours(counted.discomfort_by_month, weather)

@@ -1,4 +1,8 @@
-"""Glass between rooms: window groups of a room whose outdoors is another room with windows."""
+"""Glass between rooms: window groups of a room whose outdoors is another room with windows.
+
+A room without windows that such glass lights passes light on: each room takes light from rooms that
+are no more panes away from the nearest window than it is, and these from rooms that are fewer away.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +31,7 @@ from scenes.room.windows import room_windows
 
 CLEAR = 0.88  # visible transmittance of glass that states none: a float pane of 6 mm, EN 410
 SAME_SIZE = 0.05  # share by which the pane may differ as the two rooms have it
+PANE = "glass between rooms"  # name of a pane as the room beyond has it: opaque
 THINNEST = 1e-3  # walls up to this have no reveal [m]
 
 
@@ -40,29 +45,50 @@ class InnerGlass:
     beyond: tuple[RoomBeyond, ...]  # [I]
     names: tuple[str, ...]  # [I] labels of the rooms beyond
     area: float  # of the glass [m2]
+    faces: frozenset[str]  # names of the room's faces that this glass is
 
 
-def lit_neighbours(building: Building, space: Space) -> list[Space]:
-    """The rooms with windows that glass of a room leads to, as far as both rooms agree on it."""
-    pairs = _panes(building, space)
-    return [other for other in building.spaces if other.guid in pairs and other.windows]
+def lending_rooms(building: Building, space: Space) -> list[Space]:
+    """The rooms that a room gets light from through glass, and those that they get it from."""
+    away = _panes_to_windows(building)
+    found: dict[str, Space] = {}
+    left = _lenders(building, space, away, away.get(space.guid, -1) + 1)
+    while left:
+        room = left.pop(0)
+        if room.guid not in found:
+            found[room.guid] = room
+            left += _lenders(building, room, away, away[room.guid])
+    return list(found.values())
 
 
 def inner_glass(
     building: Building, space: Space, systems: Mapping[str, States]
 ) -> InnerGlass | None:
-    """The glass of a room to rooms with windows; None where there is none.
+    """The glass of a room to rooms that daylight reaches; None where there is none.
 
     The windows there are in their first state, the glass between is a clear pane of the
     transmittance that it states.  The wall's thickness is a tube of reveals beyond the glass.
 
-    Args: systems: of the windows of both rooms, by their GUID.
+    Args: systems: of the windows of all these rooms, by their GUID.
     """
+    away = _panes_to_windows(building)
+    return _inner_glass(building, space, systems, away, away.get(space.guid, -1) + 1)
+
+
+def _inner_glass(
+    building: Building,
+    space: Space,
+    systems: Mapping[str, States],
+    away: Mapping[str, int],
+    below: int,
+) -> InnerGlass | None:
+    """That to rooms fewer than so many panes away from a window."""
     found, used = [], []
     dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun comes by patches
-    for other in lit_neighbours(building, space):
+    for other in _lenders(building, space, away, below):
         pairs = _panes(building, space)[other.guid]
-        scene, transmission = _lit_room(building, other, pairs, systems)
+        onward = _inner_glass(building, other, systems, away, away[other.guid])
+        scene, transmission = _room_beyond(building, other, pairs, systems, onward)
         used += [face for face, _ in pairs]
         for optics, group in _groups(space, [face for face, _ in pairs]):
             given = GivenOptics(optics.transmission, dark, reflection=optics.reflection)
@@ -72,10 +98,10 @@ def inner_glass(
             found.append((named, (given,), beyond, other.label))
     if not found:
         return None
-    names = {face.name for face in used}
+    names = frozenset(face.name for face in used)
     rest = replace(space, faces=tuple(face for face in space.faces if face.name not in names))
     area = sum(face.area for face in used)
-    return InnerGlass(furnished_surfaces(rest), *map(tuple, zip(*found, strict=True)), area)
+    return InnerGlass(furnished_surfaces(rest), *map(tuple, zip(*found, strict=True)), area, names)
 
 
 def borrowed_share(space: Space, light: PhaseLight, inner: InnerGlass | None) -> str:
@@ -93,6 +119,27 @@ def borrowed_share(space: Space, light: PhaseLight, inner: InnerGlass | None) ->
         f"m2 of glass from {', '.join(dict.fromkeys(inner.names))}; the sun comes through it by "
         "sky patches, blinds there are in their first state, the heat balance has none of it."
     )
+
+
+def _panes_to_windows(building: Building) -> dict[str, int]:
+    """How many panes lie between a room and the nearest with windows; of rooms with light only."""
+    rooms = {space.guid: space for space in building.spaces}
+    found = {space.guid: 0 for space in building.spaces if space.windows}
+    newest = list(found)
+    while newest:
+        reached = {guid for one in newest for guid in _panes(building, rooms[one])} - found.keys()
+        found |= dict.fromkeys(reached, found[newest[0]] + 1)
+        newest = sorted(reached)
+    return found
+
+
+def _lenders(building: Building, space: Space, away: Mapping[str, int], below: int) -> list[Space]:
+    """The rooms behind a room's panes that are fewer than so many panes away from a window."""
+    pairs = _panes(building, space)
+    return [
+        other for other in building.spaces
+        if other.guid in pairs and away.get(other.guid, below) < below
+    ]  # fmt: skip
 
 
 def _panes(building: Building, space: Space) -> dict[str, list[tuple[Face, Face]]]:
@@ -144,18 +191,19 @@ def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[BsdfOptics, Windo
     return found
 
 
-def _lit_room(
+def _room_beyond(
     building: Building,
     room: Space,
     pairs: Sequence[tuple[Face, Face]],
     systems: Mapping[str, States],
+    onward: InnerGlass | None,
 ) -> tuple[DaylightScene, tuple[NDArray[np.float64], ...]]:
-    """The room beyond seen from the panes of another one, and T of its windows."""
-    away = {back.name for _, back in pairs}
-    kept = [face for face in room.faces if face.name not in away]
-    glass = [_piece(face.pane.guid, face.triangles, GLASS_REFLECTANCE) for face, _ in pairs]
+    """The room beyond seen from the panes of another one, and T of all glass that lights it."""
+    open_ = {back.name for _, back in pairs} | (set() if onward is None else onward.faces)
+    kept = [face for face in room.faces if face.name not in open_]
+    glass = [_piece(face, PANE, face.triangles, GLASS_REFLECTANCE) for face, _ in pairs]
     reveals = [
-        _piece(face.pane.guid, _tube(face, _depth(face, back)), ROOM_REFLECTANCE["reveal"])
+        _piece(face, "reveal", _tube(face, _depth(face, back)), ROOM_REFLECTANCE["reveal"])
         for face, back in pairs
         if _depth(face, back) > THINNEST
     ]
@@ -163,13 +211,16 @@ def _lit_room(
     scene = DaylightScene(
         element_surfaces([*kept, *room.furniture, *glass, *reveals]),
         exterior_surfaces(building, room),
-        windows.groups,
+        (*windows.groups, *(() if onward is None else onward.groups)),
+        beyond=() if onward is None else onward.beyond,
     )
-    return scene, tuple(states[0].transmission for states in windows.optics())
+    optics = [*windows.optics(), *(() if onward is None else onward.optics)]
+    return scene, tuple(states[0].transmission for states in optics)
 
 
-def _piece(guid: str, triangles: NDArray[np.float64], reflectance: float) -> Element:
-    return Element(guid, "glass between rooms", "IfcWindow", triangles, reflectance, reflectance)
+def _piece(face: Face, name: str, triangles: NDArray[np.float64], reflectance: float) -> Element:
+    """Something of the pane of a face that the room beyond has."""
+    return Element(face.pane.guid, name, "IfcWindow", triangles, reflectance, reflectance)
 
 
 def _tube(face: Face, depth: float) -> NDArray[np.float64]:

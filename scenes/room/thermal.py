@@ -14,7 +14,7 @@ from scenes.results import OperationResult, ThermalResult
 from scenes.room.windows import RoomWindows
 from scenes.room.zone import RoomZone
 from thermal.balance import ZoneResult
-from thermal.comfort import adaptive_comfort, running_mean, summarise
+from thermal.comfort import comfort_by_outdoors, summarise
 from thermal.zone import Zone
 
 BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
@@ -112,18 +112,20 @@ def _comfort(
     result: ZoneResult, weather: Weather, occupied: NDArray[np.bool_]
 ) -> tuple[pd.DataFrame, dict[str, float]]:
     """Adaptive comfort (ASHRAE 55) of every hour, and its shares of the occupied ones."""
-    mean = running_mean(weather.dry_bulb_c)
-    table = {"occupied": occupied, "running_mean_c": mean}
+    table = {"occupied": occupied}
     summary: dict[str, float] = {}
     for name, band in BANDS.items():
-        comfort = adaptive_comfort(result.operative_c, mean, band)
+        comfort = comfort_by_outdoors(
+            result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day
+        )
+        table.setdefault("running_mean_c", comfort.outdoor_mean_c)
         table.setdefault("comfort_c", (comfort.low_c + comfort.high_c) / 2)
         table.setdefault("applicable", comfort.applicable)
         table[name] = comfort.comfortable
         counted = summarise(comfort, occupied, weather.midpoints.month.to_numpy())
         summary[name] = 100.0 * counted.comfortable / counted.hours
-    summary["too_warm_hours"] = float(counted.too_warm)
-    summary["too_cold_hours"] = float(counted.too_cold)
-    summary["outside_the_model_hours"] = float(counted.not_applicable)
+    summary["too_warm_hours"] = counted.too_warm * weather.step_h
+    summary["too_cold_hours"] = counted.too_cold * weather.step_h
+    summary["outside_the_model_hours"] = counted.not_applicable * weather.step_h
     frame = pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
     return frame, summary

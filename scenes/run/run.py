@@ -26,7 +26,7 @@ from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.drawn_shades import traced_building
 from scenes.room.equal_rooms import moved_result
-from scenes.room.inner_glass import lit_neighbours
+from scenes.room.inner_glass import lending_rooms
 from scenes.room.operation import Operation, check_states
 from scenes.room.room import compute_room, skies_for
 from scenes.run.building import read_building
@@ -167,7 +167,7 @@ def job_inputs(
     operation, weather = files.operation, files.weather
     beyond: dict[str, list[Space]] = {}
     if inner:
-        beyond = {space.guid: lit_neighbours(building, space) for space in building.spaces}
+        beyond = {space.guid: lending_rooms(building, space) for space in building.spaces}
     spaces = chosen_spaces(
         building, names, building.file, lambda s: bool(s.windows or beyond.get(s.guid))
     )
@@ -210,7 +210,7 @@ def _rooms(
     def borrows(*spaces: Space) -> bool:
         """Whether what a room gets depends on a neighbour: then none stands for another."""
         return options.inner_glass and any(
-            lit_neighbours(inputs.building, space) for space in spaces
+            lending_rooms(inputs.building, space) for space in spaces
         )
 
     def compute(space: Space, steps: Progress) -> RoomYear:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bim.model import Space
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.images.view import View
 from scenes.room_views import NamedView, check_eye, eyes_of, given_views
 from scenes.year_of_glare.options import YearOptions
 
@@ -42,8 +39,3 @@ def _check_kind(each: NamedView) -> None:
             "expected 180 x 180 (-vh 180 -vv 180)",
             field="--view",
         )
-
-
-def shown_as(view: View, size: int) -> View:
-    """The view in pictures of another size."""
-    return replace(view, width=size, height=size)

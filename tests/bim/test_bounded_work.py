@@ -18,6 +18,7 @@ import bim.ifc.head
 import bim.ifc.survey
 from bim.enclosure import rooms_enclosed_by
 from bim.guarded import _boundary as boundary
+from bim.guarded import _space as space_here
 from bim.ifc.building import read_ifc
 from bim.ifc.found_rooms import first_rooms_enclosed as search
 from bim.ifc.survey import _surveyed as survey_one
@@ -26,7 +27,7 @@ from bim.rooms import room_pieces
 from bim.solids import solid_of
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.processes import ProcessEnded, answer_apart, each_apart
-from tests.bim.small_ifc import HEIGHT, WIDTH, box_model, box_room
+from tests.bim.small_ifc import HEIGHT, WALL, WIDTH, box_model, box_room
 from tests.bim.test_enclosure import box, room
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -114,6 +115,13 @@ def gaps_that_die(item):
     os.kill(os.getpid(), signal.SIGSEGV)
 
 
+def space_that_dies(body):
+    """Of the room that begins at y = 3."""
+    if body[..., 1].min() > 2:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return space_here(body)
+
+
 def test_room_whose_booleans_end_the_process_is_named_and_the_others_stay(tmp_path, monkeypatch):
     monkeypatch.setattr(bim.guarded, "_boundary", boundary_that_dies)
     small, _ = box_model(space=False)
@@ -134,6 +142,51 @@ def test_walls_whose_distance_ends_the_process_are_named(tmp_path, monkeypatch):
     building = read_ifc(path)
     assert len(building.spaces) == 1
     assert any("its distance to other walls" in p.what for p in building.problems)
+
+
+def two_spaces(path, **more):
+    """A file with two rooms side by side, the second one drawn a little into the first."""
+    small, _ = box_model(space=False)
+    for name, y, depth in (("A", 0.0, 3.2), ("B", 3.0, 3.0)):
+        small.box("IfcSpace", name, (0.0, y, 0.0), (WIDTH, depth, HEIGHT))
+    small.model.write(str(path))
+    return read_ifc(path, **more)
+
+
+def test_space_whose_solid_ends_the_process_is_named_and_the_others_stay(tmp_path, monkeypatch):
+    monkeypatch.setattr(bim.guarded, "_space", space_that_dies)
+    building = two_spaces(tmp_path / "model.ifc")
+    assert [space.name for space in building.spaces] == ["A"]
+    (named,) = [p for p in building.problems if "SIGSEGV" in p.what]
+    assert named.what.startswith("space B: its geometry: ") and named.lost == "room"
+
+
+@pytest.mark.parametrize(
+    ("function", "what", "done"),
+    [
+        ("_solid", "IfcWall south: its body: ", "its surfaces are used as they are"),
+        ("_shared", "space A: what it shares with others: ", "taken as nothing"),
+        ("_united", "rooms A, B: ", "not joined"),
+    ],
+)
+def test_boolean_that_ends_the_process_is_named(tmp_path, monkeypatch, function, what, done):
+    monkeypatch.setattr(bim.guarded, function, gaps_that_die)
+    building = two_spaces(tmp_path / "model.ifc", join=["A + B"])
+    (named, *_) = [p for p in building.problems if p.what.startswith(what)]
+    assert "SIGSEGV" in named.what and named.consequence == done
+    assert building.spaces
+
+
+def test_wall_whose_opening_ends_the_process_is_left_out_and_named(tmp_path, monkeypatch):
+    path = tmp_path / "model.ifc"
+    small, _ = box_model()
+    small.box("IfcWall", "before", (-1.0, -WALL - 0.3, 0.0), (6.0, 0.2, 3.0))
+    small.model.write(str(path))
+    (named,) = [p for p in read_ifc(path).problems if "covers the glass" in p.what]
+    assert named.consequence == "cut open there"
+    monkeypatch.setattr(bim.guarded, "_opened", gaps_that_die)
+    (named,) = [p for p in read_ifc(path).problems if "covers the glass" in p.what]
+    assert named.consequence.startswith("left out: a library ended its process by signal SIGSEGV")
 
 
 @pytest.mark.parametrize(("error", "left_out"), [(RoomError, True), (ValueError, False)])

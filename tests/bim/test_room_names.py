@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from bim.names import folder_names, found_by_name, label_of, nearest
+from bim.names import folder_names, found_by_name, label_of, nearest, numbered
 
 
 @dataclass(frozen=True)
@@ -59,3 +59,16 @@ def test_an_unknown_name_lists_the_nearest_first():
 def test_rooms_of_one_name_have_folders_of_their_own():
     rooms = (Room("a", "1", "Bad"), Room("b", "1", "bad"), Room("c", "2", "Küche/Essen"))
     assert folder_names(rooms) == ["1_Bad_a", "1_bad_b", "2_Küche_Essen"]
+
+
+@pytest.mark.parametrize(
+    ("names", "found"),
+    [
+        ("a b a a", ["a", "b", "a 2", "a 3"]),
+        ("a/a/a 2", ["a", "a 3", "a 2"]),
+        ("a 2/a/a", ["a 2", "a", "a 3"]),
+        ("a 2/a 2/a/a", ["a 2", "a 2 2", "a", "a 3"]),
+    ],
+)
+def test_names_that_come_again_get_a_number_that_no_other_has(names, found):
+    assert numbered(names.split("/" if "/" in names else None)) == found

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_cfs.bsdf.evaluate import direct_hemispherical
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF
 from mitsuba_cfs.bsdf.resample import BLOCKS, _block, klems_of
-from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from scenes.demo import VENETIAN_BLIND
 
@@ -18,7 +18,7 @@ def test_a_klems_matrix_comes_back(name) -> None:
     """The blind is the same from neither side nor turned: every convention is in its numbers."""
     bsdf = read_bsdf_xml(VENETIAN_BLIND).band("Visible").filled()
     np.testing.assert_allclose(
-        _block(bsdf, name, KLEMS_FULL, 2), getattr(bsdf, name), rtol=1e-9, atol=1e-12
+        _block(bsdf, bsdf, name, KLEMS_FULL, 2), getattr(bsdf, name), rtol=1e-9, atol=1e-12
     )
 
 
@@ -38,3 +38,23 @@ def test_energy_is_that_of_the_tree() -> None:
     assert not klems.reflection_front.any()
     np.testing.assert_array_equal(klems_of(klems).transmission_front, klems.transmission_front)
     assert klems_of(bsdf, KLEMS_HALF, samples=4).transmission_front.shape == (77, 77)
+
+
+@pytest.mark.parametrize("side", ["front", "back"])
+def test_the_beam_of_a_tree_is_all_on_the_diagonal(side) -> None:
+    """Half goes straight on in each cell: no patch has any of it beside the diagonal."""
+    depth, straight, scattered = 4, 0.5, 0.1 / np.pi
+    cells = 1 << depth
+    grid = np.full((cells,) * 4, scattered)
+    x, y = np.indices((cells, cells))
+    grid[x, y, x, y] += straight * cells**2 / np.pi
+    order = np.argsort(morton(np.stack(np.indices(grid.shape), -1), depth).ravel())
+    tree = TensorTree(4, np.full(grid.size, depth, dtype=np.int64), grid.ravel()[order])
+    name = f"transmission_{side}"
+    bsdf = TensorTreeBsdf(**{name: tree})
+    omega = KLEMS_FULL.projected_solid_angles()
+    found = getattr(klems_of(bsdf, samples=4), name)
+    beam = (np.diag(found) - scattered) * omega
+    np.testing.assert_allclose(beam, straight, rtol=1e-6)
+    beside = ~np.eye(len(found), dtype=bool)
+    np.testing.assert_allclose(found[beside], scattered, rtol=1e-6)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple, replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,18 @@ def test_bands_of_the_categories(calendar, operative, inside):
     met = [name for name, need in needs.items() if need.value(found) == 1.0]
     assert (met[0] if met else "") == inside
     assert needs["I"].value(Findings(calendar, heat=heat(20.0, outdoor=5.0))) is None
+
+
+def test_comfort_of_half_hours_is_that_of_hours(calendar):
+    """The limits follow the means of whole days: hot days and cool nights, colder by the season."""
+    hours = np.arange(8760)
+    outdoor = 22 - 16 * np.cos(2 * np.pi * hours / 8760) + np.where(hours % 24 < 12, -8.0, 8.0)
+    year = replace(heat(27.0), outdoor_c=outdoor)
+    halves = RoomHeat(*(np.repeat(values, 2) for values in astuple(year)))
+    need = ComfortShare(what="comfort", band="EN 16798-1 II", at_least=0.95)
+    share = need.value(Findings(calendar, heat=year))
+    assert 0.1 < share < 0.9
+    assert need.value(Findings(replace(calendar, step_h=0.5), heat=halves)) == share
 
 
 def test_lamps_make_up_for_what_daylight_lacks(calendar):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
@@ -27,11 +28,13 @@ from scenes.result_folder import ResultFolder
 from scenes.run.building import read_building
 from scenes.run.inputs import read_weather
 
-RULE = """
+HEAD = """
 title = "View and sun"
 edition = "2026 <draft>"
 source = ["mine"]
 grid = {height = 0.8, margin = 0.5}
+"""
+VIEW = """
 [[criterion]]
 key = "view"
 title = "View & distance"
@@ -39,6 +42,8 @@ clause = "clause 7.1"
 [[criterion.level]]
 name = "met"
 needs = [{what = "view", angle_deg = 14, distance = 6, layers = 1, at_least = 0.75}]
+"""
+SUN = """
 [[criterion]]
 key = "sun"
 title = "Sun"
@@ -48,6 +53,8 @@ occupied = true
 name = "met"
 needs = [{what = "sun_hours", at_least = 1.5}]
 """
+RULE = HEAD + VIEW + SUN
+STRICT = HEAD + SUN.replace("1.5", "6.0")
 
 
 @pytest.fixture(scope="module")
@@ -142,48 +149,70 @@ def test_topics_are_of_rooms_that_miss_something(result, tmp_path):
     assert "clause 7.2" in text and "0.00 h, ≥ 1.5 h for met" in text
 
 
-STRICT = """
-title = "Strict"
-edition = "1"
-source = ["made"]
-grid = {height = 0.8, margin = 0.5}
-[[criterion]]
-key = "sun"
-title = "Sun"
-clause = "1.1"
-[[criterion.level]]
-name = "met"
-needs = [{what = "sun_hours", at_least = 6.0}]
-"""
+def found_again(bcf: Path, file: Path) -> dict[str, tuple[str, np.ndarray]]:
+    """From the topics alone into the model: text and camera's way of each space that one shows.
 
-
-def test_a_failing_room_is_found_again_from_its_topic(tmp_path):
-    """From the BCF file alone into the model: the topic's GUID is the space of its title."""
+    The camera stands within the space as ifcopenshell draws it, in the file's own axes.
+    """
     import ifcopenshell
+    import ifcopenshell.geom
 
-    rule = tmp_path / "strict.toml"
-    rule.write_text(STRICT)
-    options = ComplyOptions(OFFICE, WEATHER, standards=(str(rule),))
-    files = files_of(options, rules={"strict": read_rule(str(rule))})
-    write_compliance(
-        check_rooms(read_building(OFFICE), options, files), ResultFolder(tmp_path / "out", "comply")
-    )
-    table = pd.read_csv(tmp_path / "out" / "values.csv").set_index("guid")
-    failing = set(table.index[table.met == "no"])
-    assert 0 < len(failing) < len(table)
-    model, found = ifcopenshell.open(OFFICE), set()
-    with zipfile.ZipFile(tmp_path / "out" / "issues.bcf") as archive:
+    settings = ifcopenshell.geom.settings()
+    settings.set("use-world-coords", True)
+    model, found = ifcopenshell.open(file), {}
+    with zipfile.ZipFile(bcf) as archive:
         for name in (n for n in archive.namelist() if n.endswith("markup.bcf")):
             markup = ElementTree.fromstring(archive.read(name))
             view = markup.find("Viewpoints").findtext("Viewpoint")
             shown = ElementTree.fromstring(archive.read(f"{name.partition('/')[0]}/{view}"))
             space = model.by_guid(shown.find("Components/Selection/Component").get("IfcGuid"))
             assert space.is_a("IfcSpace")
-            assert markup.find("Topic").findtext("Title").startswith(f"{space.Name}")
-            value = table.loc[space.GlobalId].value
-            assert f"{value:.2f} h, ≥ 6 h" in markup.find("Topic").findtext("Description")
-            found.add(space.GlobalId)
-    assert found == failing
+            title = markup.find("Topic").findtext("Title")
+            assert title.startswith(f"{space.Name}")
+            eye, direction = (
+                np.array([float(shown.find(f"PerspectiveCamera/{what}/{axis}").text)
+                          for axis in "XYZ"])
+                for what in ("CameraViewPoint", "CameraDirection")
+            )  # fmt: skip
+            corners = ifcopenshell.geom.create_shape(settings, space).geometry.verts
+            corners = np.reshape(corners, (-1, 3))
+            assert np.all(corners.min(axis=0) < eye) and np.all(eye < corners.max(axis=0)), title
+            assert np.linalg.norm(direction) == pytest.approx(1.0, abs=1e-5)
+            found[space.GlobalId] = markup.find("Topic").findtext("Description"), direction
+    return found
+
+
+def checked_strictly(building: Path, folder: Path) -> pd.DataFrame:
+    """Values of a building against a rule that few rooms keep, by GUID; its files are in `out`."""
+    rule = folder / "strict.toml"
+    rule.write_text(STRICT)
+    options = ComplyOptions(building, WEATHER, standards=(str(rule),))
+    files = files_of(options, rules={"strict": read_rule(str(rule))})
+    result = check_rooms(read_building(building), options, files)
+    write_compliance(result, ResultFolder(folder / "out", "comply"))
+    return pd.read_csv(folder / "out" / "values.csv").set_index("guid")
+
+
+def test_a_failing_room_is_found_again_from_its_topic(tmp_path):
+    """The file's true north is not its y: by the world's axes a camera would look askew."""
+    table = checked_strictly(OFFICE, tmp_path)
+    failing = set(table.index[table.met == "no"])
+    assert 0 < len(failing) < len(table)
+    found = found_again(tmp_path / "out" / "issues.bcf", OFFICE)
+    assert set(found) == failing
+    for guid, (text, direction) in found.items():
+        assert f"{table.loc[guid].value:.2f} h, ≥ 6 h" in text
+        assert np.abs(direction).max() == pytest.approx(1.0, abs=1e-6)  # windows amid their walls
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["AC11-Institute-Var-2-IFC.ifc", "AC20-FZK-Haus.ifc"])
+def test_failing_rooms_of_real_buildings_are_found_again(real_data, tmp_path, name):
+    file = real_data / "ifc" / "buildings" / name
+    table = checked_strictly(file, tmp_path)
+    failing = set(table.index[table.met == "no"])
+    assert failing
+    assert set(found_again(tmp_path / "out" / "issues.bcf", file)) == failing
 
 
 def test_levels_go_into_the_ifc(options, tmp_path):

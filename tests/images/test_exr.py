@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -39,3 +43,20 @@ def test_what_cannot_be_is_told_in_a_line(tmp_path):
     (tmp_path / "a.exr").write_bytes(b"#?RADIANCE\n")
     with pytest.raises(DataError, match="not an EXR"):
         read_exr(tmp_path / "a.exr")
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores are not to be chosen here")
+def test_a_process_with_one_core_writes_and_reads_too(tmp_path):
+    """Mitsuba's OpenEXR waits for a second thread: `cfs picture` stood for ever on one core."""
+    code = (
+        "import os, sys\n"
+        "os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+        "from mitsuba_cfs import llvm\nllvm.select_library()\n"
+        "import numpy as np\n"
+        "from mitsuba_cfs.images.exr import read_exr, write_exr\n"
+        "write_exr(sys.argv[1], np.ones((40, 30)))\n"
+        "print(read_exr(sys.argv[1])[0].shape)\n"
+    )
+    line = [sys.executable, "-c", code, str(tmp_path / "a.exr")]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == ["(40,", "30)"]

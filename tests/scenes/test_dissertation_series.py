@@ -52,6 +52,31 @@ def test_the_series_are_drawn_with_the_measurement_in_them(tmp_path):
         assert (tmp_path / "glare" / f"{method}.png").read_bytes()[:4] == PNG
 
 
+@pytest.mark.usefixtures("variant")
+def test_the_measurement_has_the_sun_as_a_source_whatever_the_pixels():
+    """As the methods have it; in the pixels its L^2 omega is that of a larger, darker disc."""
+    from dataclasses import replace
+
+    import mitsuba_cfs as cfs
+    from scenes.evidence.validation.blind_room import empty, glass_klems
+    from scenes.evidence.validation.glare_methods import GlareCase, measured
+    from scenes.evidence.validation.glare_room import glare_scene
+
+    scenes = [glare_scene(size) for size in (40, 80)]
+    towards = np.add(scenes[0].view.direction, [0, 0, 0.25])[None]
+    towards /= np.linalg.norm(towards)
+    sky = cfs.given_sky(towards, [5.0], [100.0], day_of_year=250)
+    case = GlareCase("glass", empty(), cfs.BsdfOptics(glass_klems()), sky, ("09-07 15:30",))
+    sampling = cfs.Sampling(picture_samples=4)
+    apart, in_pixels = (
+        [measured(scene, one, sampling)[0][0] for scene in scenes]
+        for one in (case, replace(case, sun="pixels"))
+    )
+    assert 0.3 < apart[0] < 0.95
+    assert abs(apart[1] - apart[0]) < 0.01
+    assert max(in_pixels) < min(apart) - 0.05
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("variant")
 def test_the_scale_of_bars_does_not_change_their_bsdf():

@@ -12,30 +12,40 @@ from bim import read_ifc
 from bim.model import Building
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
-from scenes.room.inner_glass import inner_glass, lit_neighbours
-from scenes.room.windows import in_all_windows
-from tests.bim.small_ifc import DEPTH, FRAME, HEIGHT, WIDTH, box_model
+from scenes.room.inner_glass import CLEAR, inner_glass, lending_rooms
+from scenes.room.windows import in_all_windows, room_windows
+from tests.bim.small_ifc import DEPTH, FRAME, HEIGHT, WIDTH, SmallIfc, box_model
 
-MIDDLE, THICK = 3.0, 0.2  # of the partition: where it begins and how thick it is [m]
-PLACE = (0.5, 0.3, 3.0, 2.2)  # x, sill, width, height of its window [m]
+MIDDLE, THICK = 3.0, 0.2  # of a partition: where it begins and how thick it is [m]
+PLACE = (0.5, 0.3, 3.0, 2.2)  # x, sill, width, height of a partition's window [m]
 GLASS_AREA = (PLACE[2] - 2 * FRAME) * (PLACE[3] - 2 * FRAME)
 
 
-@pytest.fixture(scope="module")
-def two_rooms(tmp_path_factory) -> Path:
-    """The small room cut by a glazed partition: one room with the window, a dark one behind."""
+def glazed_rooms(path: Path, rooms: dict[str, float]) -> Path:
+    """The small room cut by glazed partitions; each room and where it begins, the first at 0."""
     small, _ = box_model(space=False)
-    grey = small.style("partition", 0.5)
-    wall = small.box("IfcWall", "partition", (0, MIDDLE, 0), (WIDTH, THICK, HEIGHT), grey)
-    x, sill, width, height = PLACE
-    opening = small.box(
-        "IfcOpeningElement", "hole", (x, MIDDLE - 0.1, sill), (width, THICK + 0.2, height)
-    )
+    begin = list(rooms.values())
+    for name, y0, y1 in zip(rooms, begin, [*begin[1:], DEPTH + THICK], strict=True):
+        small.box("IfcSpace", name, (0, y0, 0), (WIDTH, y1 - THICK - y0, HEIGHT))
+    for number, y in enumerate(begin[1:], 1):
+        glazed_partition(small, f"P{number}", y - THICK)
+    small.model.write(str(path))
+    return path
+
+
+def glazed_partition(small: SmallIfc, name: str, low: float) -> None:
+    """A partition that begins at a depth, with a window."""
     import ifcopenshell.api.feature
 
+    grey = small.style("partition", 0.5)
+    wall = small.box("IfcWall", "partition", (0, low, 0), (WIDTH, THICK, HEIGHT), grey)
+    x, sill, width, height = PLACE
+    opening = small.box(
+        "IfcOpeningElement", "hole", (x, low - 0.1, sill), (width, THICK + 0.2, height)
+    )
     ifcopenshell.api.feature.add_feature(small.model, feature=opening, element=wall)
-    glass, frame, y = small.style("inner", 0.9, 0.8), small.style("sash", 0.7), MIDDLE + THICK / 2
-    window = small.box("IfcWindow", "P1", (x + FRAME, y - 0.01, sill + FRAME),
+    glass, frame, y = small.style("inner", 0.9, 0.8), small.style("sash", 0.7), low + THICK / 2
+    window = small.box("IfcWindow", name, (x + FRAME, y - 0.01, sill + FRAME),
                        (width - 2 * FRAME, 0.02, height - 2 * FRAME), glass)  # fmt: skip
     small.show(window, [
         ((x, y - 0.03, sill), (FRAME, 0.06, height), frame),
@@ -45,12 +55,20 @@ def two_rooms(tmp_path_factory) -> Path:
         ((x + FRAME, y - 0.01, sill + FRAME), (width - 2 * FRAME, 0.02, height - 2 * FRAME), glass),
     ])  # fmt: skip
     ifcopenshell.api.feature.add_filling(small.model, opening=opening, element=window)
-    small.box("IfcSpace", "lit", (0, 0, 0), (WIDTH, MIDDLE, HEIGHT))
-    back = MIDDLE + THICK
-    small.box("IfcSpace", "dark", (0, back, 0), (WIDTH, DEPTH - back, HEIGHT))
+
+
+@pytest.fixture(scope="module")
+def two_rooms(tmp_path_factory) -> Path:
+    """One room with the window, a dark one behind."""
     path = tmp_path_factory.mktemp("inner") / "two.ifc"
-    small.model.write(str(path))
-    return path
+    return glazed_rooms(path, {"lit": 0.0, "dark": MIDDLE + THICK})
+
+
+@pytest.fixture(scope="module")
+def three_rooms(tmp_path_factory) -> Building:
+    """One room with the window, two dark ones behind each other."""
+    path = tmp_path_factory.mktemp("inner") / "three.ifc"
+    return read_ifc(glazed_rooms(path, {"lit": 0.0, "dark": 2.2, "last": 4.2}))
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +79,8 @@ def building(two_rooms: Path) -> Building:
 
 def test_the_pane_is_a_face_of_both_rooms(building: Building) -> None:
     dark, lit = building.space("dark"), building.space("lit")
-    assert lit_neighbours(building, dark) == [lit]
-    assert lit_neighbours(building, lit) == []
+    assert lending_rooms(building, dark) == [lit]
+    assert lending_rooms(building, lit) == []
     for room in (dark, lit):
         area = sum(face.area for face in room.faces if face.pane is not None)
         assert area == pytest.approx(GLASS_AREA, rel=1e-3)
@@ -72,12 +90,32 @@ def test_the_dark_room_looks_into_the_lit_one_through_a_closed_reveal(building: 
     dark, lit = building.space("dark"), building.space("lit")
     found = inner_glass(building, dark, in_all_windows(lit, read_system(VENETIAN_BLIND)))
     assert found is not None and found.area == pytest.approx(GLASS_AREA, rel=1e-3)
-    (group,), (room,) = found.groups, found.beyond
+    (group,), (room,), ((pane,),) = found.groups, found.beyond, found.optics
+    assert room.beam[0] == pane.transmission[0, 0] == pytest.approx(CLEAR, rel=0.01)
     np.testing.assert_allclose(group.frame[2], [0, -1, 0], atol=1e-9)
     reveal = 2 * (PLACE[2] + PLACE[3] - 4 * FRAME) * THICK
     total = room.scene.interior.areas.sum()
     faces = sum(face.area for face in lit.faces)
     assert total == pytest.approx(faces + reveal, rel=1e-3)
+
+
+def test_light_goes_through_a_dark_room_to_the_one_behind_it(three_rooms: Building) -> None:
+    lit, dark, last = (three_rooms.space(name) for name in ("lit", "dark", "last"))
+    assert lending_rooms(three_rooms, last) == [dark, lit]
+    assert lending_rooms(three_rooms, dark) == [lit]
+    assert lending_rooms(three_rooms, lit) == []
+    systems = in_all_windows(lit, read_system(VENETIAN_BLIND))
+    found = inner_glass(three_rooms, last, systems)
+    (beyond,) = found.beyond
+    (before,) = beyond.scene.beyond
+    assert len(beyond.scene.groups) == 1 and len(beyond.transmission) == 1
+    np.testing.assert_allclose(beyond.transmission[0], found.optics[0][0].transmission)
+    (blind,) = room_windows(lit, systems).optics()[0]
+    np.testing.assert_allclose(before.transmission[0], blind.transmission)
+    # neither of the dark room's two panes is among its opaque faces, one is glass to the last room
+    faces = sum(face.area for face in dark.faces) - GLASS_AREA
+    reveal = 2 * (PLACE[2] + PLACE[3] - 4 * FRAME) * THICK
+    assert beyond.scene.interior.areas.sum() == pytest.approx(faces + reveal, rel=1e-3)
 
 
 @pytest.mark.slow

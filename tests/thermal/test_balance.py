@@ -10,7 +10,7 @@ from tests.thermal.rooms import CONCRETE, INSULATION, PLASTER, box, climate, sun
 from thermal.balance import BalanceOptions, simulate, simulate_zones
 from thermal.blackbox import Fenestration, layer_absorptances
 from thermal.climate import Solar, no_sun
-from thermal.conduction import half_of_symmetric, u_value
+from thermal.conduction import u_value
 from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
 from thermal.zone import Gains, Layer, OpaqueSurface, WindowElement, Zone
@@ -93,6 +93,19 @@ def test_energy_closes_every_hour_and_over_the_run(step_s):
     assert result.heat_flow["glass sun"].mean() == pytest.approx(
         4.5 * (sun(hours, zone).absorbed_outer).mean()
     )
+
+
+def half_of_symmetric(layers):
+    """The inner half of a symmetric partition, "adiabatic" at its mid-plane."""
+    total = sum(layer.thickness for layer in layers) / 2
+    kept: list[Layer] = []
+    for layer in reversed(layers):
+        if total <= 1e-12:
+            break
+        part = min(layer.thickness, total)
+        kept.append(Layer(part, layer.conductivity, layer.density, layer.heat_capacity))
+        total -= part
+    return tuple(reversed(kept))
 
 
 def test_symmetric_partition_is_half_a_partition_with_adiabatic_middle():

@@ -9,10 +9,8 @@ from pythermalcomfort.models import adaptive_ashrae, adaptive_en
 from thermal.comfort import (
     adaptive_comfort,
     mean_radiant_temperature,
-    operative_from_films,
     operative_temperature,
     pmv_ppd,
-    prevailing_mean,
     room_centre_mrt,
     running_mean,
     running_mean_en16798,
@@ -25,7 +23,7 @@ from thermal.zone import work_hours
 
 def test_means_of_a_constant_year_are_that_constant():
     outdoor = np.full(8760, 17.0)
-    for mean in (running_mean, running_mean_en16798, prevailing_mean):
+    for mean in (running_mean, running_mean_en16798):
         np.testing.assert_allclose(mean(outdoor), 17.0)
 
 
@@ -78,7 +76,6 @@ def test_radiant_temperatures():
 def test_operative_temperature_forms():
     assert operative_temperature(20.0, 24.0) == pytest.approx(22.0)
     assert operative_temperature(20.0, 24.0, 0.4) == pytest.approx((24 + 2 * 20) / 3)
-    assert operative_from_films(20.0, 24.0, 4.7) == pytest.approx(22.0)
 
 
 def test_summary_counts_add_up():

@@ -1,4 +1,4 @@
-"""Five phases of clear glass against paths, and many states of many window groups."""
+"""Five phases with many states of many window groups, and with windows that reflect."""
 
 from __future__ import annotations
 
@@ -13,185 +13,21 @@ from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from tests.trace.phase_rooms import (
+    OMEGA,
+    POINTS,
+    K,
+    diffuser,
+    glass,
+    glass_transmittance,
+    lit,
+    sun_series,
+    traced,
+)
 
 from . import rooms
 
 pytestmark = pytest.mark.usefixtures("variant")
-
-K = KLEMS_FULL.size
-OMEGA = KLEMS_FULL.projected_solid_angles()
-POINTS = np.array([[1.8, 1.0, 0.8], [1.8, 0.3, 0.8], [1.0, 3.0, 0.8]])
-UP = np.tile([0.0, 0.0, 1.0], (3, 1))
-
-
-def glass_transmittance(cosine):
-    """Of clear glass: it falls fast at grazing incidence, as 1 - (1 - cos)^5 does."""
-    return 0.6 * (1 - (1 - np.clip(cosine, 0, 1)) ** 5)
-
-
-def glass():
-    """T and the sun's way of glass that a file knows at the middles of its patches."""
-    from mitsuba_cfs.methods.optics import GivenOptics
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-
-    tau = glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
-    return GivenOptics(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
-
-
-def between_the_rings(cosine):
-    """What the glass's file says at an angle of incidence."""
-    theta, _ = KLEMS_FULL.centres()
-    rings = np.append(theta[KLEMS_FULL.ring_starts], np.pi / 2)
-    return np.interp(
-        np.arccos(cosine), rings, np.append(glass_transmittance(np.cos(rings[:-1])), 0)
-    )
-
-
-def diffuser(tau: float):
-    from mitsuba_cfs.methods.optics import GivenOptics
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-
-    block = np.full((K, K), tau / np.pi)
-    return GivenOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
-
-
-def traced(interior, exterior, groups, points, **sampling):
-    """The matrices of a room, none of them traced yet."""
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
-    from mitsuba_cfs.methods.scene import DaylightScene
-
-    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    scene = DaylightScene(interior, exterior, groups, points, up)
-    return PhaseScene(scene, Sampling(patch_samples=4096, **sampling))
-
-
-def lit(matrices, systems, sky, state=None):
-    """Illuminance [S, L] of a room with systems by group and state."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
-
-    return PhaseSystems(matrices, systems).light(sky).illuminance(state)
-
-
-def sun_series(sky: ReinhartSky, patches, diffuse: float = 0.0) -> AnnualSky:
-    """Suns at the middles of patches, 1e5 lx each, and a uniform sky and ground [cd/m2]."""
-    spread = np.zeros((sky.size, len(patches)))
-    spread[patches, np.arange(len(patches))] = 1e5 / sky.solid_angles[patches]
-    hours = np.arange(len(patches))
-    towards, strength = sky.directions[patches], np.full(len(patches), 1e5)
-    return AnnualSky(spread + diffuse, towards, strength, hours, len(patches), spread)
-
-
-def suns_at(places, diffuse: float = 0.0):
-    """The sky of MF:4, and suns of 1e5 lx at an incidence [deg] on the window and a height (z)."""
-    sky = ReinhartSky(4)
-    cosine = sky.directions @ [0, -1, 0]
-    patches = [
-        int(np.argmin(np.hypot(cosine - np.cos(np.radians(angle)), sky.directions[:, 2] - z)))
-        for angle, z in places
-    ]
-    return sky, sun_series(sky, patches, diffuse)
-
-
-def test_the_beam_between_patches_is_linear_in_angle_and_that_of_the_patch_at_its_middle():
-    import mitsuba as mi
-
-    from mitsuba_cfs.trace.bins import DirectionBins
-
-    bins, values = DirectionBins(KLEMS_FULL), np.random.default_rng(0).random(K)
-
-    def at(theta, phi):
-        sine = np.sin(theta)
-        local = [sine * np.cos(phi), -sine * np.sin(phi), np.cos(theta)]  # incident azimuth
-        return bins.between(mi.Float(values.astype(np.float32)), mi.Vector3f(*map(mi.Float, local)))
-
-    theta, phi = KLEMS_FULL.centres()
-    assert at(theta, phi).numpy() == pytest.approx(values, abs=2e-5)
-    # between rings and azimuths by hand: 45 degrees lies midway between 40 and 50, each ring
-    # (20 and 24 patches) at 3 / 4 of a step after its second patch
-    starts, counts = KLEMS_FULL.ring_starts[4:6], (24, 24)
-    place = 1.75
-    turn = 2 * np.pi * place / 24
-    rings = [0.25 * values[s + 1] + 0.75 * values[s + 2] for s in starts]
-    assert KLEMS_FULL.phi_counts[4:6] == counts
-    assert at(np.radians([45.0]), np.array([turn])).numpy() == pytest.approx(
-        [np.mean(rings)], abs=2e-5
-    )
-    last = values[KLEMS_FULL.ring_starts[8]]
-    assert at(np.radians([86.25]), np.zeros(1)).numpy() == pytest.approx([last / 2], abs=2e-5)
-    # just before the first patch of a ring its neighbour is the last
-    first, before = KLEMS_FULL.ring_starts[3], KLEMS_FULL.ring_starts[4] - 1
-    found = at(np.radians([30.0]), np.array([-np.pi / 20])).numpy()
-    assert found == pytest.approx([(values[first] + values[before]) / 2], abs=2e-5)
-
-
-def test_glass_keeps_its_hemispherical_transmittance():
-    import mitsuba as mi
-
-    way = glass().scattering
-    u = (np.arange(20000) + 0.5) / 20000  # cos^2, even in projected solid angle
-    cosine = np.sqrt(u)
-    local = mi.Vector3f(*(np.float32(v) for v in (np.sqrt(1 - u), 0 * u, cosine)))
-    hemispherical = way.through(local).numpy().mean()
-    of_file = (glass_transmittance(KLEMS_FULL.incident_directions()[:, 2]) * OMEGA).sum() / np.pi
-    assert hemispherical == pytest.approx(of_file, rel=5e-3)
-    assert hemispherical == pytest.approx(glass_transmittance(cosine).mean(), rel=1e-2)
-
-
-def test_five_phases_of_clear_glass_have_the_suns_own_transmittance_all_through():
-    """A glass that had the sun's transmittance in every patch gives the same, hour by hour."""
-    from mitsuba_cfs.methods.optics import GivenOptics
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-
-    wanted = [(62, 0.3), (66, 0.9), (74, 0.3), (77, 0.6), (84, 0.6)]
-    _, sun = suns_at(wanted)
-    room, groups = rooms.test_room()
-    matrices = traced(room, rooms.NOTHING, groups, POINTS)
-    found = lit(matrices, [[glass()]], sun)
-    at_sun = between_the_rings(sun.direction @ [0, -1, 0])
-    for h, tau in enumerate(at_sun):
-        even = GivenOptics(
-            tau * np.eye(K), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
-        )
-        # between 82.5 and 90 degrees the even glass falls to 0, and so differs
-        if wanted[h][0] < 82:
-            alone = lit(matrices, [[even]], sun)[:, h]
-            assert found[:, h] == pytest.approx(alone, rel=2e-3)
-        assert np.all(found[:, h] > 0)
-
-
-@pytest.mark.slow
-def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
-    """Suns in the middle of a ring and at its grazing end, on sensors in and beside their beam.
-
-    Between the middles of rings the glass is taken for the chord of a convex curve: up to 12 % low,
-    never high.  With one transmittance in a ring 86 degrees would be 60 % high.  Windows are black
-    from the room on both sides.
-    """
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-    from mitsuba_cfs.trace.point_in_time import point_in_time
-
-    diffuse = 300.0  # cd/m2 of a uniform sky and ground
-    sky, sun = suns_at([(62, 0.3), (74, 0.9), (86, 0.3)], diffuse)
-    room, groups = rooms.test_room()
-    # one sun lights few patches, whose entries of V are known to some per cent only
-    matrices = traced(room, rooms.NOTHING, groups, POINTS, sensor_samples=262_144)
-    found = lit(matrices, [[glass()]], sun)
-    beam = AngularBeam(glass_transmittance(np.linspace(0, 1, 128)))
-    behind, luminance = (
-        LitRoom(room, rooms.NOTHING, groups, [PathOptics(None, beam)]),
-        1e5 / SUN_SOLID_ANGLE,
-    )
-    for h, direction in enumerate(sun.direction):
-        paths = point_in_time(
-            behind, Sky(np.full(sky.size, diffuse), direction, luminance), POINTS, UP,
-            samples=8192, stopping=Stopping(batches=8),
-        )  # fmt: skip
-        ratio = found[:, h].sum() / paths.values.sum()
-        noise = 5 * float(np.hypot.reduce(paths.standard_error)) / paths.values.sum()
-        assert 0.85 < ratio < 1.05, (h, ratio, noise)
-        assert np.all(found[:, h] > 0)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.pane_stack import hemispherical_mean, pane_optics, stack
-from mitsuba_cfs.directions import window_frame
 from scenes.evidence.validation.ashrae140_cases import NORMALS, SEEN_FROM, Opening, opening_rooms
 from scenes.evidence.validation.facade_sun import FacadeSun, SunSteps, facade_sun
 from scenes.evidence.validation.sunlit_facade import diffuse_lit_share, lit_share
@@ -162,8 +161,3 @@ def box_irradiance(steps: SunSteps) -> dict[str, FacadeSun]:
         for name, normal in NORMALS.items()
         if name != "floor"
     }
-
-
-def world_frame(facade: str) -> FloatArray:
-    """Rows x, y, z of a facade's frame (for drawings and checks)."""
-    return window_frame(np.array(NORMALS[facade]))

@@ -1,180 +1,59 @@
-r"""Rooms by the light of November 2026 and by today's: a small pair of pictures for each fault.
+r"""Rooms by the light of November 2026 and by today's: a small picture for each fault.
 
     python -m scenes.evidence.validation.before_after --out docs/figures [--only mirrors bands ...]
 
-Only what an option or other data can still do as it was done is drawn: glass outdoors that scatters
-("mirrors"), one system for all windows ("bands"), one D for a whole window ("overhang"), windows
-black from the room ("windows"), the ground of another sky model ("ground").  Office of 4 x 6 x 3 m,
-five-phase pictures; DGP and Ev are those of the pictures.
+Only what an option, other data or a plain rule that is still in the code can do as it was done is
+drawn.  Pairs of five-phase pictures of an office of 4 x 6 x 3 m, with their DGP and Ev: glass
+outdoors that scatters ("mirrors"), one system for all windows ("bands"), the sun's beam that the
+room reflects by the window's patches ("beam"), the beam of a tensor tree as wide as a cell
+("tree"), windows black from the room ("windows"), the ground of another sky model ("ground").
+Curves: DGP by the picture's size, with the sun's disc in the pixels and apart ("disc"); one D for a
+whole window below a slab ("overhang"); the transmittance of a pane beyond the last ring's middle
+("grazing").
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 import mitsuba_cfs as cfs
-from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
-from bim.shoebox import WindowRectangle, shoebox
-from bim.to_tracer import interior_surfaces, window_groups
-from mitsuba_cfs.methods.optics import GivenOptics, States
+from mitsuba_cfs.bsdf.glazing import Pane, pane_values
+from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
+from mitsuba_cfs.glare.annual import full_picture
+from mitsuba_cfs.trace.direct_sun import KlemsScattering
+from scenes.evidence.validation.before_after_rooms import (
+    DARK,
+    PAIRS,
+    SENSOR_DEPTHS,
+    Drawn,
+    glass,
+    lit,
+    office,
+    picture,
+    sky,
+)
+from scenes.evidence.validation.before_after_rooms import overhang as overhang_room
 
-SIZE = 110  # [px]
-SAMPLES = 8  # paths of a pixel
 RANGE = (30.0, 3e4)  # of the colours [cd/m2]
-CLEAR = cfs.Glazing("clear", 0.78, 0.14, 0.14)
-DARK = cfs.Glazing("dark", 0.10, 0.1, 0.1)
+SUN_SIZES = (100, 150, 200, 300, 400, 600, 800)  # [px]
+SHOWN = 300  # [px] of the picture that is cut out
+CUT = 6  # [px] on each side of the sun
+HOUR_SAMPLES = 1 << 16  # paths of a sensor
+GRAZING_DEG = np.linspace(60.0, 89.5, 119)
+FLOAT = Pane("float", 0.89, 0.08, 0.08)
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A room, what fills its windows, and an hour."""
-
-    scene: cfs.DaylightScene
-    systems: Sequence[States]
-    sky: cfs.AnnualSky
-    window_parts: int = 0  # of the window; 0: as many as the error asks for
-
-
-def glass(of: cfs.Glazing = CLEAR) -> States:
-    """One state of a glazing."""
-    return [cfs.BsdfOptics(cfs.specular_klems(of, cfs.KLEMS_FULL))]
-
-
-def sky(sun: tuple[float, float, float], direct: float, diffuse: float, **more) -> cfs.AnnualSky:
-    """One hour, 21 June.
-
-    Args: sun: towards it; direct, diffuse: irradiances [W/m2].
-    """
-    towards = np.array([sun]) / np.linalg.norm(sun)
-    return cfs.given_sky(towards, [direct], [diffuse], day_of_year=172, **more)
-
-
-def office(
-    facing_deg: float = 180.0, windows: Sequence[WindowRectangle] = (), exterior=None
-) -> cfs.DaylightScene:
-    """The room with its eye 3 m behind the window; a group for each window."""
-    chosen = {"windows": windows} if windows else {}
-    space = shoebox(4.0, 6.0, 3.0, facing_deg=facing_deg, **chosen).spaces[0]
-    window = space.windows[0]
-    eye = window.centre - 3.0 * window.normal
-    view = cfs.fisheye((eye[0], eye[1], 1.2), tuple(window.normal), SIZE)
-    groups = [
-        cfs.WindowGroup(surface.name, (surface,))
-        for group in window_groups(space)
-        for surface in group.windows
-    ]
-    groups.sort(key=lambda group: group.name)
-    outdoors = cfs.Surfaces.none() if exterior is None else exterior
-    return cfs.DaylightScene(interior_surfaces(space), outdoors, groups, view=view)
-
-
-def plate(corners: Sequence[tuple], reflectance: float, gloss: cfs.Gloss | None) -> cfs.Surfaces:
-    """A quadrilateral outdoors."""
-    a, b, c, d = map(np.array, corners)
-    return cfs.Surfaces(
-        np.array([[a, b, c], [a, c, d]], dtype=float), np.full(2, reflectance),
-        np.zeros(2, dtype=np.int64), (), (gloss,) if gloss is not None else (),
-    )  # fmt: skip
-
-
-def mirrors() -> tuple[Drawn, Drawn]:
-    """A north office before a sunlit facade of glass, 12 m away: 15 % scattered, and mirrored."""
-    corners = [(-15, 12, 0), (-15, 12, 14), (20, 12, 14), (20, 12, 0)]
-    noon = sky((0.2, -1.0, 1.1), 800.0, 100.0)
-    pair = ((GLASS_REFLECTANCE, None), (0.0, CLEAR_GLAZING))
-    house = office(0.0)
-    facades = (plate(_turned(corners), *one) for one in pair)
-    scenes = (replace(house, exterior=beside(house.interior, facade)) for facade in facades)
-    before, now = (Drawn(scene, [glass()], noon) for scene in scenes)
-    return before, now
-
-
-def beside(house: cfs.Surfaces, facade: cfs.Surfaces) -> cfs.Surfaces:
-    """The house as it stands outdoors, and a facade of one surface before it."""
-    number = int(house.surface.max()) + 1
-    gloss = (*(None,) * number, facade.gloss[0]) if facade.gloss else ()
-    return cfs.Surfaces(
-        np.concatenate([house.triangles, facade.triangles]),
-        np.concatenate([house.reflectance, facade.reflectance]),
-        np.concatenate([house.surface, facade.surface + number]),
-        (),
-        gloss,
-    )
-
-
-def _turned(corners: Sequence[tuple]) -> list[tuple]:
-    """Before a window to the north of the room that the shoebox puts at the origin."""
-    return [(x - 4, y, z) for x, y, z in corners]
-
-
-def bands() -> tuple[Drawn, Drawn]:
-    """Three bands of panes, clear below, dark before the eye, clear above; before: the mean."""
-    windows = [WindowRectangle(0.3, sill, 3.4, 0.7) for sill in (0.2, 1.0, 1.8)]
-    scene, noon = office(windows=windows), sky((0.2, -1.0, 1.0), 800.0, 100.0)
-    mean = cfs.Glazing("mean", (2 * 0.78 + 0.10) / 3, 0.13, 0.13)
-    return (
-        Drawn(scene, [glass(mean)] * 3, noon),
-        Drawn(scene, [glass(), glass(DARK), glass()], noon),
-    )
-
-
-def overhang() -> tuple[Drawn, Drawn]:
-    """A slab 2 m deep over the window, overcast: one D, and as many as the error asks for."""
-    slab = plate([(-1, -2, 2.75), (5, -2, 2.75), (5, 0, 2.75), (-1, 0, 2.75)], 0.3, None)
-    drawn = Drawn(office(exterior=slab), [glass()], sky((0.0, -0.1, 1.0), 0.0, 150.0))
-    return replace(drawn, window_parts=1), drawn
-
-
-def windows() -> tuple[Drawn, Drawn]:
-    """The window black to the light of the room, and with its glass."""
-    now = Drawn(office(), [glass()], sky((0.2, -1.0, 1.0), 800.0, 100.0))
-    (optics,) = glass()
-    black = GivenOptics(optics.transmission, optics.scattering, optics.paths)
-    return replace(now, systems=[[black]]), now
-
-
-def ground() -> tuple[Drawn, Drawn]:
-    """The plain to the horizon by gendaylit, and as it reflects a fifth of sun and sky."""
-    before, now = (
-        Drawn(office(), [glass()], sky((0.9, 0.3, 0.7), 800.0, 100.0, ground=name))
-        for name in ("gendaylit", "reflected")
-    )
-    return before, now
-
-
-PAIRS: dict[str, Callable[[], tuple[Drawn, Drawn]]] = {
-    "mirrors": mirrors, "bands": bands, "overhang": overhang, "windows": windows, "ground": ground,
-}  # fmt: skip
-
-
-def picture(drawn: Drawn) -> tuple[NDArray[np.float32], cfs.GlareResult]:
-    """The picture of the hour and its glare."""
-    sampling = cfs.Sampling(view_samples=SAMPLES, window_parts=drawn.window_parts)
-    traced, view = cfs.PhaseScene(drawn.scene, sampling), drawn.scene.view
-    light = cfs.PhaseSystems(traced, drawn.systems).light(drawn.sky)
-    shown = light.pictures(np.array([0]), [0] * len(drawn.systems))
-    found = np.zeros(view.width * view.height, dtype=np.float32)
-    found[shown.pixels] = shown.values(np.array([0]))[0]
-    found = found.reshape(view.height, view.width)
-    return found, cfs.evaluate(found, view)
-
-
-def draw(name: str, file: Path) -> str:
-    """Write the pair; what it says in a line."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+def pair(name: str, figure) -> str:
+    """A pair of pictures; what they say in a line."""
     from matplotlib.colors import LogNorm
 
-    figure, axes = plt.subplots(1, 2, figsize=(4.6, 2.4), layout="constrained")
-    said = []
+    figure.set_size_inches(4.6, 2.4)
+    axes, said = figure.subplots(1, 2), []
     for axis, word, drawn in zip(axes, ("before", "now"), PAIRS[name](), strict=True):
         values, glare = picture(drawn)
         shown = axis.imshow(
@@ -184,19 +63,129 @@ def draw(name: str, file: Path) -> str:
         text = f"{word}: Ev {glare.Ev:,.0f} lx, DGP {glare.dgp:.3f}"
         axis.set_title(text, fontsize=7)
         said.append(text)
+    _colours(figure, shown, axes)
+    return "; ".join(said)
+
+
+def disc(figure) -> str:
+    """DGP over the pixels of a picture, with the sun in a dark window; its pixels at one size."""
+    from matplotlib.colors import LogNorm
+
+    figure.set_size_inches(5.6, 2.4)
+    left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
+    rated: dict[str, list[float]] = {"pixels": [], "source": []}
+    for size in SUN_SIZES:
+        whole, found = sun_rated(size)
+        for rule, dgp in found.items():
+            rated[rule].append(dgp)
+        if size == SHOWN:
+            y, x = np.unravel_index(np.argmax(whole), whole.shape)
+            cut = whole[y - CUT : y + CUT + 1, x - CUT : x + CUT + 1]
+            shown = left.imshow(cut, norm=LogNorm(1e2, 1e9), cmap="turbo")
+    left.set_axis_off()
+    left.set_title(f"the sun at {SHOWN} pixels", fontsize=7)
+    _colours(figure, shown, [left])
+    for rule, word in (("pixels", "before: in its pixels"), ("source", "now: a source")):
+        right.plot(SUN_SIZES, rated[rule], "o-", markersize=3, label=word)
+    _labelled(right, "pixels across", "DGP")
+    return "; ".join(f"{rule} {np.round(dgp, 4).tolist()}" for rule, dgp in rated.items())
+
+
+def sun_rated(size: int) -> tuple[NDArray[np.float32], dict[str, float]]:
+    """A picture with the sun in a dark window, and its DGP by the rule of the sun's disc."""
+    drawn = Drawn(office(size=size), [glass(DARK)], sky((0.13, -1.0, 0.22), 800.0, 100.0))
+    shown, hour, view = lit(drawn).pictures(np.array([0]), [0]), np.array([0]), drawn.scene.view
+    values, discs = shown.without_disc(hour)
+    bare, whole = (full_picture(v[0], shown.pixels, view) for v in (values, shown.values(hour)))
+    own = cfs.evaluate(bare, view, disc=discs[0]).dgp
+    return whole, {"pixels": cfs.evaluate(whole, view).dgp, "source": own}
+
+
+def overhang(figure) -> str:
+    """Illuminance below a slab over the distance from the window, by three phases and by paths."""
+    figure.set_size_inches(5.6, 2.4)
+    drawn, said = overhang_room(), []
+    traced = (
+        cfs.PhaseScene(drawn.scene, cfs.Sampling(window_parts=parts), five_phase=False)
+        for parts in (1, 0)
+    )
+    before, now = (
+        cfs.PhaseSystems(one, drawn.systems).light(drawn.sky).illuminance()[:, 0] for one in traced
+    )
+    many = cfs.Sampling(hour_samples=HOUR_SAMPLES)
+    paths = cfs.PathSystems(drawn.scene, drawn.systems, many).light(drawn.sky).illuminance()[:, 0]
+    left, right = figure.subplots(1, 2)
+    left.plot(SENSOR_DEPTHS, paths, "k", linewidth=2.5, alpha=0.4, label="paths")
+    for word, lux in (("before: one D", before), ("now: parts", now)):
+        left.plot(SENSOR_DEPTHS, lux, label=word)
+        right.plot(SENSOR_DEPTHS, lux / paths, label=word)
+        said.append(f"{word} {np.round(lux / paths, 3).tolist()}")
+    _labelled(left, "from the window [m]", "illuminance [lx]")
+    _labelled(right, "from the window [m]", "over paths")
+    return "; ".join(said)
+
+
+def grazing(figure) -> str:
+    """Transmittance of float glass by its Klems matrix over the angle, beside the exact one."""
+    import mitsuba as mi
+
+    figure.set_size_inches(5.6, 2.4)
+    theta, basis = np.radians(GRAZING_DEG), cfs.KLEMS_FULL
+    peak = through_peak(cfs.specular_klems(FLOAT, basis).transmission_front, basis)
+    local = np.stack([np.sin(theta) * 0.6, np.sin(theta) * 0.8, np.cos(theta)])
+    exact, said = pane_values(FLOAT, theta)[0], []
+    left, right = figure.subplots(1, 2)
+    left.plot(GRAZING_DEG, exact, "k", linewidth=2.5, alpha=0.4, label="Fresnel")
+    ways = ("before: linear", None), ("now", specular_exponent(peak, basis))
+    for word, exponent in ways:
+        way = KlemsScattering(basis, peak.scattered, peak.transmittance, exponent)
+        tau = way.through(mi.Vector3f(local.astype(np.float32))).numpy()
+        left.plot(GRAZING_DEG, tau, label=word)
+        right.plot(GRAZING_DEG, 100 * (tau / exact - 1), label=word)
+        at = [int(np.abs(GRAZING_DEG - one).argmin()) for one in (80, 85, 88)]
+        said.append(f"{word} {np.round(100 * (tau / exact - 1)[at], 1).tolist()} %")
+    _labelled(left, "angle of incidence [degrees]", "transmittance")
+    _labelled(right, "angle of incidence [degrees]", "over exact - 1 [%]")
+    return "; ".join(said)
+
+
+CURVES: dict[str, Callable[..., str]] = {
+    "disc": disc, "overhang": overhang, "grazing": grazing,
+}  # fmt: skip
+
+
+def _colours(figure, shown, axes) -> None:
     bar = figure.colorbar(shown, ax=axes, shrink=0.8)
     bar.set_label("cd/m2", fontsize=7)
     bar.ax.tick_params(labelsize=7)
+
+
+def _labelled(axis, across: str, up: str) -> None:
+    axis.set_xlabel(across, fontsize=7)
+    axis.set_ylabel(up, fontsize=7)
+    axis.tick_params(labelsize=7)
+    axis.grid(alpha=0.3)
+    axis.legend(fontsize=7)
+
+
+def draw(name: str, file: Path) -> str:
+    """Write a picture; what it says in a line."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(layout="constrained")
+    FigureCanvasAgg(figure)
+    said = CURVES[name](figure) if name in CURVES else pair(name, figure)
     figure.savefig(file, dpi=100)
-    plt.close(figure)
-    return f"{name}: {'; '.join(said)}"
+    return f"{name}: {said}"
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Draw the pairs."""
+    """Draw the pictures."""
+    names = [*PAIRS, *CURVES]
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of the pictures")
-    parser.add_argument("--only", nargs="+", choices=PAIRS, default=list(PAIRS))
+    parser.add_argument("--only", nargs="+", choices=names, default=names)
     options = parser.parse_args(arguments)
     for name in options.only:
         print(draw(name, options.out / f"office_{name}.png"), flush=True)

@@ -24,7 +24,7 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.matrices.fine_basis import fine_basis
-from mitsuba_cfs.methods.optics import GivenOptics
+from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
@@ -73,7 +73,7 @@ COEFFICIENT_PATHS = 65_536  # of a sensor in each of 16 batches
 def chosen_hours(weather: Weather, every: int) -> AnnualSky:
     """The skies of all sunlit hours of every `every`-th day."""
     series = sky_series(weather)
-    day = np.arange(len(weather.times)) // round(24 / weather.step_h)
+    day = np.arange(len(weather.times)) // weather.per_day
     lit = (series.diffuse_horizontal > 100) & is_up(series.sun) & (day % every == every // 2)
     return annual_sky(weather, SUBDIVISION, hours=np.flatnonzero(lit))
 
@@ -95,8 +95,10 @@ def by_phases(
     Args: ways: what passes the sun in the five-phase method, by name.
     """
     room = DaylightScene(scene.interior, empty(), scene.groups, scene.points, scene.up)
-    T, found = system.transmission_matrix(), {}
-    systems = [[GivenOptics(T, way) for way in ways.values()]]
+    known, found = BsdfOptics(system), {}
+    systems = [
+        [GivenOptics(known.transmission, way, reflection=known.reflection) for way in ways.values()]
+    ]
     three_phase = PhaseSystems(PhaseScene(room, SAMPLING, five_phase=False), systems).light(sky)
     found["three-phase"] = three_phase.illuminance()
     light = PhaseSystems(PhaseScene(room, SAMPLING), systems).light(sky)

@@ -74,7 +74,6 @@ WEEKS = {  # Monday to Sunday
     "April week": ("04-10", "04-16"),
     "July week with a holiday": ("07-03", "07-09"),
 }
-ZONE = "zone_or_zonelist_or_space_or_spacelist_name"
 
 
 def our_year(orientation: str) -> tuple[Weather, ZoneResult]:

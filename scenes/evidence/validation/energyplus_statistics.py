@@ -16,7 +16,7 @@ from scenes.evidence.validation.energyplus_cases import (
     EnergyPlusCase,
     errors,
 )
-from thermal.comfort import adaptive_comfort, running_mean
+from thermal.comfort import comfort_by_outdoors
 from thermal.zone import work_hours
 
 FloatArray = NDArray[np.float64]
@@ -125,8 +125,7 @@ def comfort_classification(
     ours: EnergyPlusCase, theirs: EnergyPlusCase, outdoor_c: FloatArray, band: str
 ) -> Classification:
     """Working hours (8 to 18) judged by both programs' operative temperature at the centre."""
-    mean = running_mean(outdoor_c)
-    chosen = work_hours(8, 18, len(mean)) > 0
+    chosen = work_hours(8, 18, len(outdoor_c)) > 0
     chosen[:FIRST_HOUR] = False
-    judged = [adaptive_comfort(c.centre, mean, band).comfortable[chosen] for c in (ours, theirs)]
-    return classify(*judged)
+    both = [comfort_by_outdoors(c.centre, outdoor_c, band, per_day=24) for c in (ours, theirs)]
+    return classify(*(comfort.comfortable[chosen] for comfort in both))

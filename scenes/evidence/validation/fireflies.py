@@ -7,7 +7,9 @@ Random hours of a year in which the sun's beam falls on a window, of up to three
 glass: a box under an overhang with sunlit ground and a house across the street; a room of an IFC
 file; the Geneva office of raytraverse.  Each pixel is held against the brightest of its 3 x 3
 neighbourhood in a picture by paths with twice as many pixels across, both without the sun's disc.
-A pixel is a firefly above 1.5 times that.
+A pixel is a firefly above 1.5 times that.  The pixels of a picture by paths share what varies
+slowly, which is wrong in corners: what comes near the limit is looked at again, and once more, by
+paths of each pixel's own.
 
     python -m scenes.evidence.validation.fireflies --weather CITY.epw --walls
 
@@ -38,6 +40,7 @@ from scenes.run.inputs import chosen_spaces
 
 LIMIT = 1.5  # times the brightest of the neighbourhood
 FINER = 2  # times as many pixels across in the pictures by paths
+LOOKS = ((1.15, 256), (1.3, 2048))  # ratio above which pixels have paths of their own; how many
 LEAST_BEAM = 5000.0  # [lx] normal to the sun, of the hours that are drawn
 BRIGHT = 2000.0  # [cd/m2] evalglare's threshold
 DARK = 0.1  # [cd/m2] below it nothing shines
@@ -73,7 +76,8 @@ class Found:
     beyond: NDArray[np.int64]  # [H] pixels above the limit
     bright: NDArray[np.int64]  # [H] of these, the ones that evalglare might take for a source
     pixels: int  # in all hours together
-    noise: NDArray[np.float64]  # [H] of the neighbourhoods' brightest, its mean over pixels
+    looked: NDArray[np.int64]  # [H] pixels held against paths of their own
+    noise: NDArray[np.float64]  # [H] of the brightest around these, its mean
 
     def line(self) -> str:
         """The row of the table."""
@@ -81,7 +85,8 @@ class Found:
             f"{len(self.worst)} hours, {self.pixels:,} pixels | worst {self.worst.max():.2f} | "
             f"{self.beyond.sum()} beyond {LIMIT} in {(self.beyond > 0).sum()} hours, "
             f"{self.bright.sum()} of them above {BRIGHT:.0f} cd/m2 | "
-            f"noise of the neighbourhood {100 * self.noise.mean():.1f} %"
+            f"{self.looked.sum()} by paths of their own, "
+            f"noise of the brightest around {100 * self.noise.mean():.1f} %"
         )
 
 
@@ -144,25 +149,52 @@ def held(lit: LitScene, hours: int, *, samples: int, seed: int = 0) -> Found:
     finer = replace(view, width=FINER * view.width, height=FINER * view.height)
     paths = cfs.PathSystems(replace(lit.scene, view=finer), lit.systems).light(sky)
     pictures = light.pictures(np.arange(len(sky.lit)), [0] * len(lit.systems))
-    worst, beyond, bright, noise = [], [], [], []
+    found = []
     for hour in range(len(sky.lit)):
         values = pictures.without_disc(np.array([hour]))[0][0]
         ours = full_picture(values, pictures.pixels, view)
-        halves = [
-            paths.picture(hour, disc=False, samples=max(samples // 2, 1), seed=2 * seed + i)
-            for i in range(2)
-        ]
-        top = brightest(np.mean(halves, axis=0))
-        off = np.abs(brightest(halves[0]) - brightest(halves[1])) / 2
-        shown = top > DARK
-        noise.append(float((off[shown] / top[shown]).mean()))
-        ratio = np.where(ours > DARK, ours / np.maximum(top, DARK), 0.0)
-        worst.append(float(ratio.max()))
-        beyond.append(int((ratio > LIMIT).sum()))
-        bright.append(int((ours[ratio > LIMIT] > BRIGHT).sum()))
-        print(f"{lit.name} hour {sky.lit[hour]}: {worst[-1]:.2f}, {beyond[-1]}", file=sys.stderr)
+        first = paths.picture(hour, disc=False, samples=samples, seed=seed)
+        ratio, count, noise = _ratio(ours, brightest(first)), 0, 0.0
+        for i, (least, more) in enumerate(LOOKS):
+            again = np.flatnonzero(ratio > least)
+            if len(again):
+                around, off = looked_at(paths, hour, again, samples=more, seed=2 * seed + i)
+                ratio.flat[again] = _ratio(ours.flat[again], around)
+                count, noise = max(count, len(again)), float((off / around).mean())
+        beyond = ratio > LIMIT
+        bright = int((ours[beyond] > BRIGHT).sum())
+        found.append((float(ratio.max()), int(beyond.sum()), bright, count, noise))
+        where = [divmod(int(i), view.width) for i in np.flatnonzero(beyond)]
+        print(f"{lit.name} hour {sky.lit[hour]}: {found[-1]} {where}", file=sys.stderr, flush=True)
+    worst, over, bright, looked, noise = map(np.array, zip(*found, strict=True))
     count = len(pictures.pixels) * len(sky.lit)
-    return Found(*map(np.array, (worst, beyond, bright)), count, np.array(noise))
+    return Found(worst, over, bright, count, looked, noise)
+
+
+def _ratio(ours: NDArray[np.float64], around: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of what shines to the brightest around it."""
+    return np.where(ours > DARK, ours / np.maximum(around, DARK), 0.0)
+
+
+def looked_at(
+    paths: cfs.PathLight, hour: int, pixels: NDArray[np.int64], *, samples: int, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The brightest of the finer pixels around some pixels [n], each by its own paths; its noise.
+
+    One half of the paths says which is the brightest, the other how bright it is: the largest of
+    many noisy values would be too large.
+    """
+    width = paths.filled.scene.view.width
+    row, column = np.divmod(pixels, width // FINER)
+    down, across = np.divmod(np.arange((3 * FINER) ** 2), 3 * FINER)
+    down, across = (FINER * a[:, None] + b - FINER for a, b in ((row, down), (column, across)))
+    around = np.clip(down, 0, width - 1) * width + np.clip(across, 0, width - 1)
+    options = {"samples": samples // 2, "tile": 1, "pixels": np.unique(around), "disc": False}
+    halves = [paths.picture(hour, seed=1000 + 2 * seed + i, **options) for i in range(2)]
+    first, second = (half.ravel()[around] for half in halves)
+    every = np.arange(len(pixels))
+    of_first, of_second = first[every, second.argmax(axis=1)], second[every, first.argmax(axis=1)]
+    return (of_first + of_second) / 2, np.abs(of_first - of_second) / 2
 
 
 def brightest(finer: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -197,7 +229,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--geneva", type=Path)
     parser.add_argument("--hours", type=int, default=67, help="of each scene")
     parser.add_argument("--size", type=int, default=160, help="[px]")
-    parser.add_argument("--samples", type=int, default=16, help="of each pixel by paths")
+    parser.add_argument("--samples", type=int, default=16, help="of each pixel by paths, shared")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--walls", action="store_true", help="the wall beside the box's window")
@@ -215,7 +247,7 @@ def main(arguments: list[str] | None = None) -> None:
     for lit in scenes:
         found = held(lit, options.hours, samples=options.samples, seed=options.seed)
         rows[lit.name] = {
-            name: getattr(found, name).tolist() for name in ("worst", "beyond", "bright", "noise")
+            name: getattr(found, name).tolist() for name in ("worst", "beyond", "bright", "looked")
         }
         print(f"| {lit.name} | {found.line()} |", flush=True)
     if options.json:

@@ -68,6 +68,7 @@ class GlareCase:
     sky: AnnualSky
     times: tuple[str, ...]
     raised: tuple[float, ...] = (0.0,)  # [m] eyes of the measurement above the view's, for a mean
+    sun: str = "source"  # the disc in the measurement: apart as in the methods, or in its pixels
 
 
 def measured(
@@ -80,13 +81,17 @@ def measured(
         raised = replace(scene, view=replace(scene.view, position=tuple(eye)))
         light, row = measurement(raised, case.exterior, sampling).light(case.sky), []
         for hour in range(len(case.sky.lit)):
-            picture = light.picture(hour, seed=SEED)
-            found = evaluate(picture, geometry)
+            picture = light.picture(hour, seed=SEED, disc=False)
+            whole = light.with_disc(picture, hour)
+            if case.sun == "source":
+                found = evaluate(picture, geometry, disc=light.disc(hour))
+            else:
+                found = evaluate(whole, geometry)
             row.append((found.dgp, found.Ev))
             if pictures is not None:
                 title = f"{case.name}, {case.times[hour]}: DGP {found.dgp:.3f}"
                 name = f"{case.name.replace(' ', '_')}_{hour:02d}.png"
-                write_falsecolour(pictures / name, picture, title=title)
+                write_falsecolour(pictures / name, whole, title=title)
         rows.append(row)
     dgp, lux = np.mean(rows, axis=0).T
     return dgp, lux
@@ -164,27 +169,46 @@ def write_series(runs: list[dict], folder: Path) -> None:
     """DGP of the measurement and of each method's metrics over the hours: Figures 33 to 44 (PNG).
 
     A picture for each method (36 to 38, 39 to 41, 42 to 44), with the measurement (33 to 35) in it,
-    a row for each system.
+    a row for each system, a column for each of its days.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     folder.mkdir(parents=True, exist_ok=True)
+    columns = max(len(_days(run)) for run in runs)
     for method in METHODS:
-        figure = Figure(figsize=(9, 2.6 * len(runs)), dpi=130, layout="constrained")
+        figure = Figure(figsize=(3.2 * columns, 1.7 * len(runs)), dpi=100, layout="constrained")
         FigureCanvasAgg(figure)
-        rows = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
-        for axes, run in zip(rows, runs, strict=True):
-            at = np.arange(len(run["times"]))
-            axes.plot(at, run["measured"], "ko-", label="slats as geometry", markersize=3)
-            for metric, style in zip(GLARE, ("-", "--", ":"), strict=True):
-                axes.plot(at, run["methods"][f"{method} {metric}"], style, label=metric)
-            axes.set_xticks(at, run["times"], rotation=60, fontsize=6)
-            axes.set_ylabel("DGP")
-            axes.set_title(f"{run['system']}, {method}", fontsize=9)
-            axes.grid(alpha=0.3)
-        rows[0].legend(fontsize=7)
+        places = figure.subplots(len(runs), columns, squeeze=False, sharey=True)
+        for row, run in zip(places, runs, strict=True):
+            for axes in row[len(_days(run)) :]:
+                axes.remove()
+            for axes, (day, at) in zip(row, _days(run).items(), strict=False):
+                _draw_day(axes, run, at, method)
+                axes.set_title(f"{run['system']}, {day}, {method}", fontsize=7)
+        places[0, 0].legend(fontsize=6)
         figure.savefig(folder / f"{method}.png")
+
+
+def _days(run: dict) -> dict[str, list[int]]:
+    """The hours of each day of a run, by number."""
+    found: dict[str, list[int]] = {}
+    for i, time_of_day in enumerate(run["times"]):
+        found.setdefault(time_of_day.split()[0], []).append(i)
+    return found
+
+
+def _draw_day(axes, run: dict, at: list[int], method: str) -> None:
+    clock = [run["times"][i].split()[1].split(":") for i in at]
+    hour = [int(h) + int(m) / 60 for h, m in clock]
+    measured_dgp = [run["measured"][i] for i in at]
+    axes.plot(hour, measured_dgp, "ko-", label="slats as geometry", markersize=3)
+    for metric, style in zip(GLARE, ("-", "--", ":"), strict=True):
+        values_of = run["methods"][f"{method} {metric}"]
+        axes.plot(hour, [values_of[i] for i in at], style, label=metric)
+    axes.set_ylim(0, 1.02)
+    axes.tick_params(labelsize=7)
+    axes.grid(alpha=0.3)
 
 
 def _cell(found: tuple[float, ...]) -> str:

@@ -91,8 +91,8 @@ def _between(layer: KlemsBsdf, both: KlemsBsdf) -> KlemsBsdf:
 def sunny_days(weather: Weather, month: int, day: int, count: int) -> NDArray[np.int64]:
     """Days of the year [count] with the most direct sun within a fortnight of a date."""
     series = sky_series(weather)
-    of_day = series.direct_normal.reshape(-1, round(24 / weather.step_h)).sum(axis=1)
-    dates = weather.midpoints[:: round(24 / weather.step_h)]
+    of_day = series.direct_normal.reshape(-1, weather.per_day).sum(axis=1)
+    dates = weather.midpoints[:: weather.per_day]
     target = int(np.flatnonzero((dates.month == month) & (dates.day == day))[0])
     near = np.arange(max(0, target - 14), min(len(of_day), target + 15))
     return np.sort(near[np.argsort(-of_day[near], kind="stable")[:count]])
@@ -100,7 +100,7 @@ def sunny_days(weather: Weather, month: int, day: int, count: int) -> NDArray[np
 
 def lit_hours(weather: Weather, days: NDArray[np.int64], every: int) -> NDArray[np.int64]:
     """Every `every`-th daylit hour of some days."""
-    steps = round(24 / weather.step_h)
+    steps = weather.per_day
     bright = sky_series(weather).diffuse_horizontal > DIFFUSE
     hours = (days[:, None] * steps + np.arange(0, steps, every)).ravel()
     return hours[bright[hours]]

@@ -9,7 +9,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
-from mitsuba_cfs.methods.optics import GivenOptics
+from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
 from mitsuba_cfs.trace.direct_sun import KlemsScattering
 from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
 
@@ -95,4 +95,6 @@ def tree_optics(
         between: see `TreeBehind`; mirrors: see `PathOptics`.
     """
     way = TreeBehind(tree, glass, between)
-    return GivenOptics(klems.transmission_matrix(), way, PathOptics(way, way, mirrors))
+    known = BsdfOptics(klems)
+    paths = PathOptics(way, way, mirrors)
+    return GivenOptics(known.transmission, way, paths, known.reflection)

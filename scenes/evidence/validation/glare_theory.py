@@ -165,6 +165,7 @@ def cases(scene: DaylightScene, levels: int) -> list[GlareCase]:
                     sky,
                     (name,),
                     tuple(SPACING * np.arange(EYES) / EYES),
+                    "pixels",  # the slits are finer than the disc: an eye does not tell them apart
                 )
             )
     return found

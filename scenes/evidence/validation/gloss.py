@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import tempfile
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -38,12 +38,14 @@ from mitsuba_cfs.trace.point_in_time import point_in_time
 from scenes.cost import room
 from scenes.evidence.benchmarks import radiance
 from scenes.evidence.validation.rendered_scene import RenderedScene
+from scenes.evidence.validation.scene_rows import add_row_options, show_rows
 
 EYE, DIRECTION = (-1.8, -2.0, 1.2), (0.0, 1.0, 0.0)
 TURN = np.array([-1.0, -1.0, 1.0])  # of the room, its window to the north
 FACADE = 10.0  # before the window [m]
 BACKING = np.array([0.0, 0.05, 0.0])  # of dark behind panes [m]
 SIZE = 200  # [px]
+SEEDS = (0, 1, 2)  # of our pictures and phases
 SUN = np.array([0.25, -1.0, 0.8]) / np.linalg.norm([0.25, -1.0, 0.8])
 SUN_ILLUMINANCE = {
     "mirror": 80_000.0,
@@ -94,10 +96,15 @@ class Outcome:
     ev_error: float
     ev_picture: float
     ev_five_phase: float  # of its picture
+    ev_five_phase_error: float  # these and what follows from several seeds
     ev_five_phase_point: float
+    ev_five_phase_point_error: float
     dgp_rpict: float
+    dgp_rpict_error: float  # from halves of its pixels
     dgp: float
+    dgp_error: float
     dgp_five_phase: float
+    dgp_five_phase_error: float
     without: float  # our Ev with the specular part of no surface
     diffuse: float  # our Ev with as much reflected, at normal incidence, but diffusely
 
@@ -170,20 +177,33 @@ def outcome(name: str, folder: Path, *, size: int = SIZE, points: int = 8) -> Ou
     found, plain, even = (
         _eye(one, view) for one in (given, _without_gloss(given), _diffuse(given))
     )
-    picture = point_in_time_picture(given.lit, given.sky, view, samples=64)
-    picture_of_theirs = theirs.picture(view)
-    phases, at_point = _five_phase(given, view)
-    np.savez(folder / "pictures.npz", ours=picture, theirs=picture_of_theirs, five_phase=phases)
-    ours, rated = evaluate(picture, view), evaluate(picture_of_theirs, view, illuminance=ev)
-    third = evaluate(phases, view)
+    pictures = [
+        point_in_time_picture(given.lit, given.sky, view, samples=64, seed=seed) for seed in SEEDS
+    ]
+    halves = theirs.halves(view)
+    phases, at_point = zip(*(_five_phase(given, view, seed) for seed in SEEDS), strict=True)
+    np.savez(
+        folder / "pictures.npz", ours=pictures[0], theirs=np.mean(halves, axis=0),
+        five_phase=phases[0],
+    )  # fmt: skip
+    rated = evaluate(np.mean(halves, axis=0), view, illuminance=ev).dgp
+    first, second = (evaluate(half, view, illuminance=ev).dgp for half in halves)
+    ours, third = ([evaluate(one, view) for one in of] for of in (pictures, phases))
     return Outcome(
-        name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]), ours.Ev,
-        third.Ev, at_point, rated.dgp, ours.dgp, third.dgp, float(plain.values[0]),
-        float(even.values[0]),
+        name, ev, ev_error, float(found.values[0]), float(found.standard_error[0]),
+        _mean(one.Ev for one in ours)[0], *_mean(one.Ev for one in third), *_mean(at_point),
+        rated, abs(first - second) / 2, *_mean(one.dgp for one in ours),
+        *_mean(one.dgp for one in third), float(plain.values[0]), float(even.values[0]),
     )  # fmt: skip
 
 
-def _five_phase(given: Case, view: View) -> tuple[np.ndarray, float]:
+def _mean(values: Iterable[float]) -> tuple[float, float]:
+    """Mean of several seeds' values, and its standard error."""
+    found = np.array(list(values))
+    return float(found.mean()), float(found.std(ddof=1) / np.sqrt(len(found)))
+
+
+def _five_phase(given: Case, view: View, seed: int) -> tuple[np.ndarray, float]:
     """Picture and Ev by five phases; the sun lies on the sky patch that it stands in."""
     reinhart = ReinhartSky(4)
     strength, sun = given.sun_luminance * SUN_SOLID_ANGLE, np.zeros((reinhart.size, 1))
@@ -196,7 +216,8 @@ def _five_phase(given: Case, view: View) -> tuple[np.ndarray, float]:
     points, normals = np.array([view.position]), np.array([view.direction])
     around = given.interior, given.exterior, given.groups
     scene = cfs.DaylightScene(*around, points, normals, view=view)
-    traced = cfs.PhaseScene(scene, cfs.Sampling(outdoor_samples=16, view_samples=16))
+    sampling = cfs.Sampling(outdoor_samples=16, view_samples=16, seed=seed)
+    traced = cfs.PhaseScene(scene, sampling)
     clear = cfs.AngularOptics(np.ones(64))
     light = cfs.PhaseSystems(traced, [[clear]]).light(sky)
     shown = light.pictures(np.array([0]), [0])
@@ -234,19 +255,15 @@ def main() -> None:
     parser.add_argument("--cases", nargs="+", choices=MATERIALS, default=list(MATERIALS))
     parser.add_argument("--size", type=int, default=SIZE)
     parser.add_argument("--points", type=int, default=8, help="times that rtrace finds Ev")
-    parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
-    parser.add_argument("--json", type=Path)
+    add_row_options(parser)
     options = parser.parse_args()
     variants.activate()
-    rows = []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = (options.keep or Path(temporary)).resolve()
+
+    def rows(folder: Path) -> Iterator[Outcome]:
         for name in options.cases:
-            row = outcome(name, folder / name, size=options.size, points=options.points)
-            rows.append(asdict(row))
-            print(json.dumps(rows[-1], indent=1), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1))
+            yield outcome(name, folder / name, size=options.size, points=options.points)
+
+    show_rows(options, rows, lambda row: json.dumps(asdict(row), indent=1))
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from datetime import date
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
@@ -35,7 +36,7 @@ from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.matrix import sky_series
+from mitsuba_cfs.sky.matrix import SkySeries, sky_series
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.calibration.costs import GLARE
 from scenes.calibration.errors import FILE, LEAST, MeasuredCase, MeasuredErrors
@@ -47,6 +48,7 @@ from scenes.evidence.validation.blind_room import blind_layer
 REFERENCE_SAMPLES, REFERENCE_SEED = 48, 11  # paths of a pixel of the reference
 BRIGHT = 8_000.0  # [lx] horizontal diffuse: hours below it are left out
 SHINING = 5_000.0  # [lx] normal to the sun
+SUNNY = 20_000.0  # [lx] the same, of hours that are to have the sun
 WALL = (12.0, 8.0, 8.0)  # [m] width, height and distance of the building opposite
 BARS = (0.05, 0.1, 0.2)  # errors that a user may ask for
 TREE_TILT = 20.0  # [degrees]
@@ -111,14 +113,10 @@ def sky(scene: DaylightScene, hours: int, in_view: bool) -> AnnualSky:
     Of those without, half have the sun before the window.
     """
     weather = read_epw(WEATHER)
-    series, view = sky_series(weather), scene.view
+    series = sky_series(weather)
     bright = series.diffuse_horizontal > BRIGHT
-    sunny = bright & (series.direct_normal > 20_000)
-    eye = scene.groups, view.position, view.direction
-    seen = np.zeros(len(bright), dtype=bool)
-    for hour in np.flatnonzero(sunny):
-        sun = series.sun[hour : hour + 1]
-        seen[hour] = sun_in_view(*eye, sun, np.ones(1, dtype=bool)) > 0
+    sunny = bright & (series.direct_normal > SUNNY)
+    seen = with_sun(scene, series)
     before = sunny & ~seen & (series.sun[:, 1] < -0.3)
     sets = [(before, hours - hours // 2), (bright & ~seen & ~before, hours // 2)]
     chosen = []
@@ -126,6 +124,17 @@ def sky(scene: DaylightScene, hours: int, in_view: bool) -> AnnualSky:
         found = np.flatnonzero(which)
         chosen.append(found[np.linspace(0, len(found) - 1, count + 2)[1:-1].astype(int)])
     return annual_sky(weather, hours=np.sort(np.concatenate(chosen)))
+
+
+def with_sun(scene: DaylightScene, series: SkySeries) -> NDArray[np.bool_]:
+    """Which hours [H] are bright and have the sun in a window before the eye."""
+    view, bright = scene.view, series.diffuse_horizontal > BRIGHT
+    seen = np.zeros(len(bright), dtype=bool)
+    for hour in np.flatnonzero(bright & (series.direct_normal > SUNNY)):
+        sun = series.sun[hour : hour + 1]
+        eye = scene.groups, view.position, view.direction
+        seen[hour] = sun_in_view(*eye, sun, np.ones(1, dtype=bool)) > 0
+    return seen
 
 
 def measured(scene: DaylightScene, traced: dict, bsdf: Bsdf, lit: AnnualSky) -> dict[str, float]:

@@ -1,7 +1,7 @@
 r"""What `--method auto` expects, judged on systems, suns and rooms that it was not made of.
 
     python -m scenes.evidence.validation.method_errors_fresh --weather CITY.epw BSDF.xml ... \
-        [--hours 4] [--size 96] [--rooms near deep] [--json FILE]
+        [--hours 4] [--size 96] [--rooms near deep] [--sun-in-view] [--json FILE]
 
 Rooms that `method_errors` does not have: "near", 6 x 4 m with three windows to the west and the
 eye 1.2 m behind the middle one; "deep", 3.5 x 8 m with a strip of glass below the ceiling to the
@@ -35,7 +35,7 @@ from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.calibration.errors import FILE, LEAST, MeasuredErrors
-from scenes.evidence.validation.method_errors import BARS, BRIGHT, measured, traits_of
+from scenes.evidence.validation.method_errors import BARS, BRIGHT, measured, traits_of, with_sun
 
 NEAR = [WindowRectangle(x, 0.8, 1.6, 1.7) for x in (0.3, 2.2, 4.1)]
 DEEP = [WindowRectangle(0.2, 1.9, 3.1, 0.8)]
@@ -60,10 +60,14 @@ def rooms(size: int) -> dict[str, DaylightScene]:
     return found
 
 
-def fresh_hours(weather: Weather, hours: int) -> AnnualSky:
-    """Bright hours spread over a year, wherever their sun stands."""
+def fresh_hours(weather: Weather, hours: int, scene: DaylightScene | None = None) -> AnnualSky:
+    """Bright hours spread over a year, wherever their sun stands.
+
+    Args: scene: the sun stands in a window before its eye.
+    """
     series = sky_series(weather)
-    bright = np.flatnonzero(series.diffuse_horizontal > BRIGHT)
+    chosen = series.diffuse_horizontal > BRIGHT if scene is None else with_sun(scene, series)
+    bright = np.flatnonzero(chosen)
     return annual_sky(
         weather, hours=bright[np.linspace(0, len(bright) - 1, hours + 2)[1:-1].astype(int)]
     )
@@ -119,14 +123,16 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--weather", type=Path, required=True)
     parser.add_argument("--rooms", nargs="+", choices=("near", "deep"), default=["near", "deep"])
     parser.add_argument("--hours", type=int, default=4)
+    parser.add_argument("--sun-in-view", action="store_true", help="in a window before the eye")
     parser.add_argument("--size", type=int, default=96, help="pixels of a side")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args(arguments)
     variants.activate()
-    known, lit = rooms(options.size), fresh_hours(read_epw(options.weather), options.hours)
-    rows = [
-        row for name in options.rooms for row in compared(known[name], lit, options.files, name)
-    ]
+    known, weather, rows = rooms(options.size), read_epw(options.weather), []
+    for name in options.rooms:
+        scene = known[name]
+        lit = fresh_hours(weather, options.hours, scene if options.sun_in_view else None)
+        rows += compared(scene, lit, options.files, name)
     print_table(rows)
     if options.json is not None:
         options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

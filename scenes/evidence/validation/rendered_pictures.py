@@ -14,11 +14,9 @@ ours of the picture alone.
 from __future__ import annotations
 
 import argparse
-import json
-import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import mitsuba as mi
@@ -45,6 +43,7 @@ from scenes.cost import room
 from scenes.evidence.benchmarks import radiance
 from scenes.evidence.benchmarks.annual_product import SYSTEM, WEATHER
 from scenes.evidence.validation.rendered_scene import RenderedScene
+from scenes.evidence.validation.scene_rows import add_row_options, show_rows
 
 EYE, DIRECTION = (1.8, 2.0, 1.2), (0.0, -1.0, 0.0)
 SIZE = 200  # [px] of the pictures
@@ -191,6 +190,17 @@ def outcomes(
             )  # fmt: skip
 
 
+def line(row: Outcome) -> str:
+    """A row of the table."""
+    return (
+        f"{row.system:6} {row.moment} {row.altitude_deg:5.1f} deg  Ev "
+        f"{row.ev_rtrace:9.1f} +- {row.ev_rtrace_error:.1f}  "
+        f"{row.ev:9.1f} ({100 * (row.ev / row.ev_rtrace - 1):+.2f} %)  DGP "
+        f"{row.dgp_rpict:.4f}  {row.dgp:.4f} ({row.dgp - row.dgp_rpict:+.4f})  sources "
+        f"{row.sources_rpict} {row.sources}  {row.seconds_rpict:.0f} s {row.seconds:.1f} s"
+    )
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -198,27 +208,15 @@ def main() -> None:
     parser.add_argument("--weather", type=Path, default=WEATHER)
     parser.add_argument("--size", type=int, default=SIZE)
     parser.add_argument("--every", type=int, default=1, help="moments from one to the next")
-    parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
-    parser.add_argument("--json", type=Path)
+    add_row_options(parser)
     options = parser.parse_args()
     variants.activate()
     chosen = moments(read_epw(options.weather))[:: options.every]
-    rows = []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = options.keep or Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        for row in outcomes(options.systems, chosen, folder.resolve(), size=options.size):
-            rows.append(asdict(row))
-            print(
-                f"{row.system:6} {row.moment} {row.altitude_deg:5.1f} deg  Ev "
-                f"{row.ev_rtrace:9.1f} +- {row.ev_rtrace_error:.1f}  "
-                f"{row.ev:9.1f} ({100 * (row.ev / row.ev_rtrace - 1):+.2f} %)  DGP "
-                f"{row.dgp_rpict:.4f}  {row.dgp:.4f} ({row.dgp - row.dgp_rpict:+.4f})  sources "
-                f"{row.sources_rpict} {row.sources}  {row.seconds_rpict:.0f} s {row.seconds:.1f} s",
-                flush=True,
-            )
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1))
+    show_rows(
+        options,
+        lambda folder: outcomes(options.systems, chosen, folder, size=options.size),
+        line,
+    )
 
 
 if __name__ == "__main__":

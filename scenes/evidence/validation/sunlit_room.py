@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-SURFACES = ("facade", "left", "right", "back", "floor", "ceiling")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,10 +12,8 @@ sun that passes straight on: in the tree, and between the layer's own slats or t
 from __future__ import annotations
 
 import argparse
-import json
-import tempfile
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import drjit as dr
@@ -42,6 +40,7 @@ from mitsuba_cfs.trace.sampling import lattice_2d
 from scenes.cost import room
 from scenes.evidence.benchmarks.annual_product import WEATHER
 from scenes.evidence.validation import rendered_pictures as rendered
+from scenes.evidence.validation.scene_rows import add_row_options, show_rows
 
 SLAT_RAYS = 1 << 16
 PATHS = 1 << 32  # of a tree, over all pairs of incident and outgoing cells
@@ -181,22 +180,13 @@ def main() -> None:
     parser.add_argument("--levels", type=int, default=5, help="of the layer's tree")
     parser.add_argument("--every", type=int, default=1, help="moments from one to the next")
     parser.add_argument("--size", type=int, default=120, help="[px]")
-    parser.add_argument("--keep", type=Path, help="folder for scenes and pictures")
-    parser.add_argument("--json", type=Path)
+    add_row_options(parser)
     options = parser.parse_args()
     variants.activate()
-    rows = []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = (options.keep or Path(temporary)).resolve()
-        folder.mkdir(parents=True, exist_ok=True)
-        chosen = rendered.moments(cfs.read_epw(WEATHER))[:: options.every]
-        view = fisheye(rendered.EYE, rendered.DIRECTION, options.size)
-        given = options.tree, options.layer, options.levels
-        for row in outcomes(*given, chosen, view, folder):
-            rows.append(asdict(row))
-            print(line(row), flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1))
+    chosen = rendered.moments(cfs.read_epw(WEATHER))[:: options.every]
+    view = fisheye(rendered.EYE, rendered.DIRECTION, options.size)
+    given = options.tree, options.layer, options.levels
+    show_rows(options, lambda folder: outcomes(*given, chosen, view, folder), line)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,61 @@
+"""Sentences on g_tot: the shipped blind's own figure and class, layers by ISO 52022-3."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import scenes.demo
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
+from scenes.comply.blinds import open_and_closed
+from scenes.comply.solar import solar_sentence, solar_sentences
+from scenes.fenestration.ratings import rated_state
+from scenes.fenestration.systems import read_system
+
+BLIND = Path(scenes.demo.__file__).with_name("venetian_blind.xml")
+LAYERS = """
+shading_position = "internal"
+[[layers]]
+thickness = 0.006
+solar = [0.775, 0.071, 0.071]
+gap = { width = 0.05 }
+[[layers]]
+openness = 0.02
+"""
+
+
+def test_the_shipped_blind_by_its_file():
+    """`venetian_blind.toml`: 0.2093, from 0.15 to 0.35: class 2."""
+    text = solar_sentence(read_system(BLIND))
+    assert "g_tot 0.21 at normal incidence (as the heat balance takes it), class 2 of" in text
+
+
+def test_layers_are_rated_by_the_standard(tmp_path):
+    """Where the layers are known the line is `cfs bsdf thermal`'s row of ISO 52022-3."""
+    shape = (KLEMS_FULL.size, KLEMS_FULL.size)
+    t, r = np.full(shape, 0.1 / np.pi), np.full(shape, 0.5 / np.pi)
+    sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, t, t, r, r)
+    path = tmp_path / "sheet.xml"
+    write_bsdf_xml(BsdfFile({"Visible": sheet, "Solar": sheet}, name="sheet"), path)
+    path.with_suffix(".toml").write_text(LAYERS)
+    rows = {
+        row["method"]: row for row in rated_state(path, place=None, glazing=None, kappa=0.4).rows()
+    }
+    wanted = rows["ISO 52022-3, reference"]
+    text = solar_sentence(read_system(path))
+    assert f"g_tot {wanted['g_tot']:.2f} at normal incidence (ISO 52022-3, reference)" in text
+    assert f"class {wanted['class of g_tot']} of EN 14501" in text
+
+
+def test_each_state_has_one_sentence_and_the_default_shade_none():
+    blind = read_system(BLIND)
+    other = replace(blind, name="other", u_value=None, g_value=None, g_by_patch=None, closure=None)
+    states = {"north": (other, blind), "south": (other, blind)}
+    texts = list(solar_sentences(states))
+    assert [text.partition(":")[0] for text in texts] == ["other", blind.name]
+    assert "U was not given" in texts[0] and "not given" not in texts[1]
+    shaded = open_and_closed({"north": (other,)}, None)
+    assert len(shaded["north"]) == 2 and len(list(solar_sentences(shaded))) == 1

@@ -1,0 +1,176 @@
+"""Light that windows reflect outdoors and that what stands before them sends back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
+
+from . import rooms
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+K = KLEMS_FULL.size
+OMEGA = KLEMS_FULL.projected_solid_angles()
+
+
+def small(name: str, centre, normal) -> WindowGroup:
+    """An upright window of a decimetre."""
+    side = 0.05 * np.cross([0.0, 0.0, 1.0], normal)
+    up = np.array([0.0, 0.0, 0.05])
+    middle = np.asarray(centre, dtype=float)
+    corners = [middle + a * side + b * up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return WindowGroup(name, (WindowSurface(name, rooms.quad(*corners)),))
+
+
+def test_windows_that_face_each_other_see_what_leaves_towards_them() -> None:
+    """The patches are those that a file names them by: aside, and one window above the other."""
+    from mitsuba_cfs.trace.window_exchange import outdoor_exchange
+
+    far = rooms.surfaces([(rooms.quad((0, 9, 9), (1, 9, 9), (1, 9, 8), (0, 9, 8)), 0.0)])
+    places = np.array([[0.0, 0.0, 1.0], [1.0, -0.8, 1.6]])
+    groups = [small("north", places[0], [0, -1, 0]), small("south", places[1], [0, 1, 0])]
+    found = outdoor_exchange(far, groups, samples=4096).reshape(2, K, 2, K)
+    for here, there in ((0, 1), (1, 0)):
+        way = normalize(places[there] - places[here])
+        came, went = np.unravel_index(np.argmax(found[here, :, there]), (K, K))
+        towards = groups[here].frame @ way
+        left = groups[there].frame @ -way
+        assert KLEMS_FULL.incident_directions()[came] @ towards > np.cos(np.radians(12))
+        assert KLEMS_FULL.outgoing_directions(front=True)[went] @ left > np.cos(np.radians(12))
+        # the other's share of the view by areas and distance, over that of all patches
+        distance2 = ((places[there] - places[here]) ** 2).sum()
+        share = 0.01 * towards[2] * left[2] / distance2 / np.pi
+        seen = OMEGA @ found[here, :, there].sum(axis=1) / np.pi
+        assert seen == pytest.approx(share, rel=0.15)
+        assert not found[here, :, here].any()
+
+
+def test_all_that_leaves_into_a_white_box_comes_back() -> None:
+    from mitsuba_cfs.trace.window_exchange import outdoor_exchange
+
+    box = rooms.surfaces(
+        [
+            (rooms.quad((-1, -2, 0), (3, -2, 0), (3, -2, 3), (-1, -2, 3)), 1.0),
+            (rooms.quad((-1, -2, 0), (3, -2, 0), (3, 0, 0), (-1, 0, 0)), 1.0),
+            (rooms.quad((-1, -2, 3), (3, -2, 3), (3, 0, 3), (-1, 0, 3)), 1.0),
+            (rooms.quad((-1, -2, 0), (-1, 0, 0), (-1, 0, 3), (-1, -2, 3)), 1.0),
+            (rooms.quad((3, -2, 0), (3, 0, 0), (3, 0, 3), (3, -2, 3)), 1.0),
+        ]
+    )
+    pane = rooms.quad((-1, 0, 0), (3, 0, 0), (3, 0, 3), (-1, 0, 3))
+    groups = [WindowGroup("front", (WindowSurface("front", pane),))]
+    found = outdoor_exchange(box, groups, samples=256, max_depth=64)
+    assert found.sum(axis=2) == pytest.approx(1.0, abs=0.12)
+    assert OMEGA @ found[0].sum(axis=1) / np.pi == pytest.approx(1.0, rel=0.01)
+
+
+def mirroring(front: float):
+    """Glass of 0.6 that mirrors outdoors."""
+    from mitsuba_cfs.bsdf.klems import KlemsBsdf
+    from mitsuba_cfs.methods.optics import BsdfOptics
+
+    through, mirror = np.diag(0.6 / OMEGA), np.diag(front / OMEGA)
+    return BsdfOptics(KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, mirror, np.zeros((K, K))))
+
+
+def between_fins():
+    """A room, bright walls 1 m long to both sides of its window, and an eye."""
+    from mitsuba_cfs.images.view import fisheye
+    from mitsuba_cfs.methods.scene import DaylightScene
+
+    room, groups = rooms.test_room()
+    corners = np.concatenate([w.triangles for w in groups[0].windows]).reshape(-1, 3)
+    (x0, y, z0), (x1, _, z1) = corners.min(axis=0), corners.max(axis=0)
+    fins = [
+        (rooms.quad((x, y, z0), (x, y - 1, z0), (x, y - 1, z1 + 1), (x, y, z1 + 1)), 0.8)
+        for x in (x0 - 0.02, x1 + 0.02)
+    ]
+    points = np.array([[1.8, 1.0, 0.8], [0.8, 2.5, 0.8]])
+    view = fisheye((1.8, 2.0, 1.2), (0.0, -1.0, 0.0), 30)
+    up = np.tile([0.0, 0.0, 1.0], (2, 1))
+    return DaylightScene(room, rooms.surfaces(fins), groups, points, up, view)
+
+
+def hours(subdivision: int) -> AnnualSky:
+    """Two hours: the sun aside, and a sky without."""
+    sky, sun = ReinhartSky(subdivision), np.array([[0.6, -0.6, 0.53], [0.0, -0.8, 0.6]])
+    sun /= np.linalg.norm(sun, axis=1, keepdims=True)
+    whole = np.full((sky.size, 2), 3000.0)
+    alone = np.zeros_like(whole)
+    stands = sky.index(sun[:1])[0]
+    alone[stands, 0] = 5e4 / sky.solid_angles[stands]
+    return AnnualSky(whole + alone, sun, np.array([5e4, 0.0]), np.arange(2), 8760, sun=alone)
+
+
+def by_phases(scene, front: float, *, five_phase: bool, subdivision: int = 1):
+    """The light of the hours behind panes that mirror so much outdoors."""
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+
+    few = Sampling(sensor_samples=16_384, patch_samples=8_192, subdivision=subdivision)
+    traced = PhaseScene(scene, few, five_phase=five_phase)
+    return PhaseSystems(traced, [[mirroring(front)]]).light(hours(subdivision))
+
+
+@pytest.mark.parametrize("five_phase", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_panes_light_the_fins_beside_them_in_sensors_and_pictures(five_phase) -> None:
+    """What the eye gains is what its picture gains; the daylight coefficients have it too."""
+    from mitsuba_cfs.glare.annual import full_picture
+    from mitsuba_cfs.glare.evaluation import evaluate
+
+    scene = between_fins()
+    gains = []
+    for front in (0.0, 0.4):
+        light = by_phases(scene, front, five_phase=five_phase)
+        shown = light.pictures(np.arange(2), [0])
+        pictures = [full_picture(p, shown.pixels, scene.view) for p in shown.values(np.arange(2))]
+        seen = [evaluate(p, scene.view).Ev for p in pictures]
+        gains.append((light.illuminance(), light.eye(), np.array(seen)))
+        if not five_phase:
+            factor = light.filled.coefficients() @ light.sky.whole
+            np.testing.assert_allclose(factor, light.illuminance(), rtol=1e-5)
+    inside, eye, picture = (more - bare for bare, more in zip(*gains, strict=True))
+    assert (inside / gains[0][0]).min() > 0.01
+    np.testing.assert_allclose(picture, eye, rtol=0.1)
+
+
+def test_the_sun_on_the_fins_comes_to_panes_hour_by_hour_as_in_their_sum() -> None:
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+
+    few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=1)
+    traced = PhaseScene(replace(between_fins(), view=None), few)
+    light = PhaseSystems(traced, [[mirroring(0.4)]]).reflected_sun.light(hours(1))
+    found = light.before(np.eye(K), np.array([1, 0]))
+    assert found[:, 1].max() > 100 and not found[:, 0].any()
+    whole = light.replaced(np.array([True, True]))
+    np.testing.assert_allclose(found.sum(axis=1), whole.ravel(), rtol=1e-4, atol=0.1)
+
+
+@pytest.mark.slow
+def test_panes_light_the_fins_beside_them_as_paths_have_it() -> None:
+    """The gain of two sensors; the sun's mirror image is as wide as a window patch, 15 degrees."""
+    from mitsuba_cfs.methods.path_light import PathSystems
+    from mitsuba_cfs.methods.sampling import Sampling
+
+    scene = replace(between_fins(), view=None)
+    few, found = Sampling(hour_samples=524_288, subdivision=4), {}
+    for front in (0.0, 0.4):
+        paths = PathSystems(scene, [[mirroring(front)]], few).light(hours(4))
+        phases = by_phases(scene, front, five_phase=True, subdivision=4)
+        found[front] = paths.illuminance(), phases.illuminance()
+    by_paths, by_five = (found[0.4][i] - found[0.0][i] for i in (0, 1))
+    print("gain", by_paths / found[0.0][0], by_five / found[0.0][1])
+    assert (by_paths / found[0.0][0]).min() > 0.015
+    np.testing.assert_allclose(by_five[:, 1], by_paths[:, 1], rtol=0.1)
+    np.testing.assert_allclose(by_five[:, 0], by_paths[:, 0], rtol=0.3)
