@@ -67,7 +67,7 @@ def test_seats_and_blinds(variant):
 
 
 def test_the_worst_seat_counts():
-    """One hour of four above 0.45 at the first seat, two at the second."""
+    """One hour of four above 0.45 at the first seat, two at the second; both exceed 5 %."""
     dgp = np.array([[0.2, 0.3, 0.3, 0.5], [0.2, 0.2, 0.46, 0.6]])
     seats = SeatGlare(np.zeros((2, 3)), np.zeros((2, 3)), dgp, operated=False)
     assert seats.exceeded(0.45) == 0.5 and seats.exceeded(0.55) == 0.25

@@ -221,3 +221,59 @@ when = "occupied"
     airing = hours.airing(windows)
     assert airing.both and set(np.unique(airing.share)) == {0.0, 0.2}
     assert airing.wind == 0.0  # all windows in one facade
+
+
+def test_air_of_a_neighbour_by_its_table(weather: Weather) -> None:
+    """A door by its size and hours, a given flow, the temperature of a schedule."""
+    hours = OperationHours(
+        tables_of(
+            """
+[[air.neighbour]]
+temperature_c = 18
+width = 0.9
+height = 2.0
+open = "door"
+[[air.neighbour]]
+temperature_c = "corridor"
+m3_h = 72
+[schedules.door]
+otherwise = 0.0
+weekday = [{ hours = [8, 18], value = 1.0 }]
+weekend = 0.0
+[schedules.corridor]
+weekday = [{ hours = [0, 24], value = 21.0 }]
+weekend = 15.0
+"""
+        ),
+        weather,
+    )
+    door, given = hours.outdoor_air()["beside"]
+    assert door.buoyant == pytest.approx(0.65 / 3 * 0.9 * np.sqrt(9.81 * 2.0**3))
+    assert (door.beside_c, door.flow) == (18.0, 0.0)
+    assert 0.25 < np.mean(door.share) < 0.35 and set(np.unique(door.share)) == {0.0, 1.0}
+    assert (given.buoyant, given.flow) == (0.0, 0.02)
+    assert set(np.unique(given.beside_c)) == {15.0, 21.0}
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("width = 0.9", "width and height belong together"),
+        ("", "give `width` and `height`"),
+        ("m3_h = 72\ntemperature = 3", "temperature"),
+        ('m3_h = "hours"', "no schedule 'hours'"),
+    ],
+)
+def test_faults_of_a_neighbour_s_air_are_named(keys: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        tables_of(f"[[air.neighbour]]\ntemperature_c = 18\n{keys}")
+
+
+def test_outside_faces_have_the_absorptance_stated(weather: Weather) -> None:
+    """All but frames: inner faces keep their own."""
+    text = '[envelope]\noutside_absorptance = 0.3\noutside_roughness = "rough"'
+    room, plain = room_of(text, weather), room_of("", weather)
+    found = [s for s in room.zone.surfaces if s.absorptance_out == 0.3 and s.roughness == "rough"]
+    assert [(s.name, s.outside) for s in found] == [("wall 1", "outdoor")]  # and not its frame
+    assert sum(s.outside == "outdoor" for s in room.zone.surfaces) == 2
+    assert {s.absorptance_out for s in plain.zone.surfaces} == {0.6}

@@ -28,12 +28,6 @@ CLEAR = {"thickness": 0.003048, "solar": (0.834, 0.075, 0.075)}
 PANES = (CLEAR | {"gap": {"width": 0.012}}, CLEAR)
 
 
-@pytest.mark.parametrize("name", WHOLE)
-def test_tutorial_reads(name: str) -> None:
-    study = read_study(TUTORIALS / f"{name}.toml")
-    assert study.weather.is_file()
-
-
 @pytest.mark.parametrize(
     "file", sorted(ashrae140_studies.STUDIES.glob("*.toml")), ids=lambda f: f.stem
 )

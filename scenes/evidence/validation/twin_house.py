@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.progress import silent
 from scenes.heat.study import run_study
@@ -36,7 +35,12 @@ CHANNELS = {  # numbers in `validationdataExp2.txt`, time being 0
     "supply_c": [33], "T": [53], "G": [54], "D": [55], "L": [56], "south": [59],
     "wind_from": [61], "wind": [62], "RH": [63],
 }  # fmt: skip
-GLASS = Glazing("4/16/4 low-e of the Twin Houses", 0.543, 0.265, 0.265)  # solar, at the normal
+# solar values of the panes by EN 410's spectrum at each 10 degrees, as the house's description has
+# them: transmittance, absorptance of both panes together
+ANGLES = np.radians(np.arange(0.0, 91.0, 10.0))
+PASSED = np.array([0.543, 0.546, 0.538, 0.528, 0.514, 0.486, 0.426, 0.310, 0.145, 0.0])
+ABSORBED = np.array([0.192, 0.195, 0.203, 0.212, 0.218, 0.227, 0.245, 0.257, 0.215, 0.0])
+NAME = "4/16/4 low-e of the Twin Houses"
 
 
 def measured(folder: Path) -> pd.DataFrame:
@@ -73,9 +77,10 @@ def write_inputs(data: pd.DataFrame, folder: Path) -> Path:
         }
     )
     table.to_csv(inputs / "measured.csv", index=False, float_format="%.4f")
-    klems = specular_klems(GLASS, KLEMS_FULL)
+    reflected = 1.0 - PASSED - ABSORBED  # from the room too: that side is not told
+    klems = specular_matrices(AngularTable(ANGLES, PASSED, reflected, reflected))
     bands = {"Visible": klems, "Solar": klems}
-    write_bsdf_xml(BsdfFile(bands, name=GLASS.name), inputs / "glass.xml")
+    write_bsdf_xml(BsdfFile(bands, name=NAME), inputs / "glass.xml")
     return Path(shutil.copy(STUDY, folder / STUDY.name))
 
 
