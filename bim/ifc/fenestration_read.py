@@ -137,7 +137,8 @@ def _children(prop: Entity) -> dict[str, Entity]:
 
 
 def _numbers(prop: Entity, kind: type = float) -> np.ndarray:
-    return np.array([value.wrappedValue for value in prop.ListValues], dtype=kind)
+    # by number: by its name an attribute is looked for each time, three times as long for a BSDF
+    return np.array([value[0] for value in prop.ListValues], dtype=kind)
 
 
 def _bsdf(prop: Entity) -> Bsdf:

@@ -17,7 +17,14 @@ from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.estimate import Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of, vectors
+from mitsuba_cfs.trace.sampling import (
+    batch_key,
+    empty_sums,
+    lattice_2d,
+    path_generator,
+    sums_of,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.window_parts import Cells
 
@@ -57,7 +64,7 @@ def cell_daylight(
         row = lane // count  # cell and patch
         cell = row // K
         patch, sample = row - cell * K, lane - row * count
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        key = batch_key(seed, number)
         stream = mi.sample_tea_32(patch, key)[0]
         place, first, second = (dr.gather(mi.Vector3f, table, cell) for table in tables)
         x, y, z = (dr.gather(mi.Vector3f, axis, cell) for axis in axes)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -21,6 +21,7 @@ from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.sampling import (
+    batch_key,
     empty_sums,
     lattice_2d,
     opaque,
@@ -163,8 +164,7 @@ def sky_irradiance_matrix(
         max_depth: 1 leaves the sky that the sensor sees itself.
         samples: paths for each sensor in each batch.
     """
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    points, directions = sensors_of(points, directions)
     if max_depth == 1:  # what the sensor sees itself, mirrors are left to the rest
         surfaces = replace(surfaces, gloss=())
     tracer = TracedScene(surfaces, centre=points.mean(axis=0))
@@ -179,7 +179,7 @@ def sky_irradiance_matrix(
         count = dr.opaque(mi.UInt32, n)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        key = batch_key(seed, number)
         stream = mi.sample_tea_32(sensor, key)[0]
         local = accepted.sample(lattice_2d(path - sensor * count, stream, 0))
         starts = PathStarts(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KlemsBasis
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import normalize, sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -20,7 +20,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.lit_room import PatchBeam
-from mitsuba_cfs.trace.sampling import lattice_2d, opaque, vectors
+from mitsuba_cfs.trace.sampling import batch_key, lattice_2d, opaque, vectors
 from mitsuba_cfs.trace.scene import TracedScene, kept_scene
 from mitsuba_cfs.trace.sun_discs import Scattering, SunDiscs, SunScene, on_disc, pairs
 from mitsuba_cfs.trace.sun_ways import sun_ways
@@ -134,8 +134,7 @@ def direct_sun_matrix(
     """
     if len(scattering) != len(groups):
         raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    points, directions = sensors_of(points, directions)
     suns = normalize(np.atleast_2d(np.asarray(suns, dtype=float)))
     if cache is not None and any(way is not None and way.key is None for way in scattering):
         raise ValueError("a BSDF plugin needs a `key` before its matrix can be kept in a cache")
@@ -152,7 +151,7 @@ def direct_sun_matrix(
         return [SunDiscs(around, scattering, seed) for around in ways]
 
     def batch(number: int) -> NDArray[np.float64]:
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        key = batch_key(seed, number)
         found = [np.zeros(len(points) * len(suns), dtype=np.float32) for _ in groups]
         for around, straight in zip(ways, discs(), strict=True):
             found = [a + b for a, b in zip(found, straight.light(key), strict=True)]

@@ -11,13 +11,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.sampling import empty_sums, lattice_2d, path_generator, sums_of, vectors
+from mitsuba_cfs.trace.sampling import (
+    batch_key,
+    empty_sums,
+    lattice_2d,
+    path_generator,
+    sums_of,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
 
 SIDES = ("west", "east", "south", "north", "floor", "ceiling")  # of the box round a room
@@ -58,8 +65,7 @@ def escaped_view(
         surfaces, groups, points, directions: as of `view_matrix`.
         samples: paths of each sensor in each of 4 batches.
     """
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    points, directions = sensors_of(points, directions)
     tracer = kept_scene(surfaces, groups)
     corners = np.concatenate(
         [surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]
@@ -75,7 +81,7 @@ def escaped_view(
         count = dr.opaque(mi.UInt32, n)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        key = batch_key(seed, number)
         stream = mi.sample_tea_32(sensor, key ^ mi.UInt32(0x1F83D9AB))[0]
         local = mi.warp.square_to_cosine_hemisphere(lattice_2d(path - sensor * count, stream, 0))
         starts = PathStarts(

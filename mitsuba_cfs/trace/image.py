@@ -17,6 +17,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.sampling import (
+    batch_key,
     column,
     empty_sums,
     opaque,
@@ -137,9 +138,7 @@ def _block(
             apart=dr.opaque(mi.UInt32, len(pixels)),
             stream=number,
             sample=dr.opaque(mi.UInt32, j),
-            generator=path_generator(
-                number, dr.opaque(mi.UInt32, (seed * 1_000_003 + j) & 0xFFFFFFFF)
-            ),
+            generator=path_generator(number, batch_key(seed, j)),
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
         dr.eval(matrix)

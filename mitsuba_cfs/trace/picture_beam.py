@@ -34,6 +34,7 @@ from mitsuba_cfs.trace.sun_discs import Scattering
 
 SAMPLES = 128  # of each tile, each with a ray to a point of the windows and one by the cosine
 PATHS = 2**22  # of a view at most, but one of each pixel
+FEW, MORE = 16, 8  # rays to the sky below which a row has more of them; times as many
 RAYS = 2**19  # at once
 LEAST_SHARE = 0.02  # of a window patch that surfaces fill, below which few paths know their light
 
@@ -94,17 +95,16 @@ def beam_light(
     rows = PictureRows.of_view(inside, view, tile)
     samples = int(np.clip(PATHS // max(len(rows.pixels), 1), 1, -(-SAMPLES // tile**2)))
     bins = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
+    shape = 2 * len(rows.keys), bins[1].size + len(groups) * basis.size
     look = _Look(inside, outside, scattering, bins, view, samples)
-    half, number = rows.half, rows.number
-    m, columns = 2 * len(rows.keys), bins[1].size + len(groups) * basis.size
-    found, share = sparse.csr_array((m, columns), dtype=np.float32), []
-    block = max(1, RAYS // samples)
-    for start in range(0, len(rows.pixels), block):
-        part = slice(start, start + block)
-        entries, opaque = look.at(rows.pixels[part], half[part], number[part], seed)
-        found = found + sparse.csr_array(sparse.coo_array(entries, shape=found.shape))
-        share.append(opaque)
-    seen, least = np.concatenate([np.empty(0, np.float32), *share]), 0.5 / samples
+    found, seen, carrying = look.rows(rows, np.arange(len(rows.pixels)), shape, seed)
+    # a slit of sky beside or below what stands outdoors may carry most of a row's light
+    lit = np.diff(found.indptr).reshape(-1, 2).any(axis=1)
+    few = np.repeat(lit & (carrying < FEW), 2)
+    again = np.flatnonzero(few[rows.half])
+    look = _Look(inside, outside, scattering, bins, view, MORE * samples)
+    more, seen[again], _ = look.rows(rows, again, shape, seed)
+    found, least = sparse.diags_array((~few).astype(np.float32)) @ found + more, 0.5 / samples
     # rays enough and no smoothing: beside a window and below an overhang's edge a tile may have
     # half the light of the next
     mean, noise = (sparse.csr_array(a @ found) for a in rows.of_halves(seen, least))
@@ -131,6 +131,28 @@ class _Look:
         self._bins, self._sky = bins
         numbers = {id(way): i for i, way in enumerate(self._ways)}
         self._way = mi.Int32([numbers.get(id(way), -1) for way in scattering])
+
+    def rows(
+        self, rows: PictureRows, chosen: NDArray[np.int64], shape: tuple[int, int], seed: int
+    ) -> tuple[sparse.csr_array, NDArray[np.float32], NDArray[np.float64]]:
+        """Sums of some pixels [n] over the halves, the pixels' share that shows no window [n].
+
+        And how many equal rays would carry the light of the sky that each row has [m].
+        """
+        half, number = rows.half, rows.number
+        found, share = sparse.csr_array(shape, dtype=np.float32), [np.empty(0, np.float32)]
+        sums = np.zeros((2, shape[0] // 2))
+        block = max(1, RAYS // self._samples)
+        for start in range(0, len(chosen), block):
+            part = chosen[start : start + block]
+            (value, place), opaque = self.at(rows.pixels[part], half[part], number[part], seed)
+            found += sparse.csr_array(sparse.coo_array((value, place), shape=shape))
+            share.append(opaque)
+            sky = (place[1] > 0) & (place[1] < self._sky.size)  # 0: the ground
+            for power, total in enumerate(sums, start=1):
+                total += np.bincount(place[0][sky] // 2, value[sky] ** power, len(total))
+        equal = sums[0] ** 2 / np.maximum(sums[1], 1e-300)
+        return found, np.concatenate(share), equal
 
     def at(
         self,

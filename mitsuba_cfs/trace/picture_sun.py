@@ -243,6 +243,7 @@ class PictureSun:
         tau = self._straight(place, to_sun, shown & (cosine > 0))
         return dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0).numpy()
 
+    @dr.syntax
     def _straight(self, place: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:
         """Transmittance of the straight way from places in the room to the sun; 0 if hidden."""
         ray = mi.Ray3f(place, to_sun)
@@ -250,15 +251,23 @@ class PictureSun:
         active = active & hit.is_valid()
         group = dr.gather(mi.Int32, self._inside.group, hit.prim_index, active)
         active &= group != OPAQUE
+        tau = dr.zeros(mi.Float, dr.width(active))
+        if active:  # few rays meet a window: the others skip its BSDF and the way outdoors
+            tau = self._passed(group, mi.Point3f(place + to_sun * hit.t), to_sun, active)
+        return tau
+
+    def _passed(
+        self, group: mi.Int32, window: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool
+    ) -> mi.Float:
+        """Transmittance from places on windows to the sun."""
         local = self._inside.to_local(group, to_sun, active)
-        active &= local.z > 0
+        active = active & (local.z > 0)
         tau = mi.Float(0)
         for g, system in enumerate(self._scattering):
             tau = dr.select(active & (group == g), system.through(local), tau)
         if not self._free:
-            beyond = mi.Ray3f(mi.Point3f(place + to_sun * hit.t), to_sun)
             active &= tau > 0
-            tau *= self._way.reaching(beyond, active, coherent=True)
+            tau *= self._way.reaching(mi.Ray3f(window, to_sun), active, coherent=True)
         return tau
 
     def _scattered_in_panes(self, pixel, hour, suns, light, g: int) -> mi.Float:

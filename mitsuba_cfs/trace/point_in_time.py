@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
@@ -23,7 +23,7 @@ from mitsuba_cfs.trace.path_sun import (
     surface_sun,
 )
 from mitsuba_cfs.trace.random_walk import PathStarts
-from mitsuba_cfs.trace.sampling import path_generator, vectors
+from mitsuba_cfs.trace.sampling import batch_key, path_generator, vectors
 from mitsuba_cfs.trace.scene import OPAQUE
 
 CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
@@ -353,8 +353,7 @@ def sensor_batches(
     seed: int,
 ) -> Callable[[int], NDArray[np.float64]]:
     """Batches [S, columns of the sky] of paths from sensors."""
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    points, directions = sensors_of(points, directions)
     S, n = len(points), int(samples)
     place = vectors(points - room.inside.centre, mi.Point3f)
     normals = vectors(directions)
@@ -364,7 +363,7 @@ def sensor_batches(
         count = dr.opaque(mi.UInt32, n)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        key = batch_key(seed, number)
         generator = path_generator(path, key)
         origin = mi.Point3f(dr.gather(mi.Point3f, place, sensor))
         normal = dr.gather(mi.Vector3f, normals, sensor)

@@ -25,7 +25,7 @@ from scipy import sparse
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, mirrored
-from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, tables, vectors
+from mitsuba_cfs.trace.sampling import batch_key, column, lattice_2d, opaque, tables, vectors
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.straight_view import straight_rays
 from mitsuba_cfs.trace.sun_discs import Scattering
@@ -90,7 +90,7 @@ def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunSh
         path = dr.arange(mi.UInt32, K * samples)
         patch = path // dr.opaque(mi.UInt32, samples)
         sample = path - patch * dr.opaque(mi.UInt32, samples)
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + q) & 0xFFFFFFFF)
+        key = batch_key(seed, q)
         stream = mi.sample_tea_32(patch, key)[0]
         way = outside.to_world(q, bins.sample(patch, lattice_2d(sample, stream, 0)))
         position = outside.sample_group(q, lattice_2d(sample, stream, 2))

@@ -58,6 +58,11 @@ def path_generator(path: mi.UInt32, seed: mi.UInt32) -> mi.PCG32:
     return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
 
 
+def batch_key(seed: int, number: int) -> mi.UInt32:
+    """The key of a seed's batch of that number: apart from those of all seeds near it."""
+    return dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+
+
 def opaque(value: int | float, kind: type | None = None) -> Any:
     """A number that may change between calls without a new compilation of the kernel.
 

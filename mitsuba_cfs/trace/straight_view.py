@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
@@ -22,6 +22,7 @@ from mitsuba_cfs.trace.daylight_matrix import add_daylight_paths
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.random_walk import PathStarts
 from mitsuba_cfs.trace.sampling import (
+    batch_key,
     empty_sums,
     lattice_2d,
     opaque,
@@ -60,8 +61,7 @@ def straight_view_matrix(
         samples: points on each group for each sensor in each batch.
         max_depth: 1: what the sky sends itself.
     """
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    points, directions = sensors_of(points, directions)
     inside, outside = kept_scene(interior, groups), kept_scene(exterior, groups)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
 
@@ -83,7 +83,7 @@ def straight_view_matrix(
         return sums_of(matrix, (S, sky.size)) / n
 
     def batch(number: int) -> NDArray[np.float64]:
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        key = batch_key(seed, number)
         nothing = np.zeros((S, sky.size))
         return np.stack(
             [nothing if way is None else one_group(g, way, key) for g, way in enumerate(scattering)]

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import normalize, sensors_of
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.sampling import lattice, vectors
@@ -38,8 +38,7 @@ def sunlit_shares(
         suns: [H, 3] unit vectors to the sun.
         edges: [S, 2, 3] sides of each receiver, a parallelogram [m]; points by default.
     """
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
+    points, directions = sensors_of(points, directions)
     suns = normalize(np.atleast_2d(np.asarray(suns, dtype=float)))
     edges = np.zeros((len(points), 2, 3)) if edges is None else np.asarray(edges, dtype=float)
     tracer = TracedScene(surfaces, centre=points.mean(axis=0))

@@ -11,13 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.sampling import column, empty_sums, path_generator, sums_of, vectors
+from mitsuba_cfs.trace.sampling import (
+    batch_key,
+    column,
+    empty_sums,
+    path_generator,
+    sums_of,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import TracedScene, kept_scene
 from mitsuba_cfs.trace.shared_hits import MOST_SENSORS, indirect_rows, mirrored_rows, shares
 from mitsuba_cfs.trace.window_integral import add_window_light
@@ -60,12 +67,7 @@ def view_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method);
     balance heuristic of Veach, Guibas 1995.
     """
-    points = np.atleast_2d(np.asarray(points, dtype=float))
-    directions = normalize(np.atleast_2d(np.asarray(directions, dtype=float)))
-    if points.shape != directions.shape or points.shape[1] != 3:
-        raise ValueError(
-            f"points {points.shape} and directions {directions.shape}: need [S, 3] each"
-        )
+    points, directions = sensors_of(points, directions)
     tracer = kept_scene(surfaces, groups)
     bins = DirectionBins(basis)
     S, n = len(points), int(samples)
@@ -78,7 +80,7 @@ def view_matrix(
 
     def batch(number: int) -> NDArray[np.float64]:
         matrix = empty_sums(math.prod(shape))
-        key = dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
+        key = batch_key(seed, number)
         _add_direct(tracer, bins, matrix, place, normal, samples=n, key=key)
         values = sums_of(matrix, (S, len(groups) * bins.size))
         for block, sensors in enumerate(blocks if max_depth > 1 else []):

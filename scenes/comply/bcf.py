@@ -8,7 +8,6 @@ from __future__ import annotations
 import datetime
 import uuid
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,8 +19,7 @@ from bim.sensors import view_point
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import replacing
 from scenes.comply.results import CheckedRoom, Compliance
-from scenes.comply.rules import NOT_MET
-from scenes.comply.tables import limit_of, shown
+from scenes.comply.tables import missed
 
 VERSION = "2.1"
 AUTHOR = "mitsuba-cfs"
@@ -35,7 +33,7 @@ def write_bcf(result: Compliance, path: Path) -> int:
     window, in the axes of the building's file.
     """
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    rooms = [room for room in result.rooms if any(_missed(room))]
+    rooms = [room for room in result.rooms if any(missed(room))]
     with replacing(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("bcf.version", _text(_version()))
         for room in rooms:
@@ -44,20 +42,6 @@ def write_bcf(result: Compliance, path: Path) -> int:
             archive.writestr(f"{topic}/markup.bcf", _text(_markup(room, topic, view, now)))
             archive.writestr(f"{topic}/viewpoint.bcfv", _text(_viewpoint(room, view, result)))
     return len(rooms)
-
-
-def _missed(room: CheckedRoom) -> Iterator[str]:
-    """A sentence for each criterion of which the room reaches no level."""
-    for verdict in room.verdicts:
-        if not verdict.applies or verdict.reached != NOT_MET:
-            continue
-        one, values = verdict.criterion, verdict.values[0]
-        numbers = "; ".join(
-            f"{need.words}: {shown(need, value)}, {limit_of(need)} for {one.level[0].name}"
-            for need, value in zip(one.level[0].needs, values, strict=True)
-            if not need.met(value)
-        )
-        yield f"{verdict.rule}, {one.title} ({one.clause}): {numbers}"
 
 
 def _version() -> ElementTree.Element:
@@ -69,13 +53,13 @@ def _version() -> ElementTree.Element:
 def _markup(room: CheckedRoom, topic: str, view: str, now: str) -> ElementTree.Element:
     root = ElementTree.Element("Markup")
     about = ElementTree.SubElement(root, "Topic", Guid=topic, TopicType="Issue", TopicStatus="Open")
-    missed = list(_missed(room))
-    what = "criterion" if len(missed) == 1 else "criteria"
-    title = f"{room.space.label}: {len(missed)} {what} not met"
+    sentences = list(missed(room))
+    what = "criterion" if len(sentences) == 1 else "criteria"
+    title = f"{room.space.label}: {len(sentences)} {what} not met"
     ElementTree.SubElement(about, "Title").text = title
     ElementTree.SubElement(about, "CreationDate").text = now
     ElementTree.SubElement(about, "CreationAuthor").text = AUTHOR
-    ElementTree.SubElement(about, "Description").text = "\n".join(missed)
+    ElementTree.SubElement(about, "Description").text = "\n".join(sentences)
     views = ElementTree.SubElement(root, "Viewpoints", Guid=view)
     ElementTree.SubElement(views, "Viewpoint").text = "viewpoint.bcfv"
     return root

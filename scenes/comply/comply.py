@@ -14,6 +14,7 @@ from bim.model import Building, Problem, Space
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy
+from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded
 from mitsuba_cfs.metrics.lm83 import sunlit_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -266,6 +267,7 @@ class Check:
             light.factor,
             daylight_autonomy(light_of_use, ten),
             sunlit_hours(light.direct, ten, step_h=self.calendar.step_h),
+            exceeded(light.open[self.calendar.daylight], HALF_TIME),
             None if light.closed is None else light.closed[ten].mean(axis=0),
             None if light.free is None else free_shares(light.free[ten]),
         )

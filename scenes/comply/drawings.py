@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from scenes.comply.results import CheckedRoom, Compliance
+from scenes.comply.results import CheckedRoom, Compliance, GridSummary
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan, plan, plan_frame
 from scenes.figures.scale import ColourScale, Tick
 from scenes.report.numbers import rounded
 
 FIRST_HOUR, LAST_HOUR = 4, 21  # of the sun's bars
+# plans of the light, and the needs of rules that look at what they show, the nearest first
+LIGHT_PLANS = {
+    "Half of the daylight hours": ("reached_lux",),
+    "Daylight factor": ("reached_factor",),
+    "Daylight autonomy": ("sda", "view_free", "leni", "mean_hours", "worst_hours", "equinox"),
+    "Sunlit hours": ("ase",),
+}
 MOST_BARS = 12  # openings with a bar of their own
 
 
 def plans(result: Compliance, room: CheckedRoom) -> tuple[FloorPlan, ...]:
     """Plans of what the rules look at in a room."""
-    return (*_view_plans(result, room), *_light_plans(room), *_glare_plans(room))
+    return (*_view_plans(result, room), *_light_plans(result, room), *_glare_plans(room))
 
 
 def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
@@ -36,29 +43,49 @@ def _view_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
     yield plan(frame, layers, scale, title="Layers of the view", explanation=text)
 
 
-def _light_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
-    if room.light is None:
-        return
-    shown: set[int] = set()
-    for name, grid in room.light.grids.items():
-        if id(grid) in shown:
+def _light_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
+    """One plan of each quantity, on the grid of the first rule that asks for it."""
+    for title, needs in LIGHT_PLANS.items():
+        found = _asking(result, room, needs)
+        if found is None:
             continue
-        shown.add(id(grid))
+        name, grid = found
         frame = plan_frame(room.space, grid.points)
-        factor = 100 * grid.factor
-        scale = ColourScale(0, max(float(np.ceil(factor.max())), 1.0), "Daylight factor", "%")
-        text = f"On the grid of {name}, {grid.points[0, 2] - room.space.floor_level:.2f} m high."
-        yield plan(frame, factor, scale, title="Daylight factor", explanation=text, digits=1)
-        operated = "blinds operated" if grid.closed is not None else "blinds open"
-        scale = ColourScale(0, 100, "Daylight autonomy", "%")
-        text = f"300 lx, 8 to 18 o'clock, {operated}, on the grid of {name}."
-        values = 100 * grid.autonomy
-        yield plan(frame, values, scale, title="Daylight autonomy", explanation=text)
-        if grid.sunlit_hours.any():
+        blinds = "blinds open" if grid.closed is None else "blinds operated"
+        height = f"{grid.points[0, 2] - room.space.floor_level:.2f} m high"
+        on = f"on the grid of {name}, {height}"
+        if title == "Daylight factor":
+            factor = 100 * grid.factor
+            scale = ColourScale(0, max(float(np.ceil(factor.max())), 1.0), title, "%")
+            text = f"Overcast sky, {on}."
+            yield plan(frame, factor, scale, title=title, explanation=text, digits=1)
+        elif title == "Half of the daylight hours":
+            top = float(max(np.ceil(grid.half_time.max() / 250) * 250, 750))
+            scale = ColourScale(0, top, "Illuminance", "lx")
+            text = f"Illuminance reached in half of the daylight hours, blinds open, {on}."
+            yield plan(frame, grid.half_time, scale, title=title, explanation=text)
+        elif title == "Daylight autonomy":
+            scale = ColourScale(0, 100, title, "%")
+            text = f"300 lx, 8 to 18 o'clock, {blinds}, {on}."
+            yield plan(frame, 100 * grid.autonomy, scale, title=title, explanation=text)
+        elif grid.sunlit_hours.any():
             top = float(np.ceil(grid.sunlit_hours.max() / 50) * 50)
             scale = ColourScale(0, top, "Direct sun", "h")
-            text = f"1000 lx of direct sun, blinds open, on the grid of {name}."
-            yield plan(frame, grid.sunlit_hours, scale, title="Sunlit hours", explanation=text)
+            text = f"1000 lx of direct sun, 8 to 18 o'clock, blinds open, {on}."
+            yield plan(frame, grid.sunlit_hours, scale, title=title, explanation=text)
+
+
+def _asking(
+    result: Compliance, room: CheckedRoom, needs: Sequence[str]
+) -> tuple[str, GridSummary] | None:
+    """Name and grid of the first rule with the first of some needs; None where no rule has any."""
+    grids = {} if room.light is None else room.light.grids
+    for wanted in needs:
+        for name, grid in grids.items():
+            criteria = result.rules[name].criterion
+            if any(need.what == wanted for one in criteria for need in one.needs):
+                return name, grid
+    return None
 
 
 def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:

@@ -15,6 +15,7 @@ ROUNDING = 1e-9  # of shares of an area
 class Need(TomlTable):
     """A limit of a quantity of a room."""
 
+    what: str  # each need's own name, by which a rule asks for it
     at_least: float | None = None
     at_most: float | None = None
 

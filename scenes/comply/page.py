@@ -36,6 +36,7 @@ class DossierRule:
 class DossierRoom(RoomSection):
     """The section of one room in a dossier."""
 
+    missed: tuple[str, ...]  # a sentence for each criterion that it misses
     tables: tuple[Table, ...]
     sun: Chart | None
     openings: Table | None
@@ -76,6 +77,7 @@ def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierR
         room.space.label,
         room_facts(room),
         plans(result, room),
+        tuple(tables.missed(room)),
         tuple(table for table in found if table.rows),
         sun_bars(result, room),
         tables.openings_table(room),

@@ -29,6 +29,7 @@ class GridSummary:
     factor: FloatArray  # [S] daylight factor, 0 to 1
     autonomy: FloatArray  # [S] share of LM-83's hours with 300 lx, as operated where that is known
     sunlit_hours: FloatArray  # [S] [h] of LM-83's with 1000 lx of direct sun, blinds open
+    half_time: FloatArray  # [S] [lx] reached in half of EN 17037's daylight hours, blinds open
     closed: FloatArray | None = None  # [G] share of LM-83's hours with closed blinds, by group
     view_free: tuple[float, float] | None = None  # shares of them: some windows free, all free
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from scenes.comply.assess import NOT_FOR_IT, RoomVerdict
+from scenes.comply.assess import NOT_COMPUTED, NOT_FOR_IT, RoomVerdict
 from scenes.comply.need import Need
 from scenes.comply.results import CheckedRoom, Compliance
-from scenes.comply.rules import LevelTable
+from scenes.comply.rules import NOT_MET, LevelTable
 from scenes.report.numbers import MISSING, rounded
 from scenes.report.tables import Column, Table
 
@@ -100,6 +100,10 @@ def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:
     for verdict in room.verdicts:
         if verdict.rule != rule or not verdict.applies:
             continue
+        if verdict.reached == NOT_COMPUTED:
+            one = verdict.criterion
+            rows.append((one.title, one.clause, NOT_COMPUTED, MISSING, "", NOT_COMPUTED))
+            continue
         first = True
         for words, (value, limits) in _quantities(verdict).items():
             one = verdict.criterion
@@ -118,6 +122,20 @@ def _quantities(verdict: RoomVerdict) -> dict[str, tuple[str, list[str]]]:
             _, limits = found.setdefault(need.words, (shown(need, value), []))
             limits.append(f"{level.name} {limit_of(need)}")
     return found
+
+
+def missed(room: CheckedRoom) -> Iterator[str]:
+    """A sentence for each criterion of which the room reaches no level."""
+    for verdict in room.verdicts:
+        if not verdict.applies or verdict.reached != NOT_MET:
+            continue
+        one, values = verdict.criterion, verdict.values[0]
+        numbers = "; ".join(
+            f"{need.words}: {shown(need, value)}, {limit_of(need)} for {one.level[0].name}"
+            for need, value in zip(one.level[0].needs, values, strict=True)
+            if not need.met(value)
+        )
+        yield f"{verdict.rule}, {one.title} ({one.clause}): {numbers}"
 
 
 def openings_table(room: CheckedRoom) -> Table | None:

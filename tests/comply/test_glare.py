@@ -11,7 +11,9 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.blinds import open_and_closed
+from scenes.comply.findings import SeatGlare
 from scenes.comply.glare import seat_glare
+from scenes.comply.needs import DgpExceeded
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.options import RoomOptions
@@ -62,3 +64,13 @@ def test_seats_and_blinds(variant):
     seats = seat_glare(room, None, grid=1.0, **chosen)
     mean, y = seats.dgp.mean(axis=1), seats.eyes[:, 1]  # the window is at y = 0
     assert np.ptp(y) > 1.5 and mean[y == y.min()].mean() > mean[y == y.max()].mean()
+
+
+def test_the_worst_seat_counts():
+    """One hour of four above 0.45 at the first seat, two at the second; both exceed 5 %."""
+    dgp = np.array([[0.2, 0.3, 0.3, 0.5], [0.2, 0.2, 0.46, 0.6]])
+    seats = SeatGlare(np.zeros((2, 3)), np.zeros((2, 3)), dgp, operated=False)
+    assert seats.exceeded(0.45) == 0.5 and seats.exceeded(0.55) == 0.25
+    need = DgpExceeded(what="dgp_exceeded", limit=0.45, at_most=0.05)
+    assert not need.met(seats.exceeded(need.limit))
+    np.testing.assert_array_equal(seats.not_exceeded(), [0.5, 0.6])

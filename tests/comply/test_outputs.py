@@ -16,10 +16,12 @@ from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from scenes.commands.comply import command
 from scenes.comply.comply import check_rooms
+from scenes.comply.drawings import plans
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outputs import write_compliance, write_into_ifc
 from scenes.comply.page import dossier_html
+from scenes.comply.results import GridSummary, RoomLights
 from scenes.comply.rules import read_rule
 from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, WEATHER
@@ -116,6 +118,41 @@ def test_the_dossier_says_all(result):
                    "≥ 75 %", "Meeting room", "Sunlight at the openings", "mine"):  # fmt: skip
         assert wanted in html
     assert "<script" not in html and "http:" not in html.replace("http://www.w3.org", "")
+
+
+def test_a_room_says_what_it_misses(result):
+    """The sentence of its BCF topic; rooms that miss nothing have none."""
+    sections = dict(zip(
+        ("south", "north", "hatch", "dark"),
+        dossier_html(result).split('<section id="room-')[1:], strict=True,
+    ))  # fmt: skip
+    assert "Not met:" not in sections["south"] and "Not met:" not in sections["north"]
+    assert "rays, Sun (clause 7.2)" in sections["dark"]
+    assert "0.00 h, ≥ 1.5 h for met" in sections["dark"].replace("\xa0", " ")
+
+
+def test_each_quantity_of_the_light_has_one_plan(result):
+    """On the grid of the rule that asks for it, not on that of every rule."""
+    room = result.rooms[0]
+
+    def grid(height: float, lux: float, closed=None) -> GridSummary:
+        points = np.array([[1.0, 1.0, height], [2.0, 1.0, height]])
+        half = np.full(2, lux)
+        return GridSummary(points, half / 1e4, half / 1e3, np.full(2, 60.0), half, closed)
+
+    names = ("breeam-hea01", "en17037", "lm83")
+    lit = replace(result, rules={name: read_rule(name) for name in names}, calendar=result.calendar)
+    grids = (grid(0.7, 111.0), grid(0.85, 222.0), grid(0.76, 333.0, np.zeros(1)))
+    light = RoomLights(room.space, dict(zip(names, grids, strict=True)), {})
+    found = {one.title: one for one in plans(lit, replace(room, view=None, light=light))}
+    assert list(found) == [
+        "Half of the daylight hours", "Daylight factor", "Daylight autonomy", "Sunlit hours",
+    ]  # fmt: skip
+    assert "grid of en17037, 0.85 m" in found["Half of the daylight hours"].explanation
+    assert "222" in found["Half of the daylight hours"].body
+    autonomy = found["Daylight autonomy"].explanation  # of sDA before BREEAM's hours
+    assert "grid of lm83" in autonomy and "blinds operated" in autonomy
+    assert "grid of lm83" in found["Sunlit hours"].explanation
 
 
 def test_values_have_a_row_for_each_need(result, tmp_path):

@@ -23,10 +23,10 @@ def test_a_pixel_is_held_against_the_brightest_around_it() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("variant")
-def test_nothing_bright_shines_out_of_the_box_under_an_overhang() -> None:
-    """Three random hours; what is beyond the limit is dim."""
+def test_nothing_shines_out_of_the_box_under_an_overhang() -> None:
+    """Three random hours; in the corners pictures by paths that share light are too dark."""
     lit = fireflies.overhang(cfs.read_epw(Path(WEATHER)), 160)
-    found = fireflies.held(lit, 3, samples=16)
-    assert found.bright.sum() == 0
-    # 848 of 1,767,200 pixels in the evidence; without the roulette by what is left, 96 of 60,324
-    assert found.beyond.sum() < 1e-3 * found.pixels
+    found = fireflies.held(lit, 3, samples=8)
+    # by shared light alone, with beams smoothed over tiles, 18 pixels of twelve hours
+    assert found.beyond.sum() == 0
+    assert found.looked.sum() > 0

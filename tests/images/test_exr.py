@@ -45,7 +45,9 @@ def test_what_cannot_be_is_told_in_a_line(tmp_path):
         read_exr(tmp_path / "a.exr")
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores are not to be chosen here")
+@pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity"), reason="a process chooses its cores on Linux alone"
+)
 def test_a_process_with_one_core_writes_and_reads_too(tmp_path):
     """Mitsuba's OpenEXR waits for a second thread: `cfs picture` stood for ever on one core."""
     code = (

@@ -44,7 +44,7 @@ def bands(variant):
     position, direction = view_point(space)
     scene = DaylightScene(
         interior_surfaces(space, "visible"), Surfaces.none(), windows.groups, points,
-        np.tile([0.0, 0.0, 1.0], (3, 1)), fisheye(position, direction, 160),
+        np.tile([0.0, 0.0, 1.0], (3, 1)), fisheye(position, direction, 100),
     )  # fmt: skip
     sky, sun = ReinhartSky(4), np.array([0.55, -0.65, 0.52])
     sun /= np.linalg.norm(sun)
@@ -68,7 +68,7 @@ def test_each_band_has_its_own_system_in_light_and_in_glare(bands):
     scene, windows, hour = bands
     assert len(windows.groups) == 3 and [len(states) for states in windows.systems] == [1, 1, 1]
     few = Sampling(
-        sensor_samples=32_768, patch_samples=4_096, hour_samples=131_072, picture_samples=64
+        sensor_samples=32_768, patch_samples=4_096, hour_samples=131_072, picture_samples=48
     )
     optics = windows.optics()
     found = PhaseSystems(PhaseScene(scene, few), optics).light(hour)

@@ -49,7 +49,7 @@ def test_the_series_are_drawn_with_the_measurement_in_them(tmp_path):
     run = {"system": "glass", "times": hours, "measured": dgp, "methods": dict.fromkeys(keys, dgp)}
     glare_methods.write_series([run, run], tmp_path / "glare")
     for method in METHODS:
-        assert (tmp_path / "glare" / f"{method}.png").read_bytes()[:4] == PNG
+        assert (tmp_path / "glare" / f"glare_{method}.png").read_bytes()[:4] == PNG
 
 
 @pytest.mark.usefixtures("variant")

@@ -187,7 +187,7 @@ def write_series(runs: list[dict], folder: Path) -> None:
                 _draw_day(axes, run, at, method)
                 axes.set_title(f"{run['system']}, {day}, {method}", fontsize=7)
         places[0, 0].legend(fontsize=6)
-        figure.savefig(folder / f"{method}.png")
+        figure.savefig(folder / f"glare_{method}.png")
 
 
 def _days(run: dict) -> dict[str, list[int]]:

@@ -1,0 +1,53 @@
+"""The windows' straight beam on what pixels show, against the same point by point."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_cfs as cfs
+from mitsuba_cfs.images.view import pixel_directions
+from mitsuba_cfs.trace.picture_beam import beam_light
+from mitsuba_cfs.trace.picture_rows import PictureRows
+from mitsuba_cfs.trace.picture_sharing import tile_size
+from mitsuba_cfs.trace.sampling import vectors
+from mitsuba_cfs.trace.scene import kept_scene
+from mitsuba_cfs.trace.straight_view import straight_view_matrix
+from scenes.cost import room as box
+from scenes.demo import WEATHER
+from scenes.evidence.validation import fireflies
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+
+def test_a_slit_of_sky_lights_a_wall_evenly() -> None:
+    """High on the wall beside the window one ray in thirty meets the sky; its rows have more."""
+    lit = fireflies.overhang(cfs.read_epw(Path(WEATHER)), 160)
+    scene, way = lit.scene, lit.systems[0][0].scattering
+    around = scene.interior, scene.exterior, scene.groups, [way]
+    light = beam_light(*around, np.ones((1, 145)), scene.view)
+    inside = kept_scene(scene.interior, scene.groups)
+    rows = PictureRows.of_view(inside, scene.view, tile_size(scene.view))
+    directions = pixel_directions(scene.view)[0].reshape(-1, 3)[rows.pixels]
+    eye, towards = inside.place(scene.view.position), vectors(directions)
+    hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(eye, towards), coherent=True)
+    distance = dr.select(hit.is_valid(), hit.t, 0.0).numpy()
+    place = np.asarray(scene.view.position) + distance[:, None] * directions
+    high = (place[:, 0] < 1e-3) & (place[:, 1] > 0.4) & (place[:, 1] < 0.6)
+    high &= (place[:, 2] > 2.45) & (place[:, 2] < 2.58)
+    chosen = np.flatnonzero(np.isin(rows.row, rows.row[high]))
+    points = place[chosen] + [1e-3, 0, 0]
+    normals = np.tile([1.0, 0.0, 0.0], (len(points), 1))
+    exact = straight_view_matrix(*around, points, normals, samples=8192, max_depth=1).values[0]
+    sky = np.ones(exact.shape[1])
+    sky[0] = 0  # the ground
+    lit = np.bincount(rows.row[chosen], box.WALLS / np.pi * (exact @ sky))
+    expected = (lit / np.maximum(np.bincount(rows.row[chosen]), 1))[np.unique(rows.row[chosen])]
+    assert len(expected) > 5
+    ratio = (light.sky @ sky)[np.unique(rows.row[chosen])] / expected
+    # 0.17; 0.53, and rows without any, with as few rays as other rows have
+    assert np.sqrt(np.mean((ratio - 1) ** 2)) < 0.3
