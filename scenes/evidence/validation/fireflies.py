@@ -29,6 +29,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import bim
 import mitsuba_cfs as cfs
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
@@ -122,7 +123,7 @@ def ifc_room(file: Path, space: str | None, weather: cfs.Weather, size: int) -> 
 
 def office(folder: Path, size: int) -> LitScene:
     """The Geneva office, its first view."""
-    solid = geneva.surfaces(folder / "RAD/office.rad")
+    solid = bim.opaque_surfaces(geneva.scene(folder, "01_glz"))
     groups, systems = geneva.window_groups(folder, "01_glz")
     scene = cfs.DaylightScene(solid, solid, groups, view=geneva.view(folder, 1, size))
 
