@@ -37,13 +37,7 @@ def perforated_screen(
         raise ValueError("the holes touch: fewer segments or a smaller openness")
     reach = spacing / 2 / np.abs(np.stack([np.cos(angle), np.sin(angle)], -1)).max(axis=1)
     rim = reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
-    face = _ring(hole, rim, spacing / 2)
-    faces = [
-        np.concatenate([face, np.full((*face.shape[:2], 1), z)], -1) for z in _faces(thickness)
-    ]
-    if thickness > 0:
-        faces.append(_walls(hole, thickness))
-    return _sheet(np.concatenate(faces), material, spacing)
+    return _with_hole(hole, rim, thickness, material, spacing)
 
 
 def woven_screen(
@@ -58,6 +52,17 @@ def woven_screen(
     half = 0.5 * spacing * np.sqrt(openness)
     hole = half * np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]], dtype=float)
     rim = 0.5 * spacing * np.sign(hole)
+    return _with_hole(hole, rim, thickness, material, spacing)
+
+
+def _with_hole(
+    hole: NDArray[np.float64],
+    rim: NDArray[np.float64],
+    thickness: float,
+    material: SlatMaterial,
+    spacing: float,
+) -> PeriodicLayer:
+    """A sheet with a hole in each period, from the corners of the hole and of the period [n, 2]."""
     face = _ring(hole, rim, spacing / 2)
     faces = [
         np.concatenate([face, np.full((*face.shape[:2], 1), z)], -1) for z in _faces(thickness)

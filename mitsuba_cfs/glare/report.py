@@ -44,13 +44,6 @@ def source_lines(result: GlareResult) -> list[str]:
     found, height = result.sources, result.geometry.view.height
     contrasts, shares = _contributions(result)
     veils = indices.cie_veiling_luminance(found.illuminance, result.sigma)
-    picture = (
-        result.background_luminance,
-        result.task_luminance,
-        result.Ev,
-        result.Ev_direct,
-        result.largest_luminance,
-    )
     lines = []
     for i in range(result.count):
         place = (found.pixels[i], found.x[i], height - found.y[i], found.luminance[i])
@@ -58,21 +51,25 @@ def source_lines(result: GlareResult) -> list[str]:
         after = (*result.direction[i], found.illuminance[i], veils[i], sigma)
         lines.append(
             f"{i + 1} {_six(place)} {found.solid_angle[i]:.10f} "
-            f"{_six((result.position[i], *picture, sigma, *after))} "
+            f"{_six((result.position[i], *_of_picture(result), sigma, *after))} "
             f"{result.zones[i]} {_six((contrasts[i], shares[i]))} "
         )
     return lines
 
 
-def _no_source(result: GlareResult) -> str:
-    picture = (
+def _of_picture(result: GlareResult) -> tuple[float, ...]:
+    """What each line says of the whole picture."""
+    return (
         result.background_luminance,
         result.task_luminance,
         result.Ev,
         result.Ev_direct,
         result.largest_luminance,
     )
-    return f"0 {_six([0.0] * 4)} {0:.10f} {_six((0.0, *picture, *[0.0] * 10))}"
+
+
+def _no_source(result: GlareResult) -> str:
+    return f"0 {_six([0.0] * 4)} {0:.10f} {_six((0.0, *_of_picture(result), *[0.0] * 10))}"
 
 
 def detailed_figures(result: GlareResult) -> dict[str, float]:

@@ -21,7 +21,7 @@ from mitsuba_cfs.trace.straight_view import straight_view_matrix
 BATCHES = 4
 HELD = 0.98  # share of a beam that T's diagonal has at the least
 INNER_SHARE = 8  # rays of a sensor that glass to another room is looked for with, for each of V
-SHARE = 4  # paths of a sensor for V, for each that looks straight through a cut group
+SHARE = 1  # paths of a sensor for V, for each that looks straight through a group
 
 
 class StraightViews:

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.directions import normalize
+from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.image import add_picture_paths
 from mitsuba_cfs.trace.sampling import (
+    batch_key,
     empty_sums,
     lattice_2d,
     opaque,
@@ -83,8 +84,7 @@ def borrowed_view(
         sensors: positions [S, 3] [m] and normals [S, 3].
         samples: paths of a sensor in each batch.
     """
-    points, normals = (np.atleast_2d(np.asarray(one, dtype=float)) for one in sensors)
-    directions = normalize(normals)
+    points, directions = sensors_of(*sensors)
     here, bins, n, S = kept_scene(*room), DirectionBins(KLEMS_FULL), int(samples), len(points)
     flat = [one.luminance.reshape(-1, one.luminance.shape[-1]) for one in beyond.rooms()]
     place, normal = vectors(points - here.centre, mi.Point3f), vectors(directions)
@@ -92,7 +92,7 @@ def borrowed_view(
 
     def batch(number: int) -> NDArray[np.float64]:
         sums = [empty_sums(S * len(one)) for one in flat]
-        count, key = dr.opaque(mi.UInt32, n), dr.opaque(mi.UInt32, seed * 1_000_003 + number)
+        count, key = dr.opaque(mi.UInt32, n), batch_key(seed, number)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
         sample, stream = path - sensor * count, mi.sample_tea_32(sensor, key)[0]

@@ -26,9 +26,9 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.picture_rows import PictureRows
+from mitsuba_cfs.trace.picture_rows import PictureRows, shown_hits
 from mitsuba_cfs.trace.picture_sharing import tile_size
-from mitsuba_cfs.trace.sampling import column, lattice_2d, spread_rays, tables, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
 from mitsuba_cfs.trace.sun_discs import Scattering
 
@@ -199,12 +199,7 @@ class _Look:
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
         """What rays of pixels meet: place, normal, luminance by irradiance; if it is a window."""
         inside, samples = self._inside, self._samples
-        eye = inside.place(self._view.position)
-        directions, exists = spread_rays(self._view, pixels, samples)
-        way, shown = vectors(directions), column(exists, mi.Bool)
-        ray = mi.Ray3f(eye, way)
-        hit = inside.scene.ray_intersect_preliminary(ray, coherent=True, active=shown)
-        shown &= hit.is_valid()
+        eye, way, hit, shown = shown_hits(inside, self._view, pixels, samples)
         window = shown & (dr.gather(mi.Int32, inside.group, hit.prim_index, shown) != OPAQUE)
         position, normal, rho = inside.surface_at(hit, eye, way, shown)
         beta = dr.select(shown & ~window, rho * dr.inv_pi / samples, 0.0)

@@ -6,6 +6,7 @@ A row is what the pixels of a tile have in common that show one face of the scen
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -15,7 +16,7 @@ from scipy import sparse
 
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, numbered, smoothing
-from mitsuba_cfs.trace.sampling import tables, vectors
+from mitsuba_cfs.trace.sampling import column, spread_rays, tables, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
 
@@ -96,3 +97,15 @@ class PictureRows:
         total = np.bincount(self.row, share, minlength=len(self.keys))
         found = smoothing(self.tiles, self.keys, np.maximum(total, least), close)
         return found.astype(np.float32)
+
+
+def shown_hits(
+    tracer: TracedScene, view: View, pixels: NDArray[np.int64], samples: int
+) -> tuple[mi.Point3f, mi.Vector3f, Any, mi.Bool]:
+    """Rays spread over pixels [n]: eye, directions, first hits [n * samples], which are valid."""
+    eye = tracer.place(view.position)
+    directions, exists = spread_rays(view, pixels, samples)
+    way, exist = vectors(directions), column(exists, mi.Bool)
+    ray = mi.Ray3f(eye, way)
+    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=exist)
+    return eye, way, hit, exist & hit.is_valid()

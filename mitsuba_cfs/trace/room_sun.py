@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.images.view import View, pixel_solid_angles
+from mitsuba_cfs.trace.picture_rows import shown_hits
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS, numbered
-from mitsuba_cfs.trace.sampling import column, lattice_2d, spread_rays, vectors
+from mitsuba_cfs.trace.sampling import column, lattice_2d
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 
@@ -152,14 +153,8 @@ class _Look:
         return _Hits(of_row[some], weight[some], met.some(some), halvings)
 
     def _shown(self, pixels: NDArray[np.int64], samples: int) -> _Shown:
-        tracer, view = self._tracer, self._view
-        eye = tracer.place(view.position)
-        directions, exists = spread_rays(view, pixels, samples)
-        way = vectors(directions)
-        ray = mi.Ray3f(eye, way)
-        exist = column(exists, mi.Bool)
-        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=exist)
-        found = exist & hit.is_valid()
+        tracer = self._tracer
+        eye, way, hit, found = shown_hits(tracer, self._view, pixels, samples)
         rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
         places, found, rho, far = face_places(tracer, eye, way, hit, found, found, rho, hit.t)
         kept = np.flatnonzero(found & (rho > 0))

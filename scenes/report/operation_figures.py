@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 
 from scenes.figures.carpet import carpet, class_carpet
-from scenes.figures.chart import Chart, ChartMark, Readout, box
-from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
+from scenes.figures.chart import Chart, ChartMark, box
+from scenes.figures.scale import ColourScale, round_limits
 from scenes.report.headline import occupied
+from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded
 from scenes.report.tables import monthly_gains
@@ -66,21 +67,15 @@ def loads_chart(room: RoomYear) -> Chart | None:
             for i, v in enumerate(monthly[name])
         )  # fmt: skip
         marks.append(ChartMark(path, LOADS[name], quantity(name).label, filled=True))
-    ticks = tuple(
-        Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)
-        for i, m in enumerate(monthly.index)
+    return month_chart(
+        monthly,
+        names,
+        marks,
+        top,
+        title="Heating, cooling and light by month",
+        explanation="Heat that an ideal system gives or takes to keep the set points, and the "
+        "lamps' energy that daylight leaves to be given.",
     )
-    return Chart(
-        "Heating, cooling and light by month",
-        "Heat that an ideal system gives or takes to keep the set points, and the lamps' energy "
-        "that daylight leaves to be given.",
-        "Month", "Energy [kWh]", ticks, axis_ticks(*y_range), tuple(marks),
-        readout=Readout(
-            tuple(f"{m:%B}" for m in monthly.index),
-            tuple((quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n]))
-                  for n in names),
-        ),
-    )  # fmt: skip
 
 
 def glare_carpet(result: RunResult, room: RoomYear) -> Chart | None:

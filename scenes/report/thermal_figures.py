@@ -11,6 +11,7 @@ from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, Readout, box, line
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
 from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, occupied
+from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded
 from scenes.report.tables import step_hours
@@ -181,18 +182,12 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
         )
         marks.append(ChartMark(path, f"part{min(number, 3)}", quantity(name).label, filled=True))
         base = top
-    ticks = tuple(
-        Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)
-        for i, m in enumerate(monthly.index)
+    return month_chart(
+        monthly,
+        ([incident] if incident else []) + parts,
+        marks,
+        y_range[1],
+        title="Solar energy by month",
+        explanation="What reaches the glass from outside, and what of it passes into the room or "
+        "is absorbed in the window (part of which reaches the room as heat).",
     )
-    return Chart(
-        "Solar energy by month",
-        "What reaches the glass from outside, and what of it passes into the room or is absorbed "
-        "in the window (part of which reaches the room as heat).",
-        "Month", "Energy [kWh]", ticks, axis_ticks(*y_range), tuple(marks),
-        readout=Readout(
-            tuple(f"{m:%B}" for m in monthly.index),
-            tuple((quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n]))
-                  for n in ([incident] if incident else []) + parts),
-        ),
-    )  # fmt: skip

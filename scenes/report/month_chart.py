@@ -1,0 +1,38 @@
+"""The frame of a chart of energy by month, and what it tells under the pointer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from scenes.figures.chart import Chart, ChartMark, Readout
+from scenes.figures.scale import Tick, axis_ticks
+from scenes.report.names import quantity
+from scenes.report.numbers import rounded
+
+
+def month_chart(
+    monthly: pd.DataFrame,
+    names: Sequence[str],
+    marks: Sequence[ChartMark],
+    top: float,
+    *,
+    title: str,
+    explanation: str,
+) -> Chart:
+    """Marks over months, from 0 to a top [kWh].
+
+    Args: names: columns of `monthly` [kWh] that are told under the pointer.
+    """
+    ticks = tuple(
+        Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)
+        for i, m in enumerate(monthly.index)
+    )
+    rows = tuple(
+        (quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n])) for n in names
+    )
+    return Chart(
+        title, explanation, "Month", "Energy [kWh]", ticks, axis_ticks(0.0, top), tuple(marks),
+        readout=Readout(tuple(f"{m:%B}" for m in monthly.index), rows),
+    )  # fmt: skip
