@@ -16,7 +16,7 @@ pytest.importorskip("pyradiance")
 pytestmark = [pytest.mark.peer, pytest.mark.usefixtures("variant")]
 
 POINTS = np.array([[1.0, 1.2, 0.85], [2.2, 2.2, 0.85], [1.4, 0.8, 0.85]])
-RUNS = 8
+RUNS = 16
 SUNS = {
     "room": [[0.1, -1, 0.5], [-0.6, -1, 0.9], [0.9, -1, 0.35]],
     "L": [[0.2, -1, 0.6], [-1, 0.1, 1.6], [-1, -0.7, 1.5]],
