@@ -11,7 +11,6 @@ from thermal.balance import ZoneResult
 from thermal.comfort import ADAPTIVE_BANDS, comfort_by_outdoors, degree_hours, summarise
 
 FloatArray = NDArray[np.float64]
-CATEGORIES = ("I", "II", "III")  # of ADAPTIVE_BANDS
 PMV_CATEGORIES = {"I": 0.2, "II": 0.5, "III": 0.7, "IV": 1.0}  # EN 16798-1:2019, table B.1
 WARM = 26.0  # [degC] operative, above which overheating is counted, ISO 17772, DIN 4108-2
 
@@ -54,18 +53,16 @@ def comfort_summary(
 ) -> dict[str, float]:
     """Occupied hours by categories of EN 16798-1, and warmth above 26 degC.
 
-    The adaptive categories count where the running mean lies in the standard's range; a category
-    holds the hours of those before it.
+    The adaptive categories I to III are `year_summary`'s bands; IV holds what is beyond them where
+    the running mean lies in the standard's range. A category of the votes holds the hours of those
+    before it.
     """
     operative_c, step_h = result.operative_c, weather.step_h
-    steps = {}
-    for name in CATEGORIES:
-        band = comfort_by_outdoors(
-            operative_c, weather.dry_bulb_c, f"EN 16798-1 {name}", per_day=weather.per_day
-        )
-        steps[f"adaptive_{name}_h"] = np.count_nonzero(band.comfortable & occupied)
-    inside = band.applicable & occupied
-    steps["adaptive_IV_h"] = np.count_nonzero(inside) - steps["adaptive_III_h"]
+    band = comfort_by_outdoors(
+        operative_c, weather.dry_bulb_c, "EN 16798-1 III", per_day=weather.per_day
+    )
+    beyond = band.applicable & ~band.comfortable
+    steps = {"adaptive_IV_h": np.count_nonzero(beyond & occupied)}
     for name, limit in PMV_CATEGORIES.items():
         steps[f"pmv_{name}_h"] = np.count_nonzero((np.abs(pmv) < limit) & occupied)
     steps["above_26_h"] = np.count_nonzero((operative_c > WARM) & occupied)
