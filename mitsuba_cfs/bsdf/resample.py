@@ -52,13 +52,19 @@ def _block(
         total += values.reshape(K, K)
         towards.append(incident)
     incident, omega = np.concatenate(towards), basis.projected_solid_angles()
-    whole, share = (
-        direct_hemispherical(b, name, incident).reshape(samples, K).mean(axis=0)
-        for b in (bsdf, rest)
-    )
+    share = _sent_on(rest, name, incident, samples)
+    beams = transmits and rest is not bsdf
+    whole = _sent_on(bsdf, name, incident, samples) if beams else share
     sampled = omega @ total
     scattered = total * np.divide(share, sampled, out=np.ones(K), where=sampled > 0)
     return scattered + np.diag((whole - share) / omega)
+
+
+def _sent_on(
+    bsdf: Bsdf, name: str, incident: NDArray[np.float64], samples: int
+) -> NDArray[np.float64]:
+    """Share [K] of the light of each patch that a block sends on, the mean of its directions."""
+    return direct_hemispherical(bsdf, name, incident).reshape(samples, -1).mean(axis=0)
 
 
 def _directions(

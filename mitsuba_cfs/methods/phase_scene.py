@@ -153,7 +153,7 @@ class PhaseScene:
         return window_exchange(
             self.scene.interior,
             parts,
-            samples=max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8),
+            samples=self._exchange_samples(parts),
             max_depth=INDOOR_DEPTH,
             stopping=Stopping(batches=2),
             seed=self.sampling.seed,
@@ -167,12 +167,16 @@ class PhaseScene:
         return outdoor_exchange(
             self.scene.exterior,
             parts,
-            samples=max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8),
+            samples=self._exchange_samples(parts),
             max_depth=OUTDOOR_DEPTH,
             stopping=Stopping(batches=2),
             seed=self.sampling.seed,
             cache=self.cache,
         )
+
+    def _exchange_samples(self, parts: Sequence[WindowGroup]) -> int:
+        """Paths of each patch between windows: fewer the more windows there are."""
+        return max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8)
 
     @cached_property
     def view(self) -> ViewMatrices:
