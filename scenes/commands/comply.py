@@ -15,6 +15,7 @@ from scenes.commands.room_options import (
     directions_option,
     eye_height_option,
     grid_option,
+    named_settings,
     write_ifc_option,
 )
 from scenes.comply.options import ComplyOptions
@@ -22,6 +23,9 @@ from scenes.room.options import RoomOptions
 
 OWN = (  # parameters that `ComplyOptions` has by the same name, beside those of every command
     "standards", "closed", "uses", "least_altitude_deg", "eye_height", "grid", "directions",
+)  # fmt: skip
+OF_RULES = (  # choices of a run that are the rules' own, or of what a check has not
+    "sensor_spacing", "sensor_height", "sensor_margin", "picture_hours", "picture_count",
 )  # fmt: skip
 DAYS = ((2, 1), (3, 21))  # between which EN 17037 has the day of the sunlight chosen
 
@@ -63,13 +67,16 @@ def command(
     day: str,
     write_ifc: Path | None,
     quick: bool,
+    settings: tuple[str, ...],
     no_cache: bool,
     **chosen,
 ) -> None:
     """The rooms of an IFC building against daylight rules: a dossier and a table of all values."""
     own = {name: chosen.pop(name) for name in OWN}
+    named = named_settings(settings, OF_RULES)
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
+    chosen |= named
     options = ComplyOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), day=day_of(day), **own,

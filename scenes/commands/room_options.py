@@ -6,7 +6,8 @@ What a command means by one of them beside that stands behind a semicolon in its
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import tomllib
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 import click
@@ -94,6 +95,10 @@ sky_ground_option = click.option(
 annual_glare_option = click.option(
     "--annual-glare", is_flag=True, help="Rate every hour with daylight."
 )
+set_option = click.option(
+    "--set", "settings", multiple=True, metavar="NAME=VALUE",
+    help="A choice by its name in `[options]` of study files, such as sensor_samples=4096.",
+)  # fmt: skip
 no_cache_option = click.option(
     "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."
 )
@@ -139,6 +144,7 @@ def building_options(spaces: str) -> Option:
         sun_option,
         sky_ground_option,
         seed_option,
+        set_option,
         no_cache_option,
         quick_option,
     )
@@ -149,6 +155,28 @@ def building_options(spaces: str) -> Option:
         return command
 
     return decorated
+
+
+def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[str, object]:
+    """What `--set` chooses, by the names of `scenes.room.options.NAMES`.
+
+    Args: but: names that mean nothing to the command.
+    """
+    from scenes.study.study_file import OptionsTable
+    from scenes.toml_file import validated
+
+    table: dict[str, object] = {}
+    for text in settings:
+        name, equals, value = text.partition("=")
+        if not equals or name in but:
+            reason = "means nothing to this command" if equals else "expected NAME=VALUE"
+            raise click.UsageError(f"--set {text!r}: {reason}")
+        try:
+            table[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            table[name] = value  # a word needs no quotes
+    found = validated(OptionsTable, table, Path("--set"))
+    return {name: getattr(found, name) for name in table}
 
 
 def samples_option(default: int, why: str) -> Option:

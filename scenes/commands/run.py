@@ -13,6 +13,7 @@ from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
     building_options,
     method_option,
+    named_settings,
     size_option,
     surroundings_offset_option,
     surroundings_option,
@@ -80,6 +81,7 @@ def command(
     inner_glass: bool,
     explore: bool,
     quick: bool,
+    settings: tuple[str, ...],
     **chosen,
 ) -> None:
     """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
@@ -91,8 +93,10 @@ def command(
         raise click.UsageError("--inner-glass and --explore exclude each other")
     if inner_glass and chosen["method"] == "point-in-time":
         raise click.UsageError("--inner-glass needs --method three-phase or five-phase")
+    named = named_settings(settings)
     if quick:
         chosen |= quick_run.picks(quick_run.ROOM, given())
+    chosen |= named
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -41,6 +42,7 @@ class ComfortShare(Need):
 
     what: Literal["comfort"]
     band: Literal["EN 16798-1 I", "EN 16798-1 II", "EN 16798-1 III"]
+    cold_from_c: float = -math.inf  # running mean outdoors from which the lower limit holds
 
     parts: ClassVar[frozenset[str]] = frozenset({"heat"})
     unit: ClassVar[str] = "%"
@@ -49,13 +51,22 @@ class ComfortShare(Need):
     @property
     def words(self) -> str:
         """The quantity in words."""
-        return f"share of the hours of use in the adaptive band {self.band}, where it applies"
+        found = f"share of the hours of use in the adaptive band {self.band}, where it applies"
+        if math.isfinite(self.cold_from_c):
+            found += f"; too cold counts from {self.cold_from_c:g} °C of running mean outdoors"
+        return found
 
     def value(self, room: Findings) -> float | None:
-        """Share, 0 to 1, of the hours whose running mean outdoors is in the band's range."""
+        """Share, 0 to 1, of the hours whose running mean outdoors is in the band's range.
+
+        Below `cold_from_c` a heating is on, which the temperatures here do not have: what is too
+        cold then counts as kept.
+        """
         if room.heat is None:
             return None
         heat, per_day = room.heat, round(24 / room.step_h)
         found = comfort_by_outdoors(heat.operative_c, heat.outdoor_c, self.band, per_day=per_day)
         counted = room.heat.occupied & found.applicable
-        return float(np.mean(found.comfortable[counted])) if counted.any() else None
+        heated = (found.excess < 0) & (found.outdoor_mean_c < self.cold_from_c)
+        kept = found.comfortable | heated
+        return float(np.mean(kept[counted])) if counted.any() else None

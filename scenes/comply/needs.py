@@ -288,6 +288,30 @@ class WorstHours(Need):
         return float(room.step_h * np.count_nonzero(room.light.open >= self.lux, axis=0).min())
 
 
+class PointHours(Need):
+    """BREEAM, sales areas: share of the area that has an illuminance for so many hours a year."""
+
+    what: Literal["point_hours"]
+    lux: Positive
+    hours: Positive
+
+    parts: ClassVar[frozenset[str]] = frozenset({"open"})
+    unit: ClassVar[str] = "%"
+    digits: ClassVar[int] = 1
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return f"share of the area with {self.lux:g} lx in {self.hours:g} hours of the year"
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1, of the points, each by its own hours."""
+        if room.light is None:
+            return None
+        reached = room.step_h * np.count_nonzero(room.light.open >= self.lux, axis=0)
+        return area_share(reached >= self.hours)
+
+
 class LightingEnergy(Need):
     """Yearly energy of lamps that are dimmed to what daylight lacks, per floor area (LENI)."""
 
@@ -333,6 +357,7 @@ AnyNeed = Annotated[
     | Equinox
     | MeanHours
     | WorstHours
+    | PointHours
     | LightingEnergy
     | DegreeHours
     | ComfortShare,

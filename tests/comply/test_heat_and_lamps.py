@@ -52,6 +52,24 @@ def test_bands_of_the_categories(calendar, operative, inside):
     assert needs["I"].value(Findings(calendar, heat=heat(20.0, outdoor=5.0))) is None
 
 
+def test_a_cold_room_counts_where_nothing_heats(calendar):
+    """13 °C outdoors: a heating is on, 18 °C counts as kept; at 16 °C it is too cold (24.08 - 4).
+
+    Too warm (13 °C: 23.09 + 3) counts in both.
+    """
+    need = ComfortShare(what="comfort", band="EN 16798-1 II", cold_from_c=15, at_least=0.95)
+    plain = ComfortShare(what="comfort", band="EN 16798-1 II", at_least=0.95)
+
+    def share(one, operative, outdoor):
+        return one.value(Findings(calendar, heat=heat(operative, outdoor)))
+
+    assert share(need, 18.0, 13.0) == 1.0 and share(plain, 18.0, 13.0) == 0.0
+    assert share(need, 18.0, 16.0) == 0.0 and share(need, 20.1, 16.0) == 1.0
+    assert share(need, 26.2, 13.0) == 0.0
+    rule = read_rule("en16798-1")
+    assert {one.cold_from_c for criterion in rule.criterion for one in criterion.needs} == {15}
+
+
 def test_comfort_of_half_hours_is_that_of_hours(calendar):
     """The limits follow the means of whole days: hot days and cool nights, colder by the season."""
     hours = np.arange(8760)

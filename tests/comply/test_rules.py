@@ -170,6 +170,15 @@ def test_breeam_counts_hours_of_the_year(calendar):
     assert found["offices"] == NOT_MET and found["dwellings"] == NOT_FOR_IT
 
 
+def test_sales_areas_are_counted_by_points(calendar):
+    """200 lx for 2650 h on 4 of 10 points is enough, whatever the worst has; on 3 it is not."""
+    shop, lux = RoomUse("retail", True, ""), np.zeros((8760, 10))
+    lux[:2650, :4] = 200.0
+    assert reached("breeam-hea01", Findings(calendar, light(lux)), use=shop)["sales"] == "1 credit"
+    lux[2649, 3] = 199.0
+    assert reached("breeam-hea01", Findings(calendar, light(lux)), use=shop)["sales"] == NOT_MET
+
+
 def test_rooms_that_are_not_occupied_are_left_out(calendar):
     findings = Findings(calendar, light(np.zeros((8760, 2))))
     assert reached("leed-v4.1", findings, use=STORE)["option_1"] == NOT_FOR_IT

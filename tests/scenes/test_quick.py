@@ -67,6 +67,37 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list:
     return seen
 
 
+def test_a_choice_by_its_name_holds_in_runs_and_checks(chosen: list, monkeypatch) -> None:
+    """`--set` has every name of study files, also beside `--quick`; words need no quotes."""
+    keep = run_command.run_to_folder
+    monkeypatch.setattr("scenes.comply.files.read_files", keep)
+    settings = ["sensor_samples=300", "occupied=[7, 17]", "glare_sources=pixels"]
+    words = [word for one in settings for word in ("--set", one)]
+    run([*RUN, "--quick", *words])
+    run(["comply", *RUN[1:], "--standard", "en17037", "--quick", *words])
+    assert len(chosen) == 2
+    for options in chosen:
+        named = options.room.named()
+        assert (named["sensor_samples"], named["occupied"]) == (300, (7, 17))
+        assert named["glare_sources"] == "pixels"
+        assert named["patch_samples"] == quick.ROOM["patch_samples"]
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("sensor_sampels=4", "--set: sensor_sampels: no such key; did you mean sensor_samples?"),
+        ("sensor_samples=many", "sensor_samples: expected a whole number, got 'many'"),
+        ("sensor_samples", "--set 'sensor_samples': expected NAME=VALUE"),
+        ("sensor_spacing=1", "--set 'sensor_spacing=1': means nothing to this command"),
+    ],
+)
+def test_a_wrong_choice_by_name_is_one_line(capsys, setting: str, said: str) -> None:
+    """A check's grids are its rules': a spacing is none of its choices."""
+    assert run(["comply", *RUN[1:], "--standard", "en17037", "--set", setting]) != 0
+    assert said in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("size", ["800", "600"])  # the second is the default of a full run
 def test_what_the_user_gives_holds_against_quick(chosen: list, size: str) -> None:
     run([*RUN, "--quick", "--size", size, "--spacing", "0.25"])
