@@ -7,15 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
 from bim.account import Account, StoreyAccount
 from bim.coarser import coarser
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
 from bim.model import Building, Element, Problem, Space
 from bim.names import found_by_name, label_of
 from bim.outdoors import unblinded
-from bim.planes import newell_normal
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError, RoomError
@@ -180,7 +177,7 @@ def _glazed(room: DrawnRoom) -> list[tuple[DrawnFace, DrawnOpening]]:
 
 def _glass(room: DrawnRoom) -> float:
     """Area of a room's glass that looks out, as drawn [m2]."""
-    return float(sum(np.linalg.norm(newell_normal(o.ring)) for _, o in _glazed(room)))
+    return sum(opening.area for _, opening in _glazed(room))
 
 
 def _account(

@@ -74,6 +74,13 @@ class DrawnOpening:
     finish: SurfaceFinish = SurfaceFinish()
     glazing: GlazingValues | None = None  # None: an opaque door
     states: tuple[ShadingState, ...] = ()  # BSDFs that the file holds for it
+    holes: tuple[NDArray[np.float64], ...] = ()  # each [N, 3] [m]: there is wall
+
+    @property
+    def area(self) -> float:
+        """Of the opening as drawn, without its holes [m2]."""
+        outline, *holes = (np.linalg.norm(newell_normal(r)) for r in (self.ring, *self.holes))
+        return float(outline - sum(holes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +169,7 @@ def _parts(face: DrawnFace, problems: list[Problem]) -> list[_Part]:
     rest, cut = whole, []
     for opening in face.openings:
         own = plane.to_plane(opening.ring)
-        outline = flat_polygon([own])
+        outline = flat_polygon([own, *map(plane.to_plane, opening.holes)])
         inside = shapely.intersection(outline, rest)
         near = np.abs(own[:, 2]).max() < OFF_THE_WALL
         polygons = polygons_of(inside) if near else []
@@ -180,9 +187,8 @@ def _parts(face: DrawnFace, problems: list[Problem]) -> list[_Part]:
 
 def _lost(opening: DrawnOpening, face: DrawnFace) -> Problem:
     what = f"{opening.name}: does not lie in {face.name}, which it belongs to"
-    area = float(np.linalg.norm(newell_normal(opening.ring)))
     is_glass = opening.glazing is not None
-    return Problem(opening.guid, what, "left out", "window" * is_glass, area * is_glass)
+    return Problem(opening.guid, what, "left out", "window" * is_glass, opening.area * is_glass)
 
 
 def flat_polygon(rings: Iterable[NDArray[np.float64]]) -> shapely.Geometry:

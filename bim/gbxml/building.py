@@ -20,6 +20,7 @@ from bim.drawn_building import DrawnModel, drawn_building
 from bim.gbxml.constructions import Constructions
 from bim.gbxml.document import Document, read_document
 from bim.model import Building, Element, Problem
+from bim.planes import newell_normal
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, triangles_of_rings
 
 KINDS = {  # of a surface: kind of the face of its first room, and what lies beyond with one room
@@ -38,6 +39,7 @@ KINDS = {  # of a surface: kind of the face of its first room, and what lies bey
     "EmbeddedColumn": ("wall", "adiabatic"),
 }
 OUTDOORS = ("Shade", "FreestandingColumn")
+LEVEL = 0.7  # a surface whose normal is so near to the vertical is no wall, whatever its type says
 GLAZED = ("FixedWindow", "OperableWindow", "FixedSkylight", "OperableSkylight", "SlidingDoor")
 
 
@@ -66,6 +68,7 @@ class _Reader:
         self.document = document
         self.constructions = Constructions(document)
         self.problems: list[Problem] = []
+        self.level: Counter[str] = Counter()  # surfaces that lie level, by the type of wall named
         self.turn = self._turn()
 
     def drawn(self) -> DrawnModel:
@@ -92,15 +95,23 @@ class _Reader:
             Problem(document.file.name, f"{n} surface(s) of type {k!r:.40}", "left out")
             for k, n in unplaced.items()
         ]
+        self.problems += [
+            Problem(document.file.name, f"{n} surface(s) of type {k} lie level", "no walls")
+            for k, n in self.level.items()
+        ]
         storeys = {
             s.get("id", ""): _name(s) for s in document.all("Campus/Building/BuildingStorey")
         }
-        rooms = tuple(self._room(one, faces[guid], storeys) for guid, one in spaces.items())
+        rooms = tuple(
+            self._room(one, faces[guid], storeys)
+            for guid, one in spaces.items()
+            if faces[guid] or not self._is_empty(one)
+        )
         campus = root.find("Campus")
         name = "" if campus is None else _name(campus)
         return DrawnModel(
             document.file, name or document.file.stem, rooms, tuple(elements),
-            problems=tuple(self.problems),
+            problems=(*self.problems, *self.constructions.problems),
             latitude_deg=self._location("Latitude", 90.0),
             longitude_deg=self._location("Longitude", 180.0),
             elevation=(self._location("Elevation", 1e5) or 0.0) * document.length,
@@ -145,6 +156,9 @@ class _Reader:
         face_kind, alone = KINDS[kind]
         between = len(beside) == 2
         finish = self.constructions.finish(surface.get("constructionIdRef"))
+        if face_kind == "wall" and _is_level(ring):  # OpenStudio's type of what is adiabatic
+            face_kind = ""
+            self.level[kind] += not number
         if number:
             ring, finish = ring[::-1], finish.turned()
             guid, face_kind = f"{guid}-2", face_kind if face_kind == "wall" else ""
@@ -186,6 +200,14 @@ class _Reader:
         guid = surface.get("id", "")
         return [Element(guid, _name(surface), "IfcShadingDevice", triangles, value, value)]
 
+    def _is_empty(self, space: ElementTree.Element) -> bool:
+        """Whether a space that no surface bounds is none: OpenStudio writes groups of shades so."""
+        if any(space.find(field) is not None for field in ("Area", "Volume", "ShellGeometry")):
+            return False
+        what = f"space {_name(space)}: no surface bounds it, and it states neither area nor volume"
+        self.problems.append(Problem(space.get("id", ""), what, "taken as no room"))
+        return True
+
     def _room(
         self, space: ElementTree.Element, faces: Sequence[DrawnFace], storeys: dict[str, str]
     ) -> DrawnRoom:
@@ -200,6 +222,12 @@ class _Reader:
             storeys.get(space.get("buildingStoreyIdRef", ""), ""),
             stated_area=area or None, stated_volume=volume or None,
         )  # fmt: skip
+
+
+def _is_level(ring: NDArray[np.float64]) -> bool:
+    """Whether a polygon [N, 3] is nearer to level than to upright, as `LEVEL` says."""
+    normal = newell_normal(ring)
+    return bool(abs(normal[2]) > LEVEL * np.linalg.norm(normal))
 
 
 def _name(element: ElementTree.Element) -> str:

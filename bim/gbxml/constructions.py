@@ -8,7 +8,7 @@ from functools import cached_property
 
 from bim.defaults import EPS, resistance_layer
 from bim.gbxml.document import Document
-from bim.model import Construction, MaterialLayer
+from bim.model import Construction, MaterialLayer, Problem
 from bim.polygon_rooms import GlazingValues, SurfaceFinish
 
 
@@ -17,6 +17,7 @@ class Constructions:
 
     def __init__(self, document: Document) -> None:
         self.document = document
+        self.problems: list[Problem] = []
         self._finishes: dict[str, SurfaceFinish] = {}
         self._windows: dict[str, GlazingValues] = {}
 
@@ -56,7 +57,7 @@ class Constructions:
             layer = self._referred(one, "Layer", reference.get("layerIdRef"))
             for inner in layer.iterfind("MaterialId"):
                 material = self._referred(layer, "Material", inner.get("materialIdRef"))
-                found.append(self._layer(material))
+                found += self._layer(material)
         return found
 
     def _referred(
@@ -67,7 +68,8 @@ class Constructions:
             raise self.document.fault(f"no {kind} {name!r:.60}", owner)
         return found
 
-    def _layer(self, material: ElementTree.Element) -> MaterialLayer:
+    def _layer(self, material: ElementTree.Element) -> list[MaterialLayer]:
+        """The layer of a material; none where it states no resistance."""
         name = _name(material)
         fields = ("Thickness", "Conductivity", "Density", "SpecificHeat")
         thickness, conductivity, density, capacity = (
@@ -76,14 +78,14 @@ class Constructions:
         resistance = self.document.quantity(material, "R-value")
         if not thickness or not conductivity:
             if not resistance:
-                message = "expected Thickness and Conductivity, or R-value"
-                raise self.document.fault(message, material)
+                what = f"material {name}: states neither Thickness and Conductivity nor R-value"
+                self.problems.append(Problem(material.get("id", ""), what, "layer left out"))
+                return []
             layer = resistance_layer(name, resistance, thickness)
         else:
             layer = replace(EPS, name=name, thickness=thickness, conductivity=conductivity)
-        return replace(
-            layer, density=density or layer.density, heat_capacity=capacity or layer.heat_capacity
-        )
+        heavy = density or layer.density, capacity or layer.heat_capacity
+        return [replace(layer, density=heavy[0], heat_capacity=heavy[1])]
 
     def window(self, opening: ElementTree.Element) -> GlazingValues:
         """What an opening's window type, else its construction states."""
@@ -94,18 +96,21 @@ class Constructions:
         if known is None:
             return GlazingValues(name=name)
         if name not in self._windows:
-            g_value = known.find("SolarHeatGainCoeff")
-            u_value = self.document.quantity(known, "U-value")
-            panes = len(known.findall("Glaze"))
-            self._windows[name] = GlazingValues(
-                u_value or None,
-                None if g_value is None else self.document.number(g_value, least=0.0, most=1.0),
-                self._share(known, "Transmittance", "Visible"),
-                self._share(known, "Transmittance", "Solar"),
-                panes or None,
-                _name(known),
-            )
+            self._windows[name] = self._values(known)
         return self._windows[name]
+
+    def _values(self, known: ElementTree.Element) -> GlazingValues:
+        """What a window type states; where its U and g are both nought, it states nothing."""
+        name, panes = _name(known), len(known.findall("Glaze")) or None
+        g_text = known.find("SolarHeatGainCoeff")
+        g_value = None if g_text is None else self.document.number(g_text, least=0.0, most=1.0)
+        u_value = self.document.quantity(known, "U-value") or None
+        if u_value is None and g_value == 0:
+            what = f"window type {name}: its U and g are 0"
+            self.problems.append(Problem(known.get("id", ""), what, "its values are not used"))
+            return GlazingValues(panes=panes, name=name)
+        visible, solar = (self._share(known, "Transmittance", k) for k in ("Visible", "Solar"))
+        return GlazingValues(u_value, g_value, visible, solar, panes, name)
 
     def _share(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
         """A share of 1 of that kind; near normal incidence where there are several."""

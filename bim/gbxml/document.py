@@ -83,13 +83,20 @@ class Document:
             raise self.fault(f"expected {least:g} to {most:g}, got {text[:40]}", element)
         return value
 
+    @property
+    def _length_unit(self) -> str:
+        """The unit of lengths that state none, as the schema has it."""
+        return next(unit for unit, factor in METRES.items() if factor == self.length)
+
     def quantity(self, owner: ElementTree.Element, name: str) -> float | None:
         """A quantity [SI] of an element by the unit that it states; None where it has none."""
         found = owner.find(name)
         if found is None:
             return None
         units = SI[name]
-        unit = found.get("unit", next(iter(units)))
+        unit = found.get("unit")
+        if unit is None:  # of lengths the file's own unit, of the others the SI unit
+            unit = self._length_unit if units is METRES else next(iter(units))
         if unit not in units:
             raise self.fault(f"unit {unit[:40]!r}, expected of {', '.join(units)}", owner, name)
         try:

@@ -169,10 +169,7 @@ class _Reader:
         name = self.energy.objects.name(own.energy, of_room.energy, part, f"{fields}_construction")
         if not one.is_glass:
             finish = self._finish(one, room, name, part)
-            return DrawnOpening(one.identifier, one.label, rings[0], finish)
-        if len(rings) > 1:
-            what = f"{one.label}: has holes"
-            self.problems.append(Problem(one.identifier, what, "closed"))
+            return DrawnOpening(one.identifier, one.label, rings[0], finish, holes=rings[1:])
         height = float(np.ptp(rings[0][:, 2])) or float(np.sqrt(_area(rings[0])))
         values = None if name is None else self.energy.window(name, height)
         if name is not None and self.energy.has_shade(name):
@@ -182,7 +179,9 @@ class _Reader:
         modifier = self.light.objects.name(own.radiance, of_room.radiance, part, field)
         glazing = self._by_modifier(one, values or GlazingValues(name=name or ""), modifier)
         states = self._states(one, modifier, glazing)
-        return DrawnOpening(one.identifier, one.label, rings[0], glazing=glazing, states=states)
+        return DrawnOpening(
+            one.identifier, one.label, rings[0], glazing=glazing, states=states, holes=rings[1:]
+        )
 
     def _by_modifier(
         self, one: HoneybeeAperture, values: GlazingValues, modifier: str | None

@@ -135,6 +135,61 @@ def test_a_wall_between_rooms_is_seen_from_both(building):
     assert sum(f.kind == "door" for space in building.spaces for f in space.faces) == 2
 
 
+def test_level_surfaces_that_are_named_walls_are_floors_and_ceilings(tmp_path):
+    """OpenStudio writes adiabatic floors and ceilings as walls."""
+    text = (
+        two_rooms().replace('"SlabOnGrade"', '"InteriorWall"').replace('"Roof"', '"InteriorWall"')
+    )
+    found = read_gbxml(written(tmp_path, text))
+    assert [s.floor_area for s in found.spaces] == pytest.approx([40, 32])
+    kinds = {f.name: (f.kind, f.adjacency) for f in found.spaces[0].faces}
+    assert kinds["Office-roof"] == ("ceiling", "adiabatic")
+    assert kinds["Office-floor"] == ("floor", "adiabatic")
+    assert kinds["Office-south"] == ("wall", "outside")
+    (said,) = [p for p in found.problems if "lie level" in p.what]
+    assert said.what == "4 surface(s) of type InteriorWall lie level"
+
+
+def test_a_space_without_surfaces_or_area_is_no_room(tmp_path):
+    """OpenStudio writes groups of shades as spaces; one that states an area is a lost room."""
+    empty = '<Space id="Shades"><Name>Shades</Name></Space><Space id="Room"><Area>9</Area></Space>'
+    text = two_rooms().replace("<BuildingStorey", empty + "<BuildingStorey", 1)
+    found = read_gbxml(written(tmp_path, text))
+    lost = [p.where for p in found.problems if p.lost == "room"]
+    assert (len(found.spaces), lost) == (2, ["Room"])
+    assert "space Shades: no surface bounds it" in " ".join(p.what for p in found.problems)
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("Meters", 0.2), ("Feet", 0.2 * 0.3048)])
+def test_a_thickness_without_unit_has_that_of_the_file(tmp_path, unit, metres):
+    """gbXML's schema: lengthUnit is the unit wherever a length states none."""
+    text = two_rooms().replace('<Thickness unit="Meters">', "<Thickness>")
+    found = read_gbxml(
+        written(tmp_path, text.replace('lengthUnit="Meters"', f'lengthUnit="{unit}"'))
+    )
+    south = next(f for f in found.spaces[0].faces if f.name == "Office-south")
+    assert south.construction.layers[0].thickness == pytest.approx(metres)
+
+
+def test_a_window_type_of_noughts_states_nothing(tmp_path):
+    """Some writers fill a template with 0: a glass of these values would be black."""
+    text = two_rooms()
+    for value in ('">1.1</U-value', '">0.5</Solar', '">0.7</Trans'):
+        text = text.replace(value, '">0<' + value.split("<")[1])
+    found = read_gbxml(written(tmp_path, text))
+    (window,) = found.windows
+    assert (window.u_value, window.g_value, window.visible_transmittance) == (None, None, None)
+    assert "window type Unit: its U and g are 0" in [p.what for p in found.problems]
+
+
+def test_a_material_without_resistance_is_left_out(tmp_path):
+    text = two_rooms().replace(">3</R-value>", ">0</R-value>")
+    found = read_gbxml(written(tmp_path, text))
+    south = next(f for f in found.spaces[0].faces if f.name == "Office-south")
+    assert [layer.name for layer in south.construction.layers] == ["Brick"]
+    assert any("material Wool: states neither" in p.what for p in found.problems)
+
+
 def test_north_is_turned(tmp_path):
     """The model's y axis points east, so that what is drawn south looks west."""
     (window,) = read_gbxml(written(tmp_path, two_rooms(azimuth=90))).windows

@@ -87,6 +87,20 @@ def test_rooms_open_to_each_other_become_one(tmp_path):
     assert not open_edges(one.shell)
 
 
+def test_a_hole_in_a_window_is_wall(tmp_path):
+    """By hand: 3 x 1.5 m of glass around 1 x 0.5 m of wall; the room stays closed."""
+    model = two_rooms()
+    geometry = model["rooms"][0]["faces"][0]["apertures"][0]["geometry"]
+    geometry["holes"] = [[[2, 0, 1.2], [3, 0, 1.2], [3, 0, 1.7], [2, 0, 1.7]]]
+    found = read_honeybee(write(model, tmp_path))
+    office = found.space("Office")
+    assert [window.area for window in office.windows] == pytest.approx([4.0])
+    walls = sum(f.area for f in office.faces if f.name.startswith("Office_south"))
+    assert walls == pytest.approx(15 - 4.0)
+    assert not open_edges(office.shell)
+    assert (found.account.glass_used, found.account.glass_out) == pytest.approx((6.0, 6.0))
+
+
 def test_a_window_beside_its_wall_is_lost_and_said(tmp_path):
     model = two_rooms()
     for point in model["rooms"][0]["faces"][0]["apertures"][0]["geometry"]["boundary"]:
