@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,6 +37,7 @@ from scenes.fenestration.resolver import fill_windows, source_notes, window_sour
 from scenes.fenestration.systems import States
 from scenes.room.drawn_shades import traced_building
 from scenes.room.equal_rooms import corner
+from scenes.room.options import RoomOptions
 from scenes.room.room import RoomSimulation, skies_for
 from scenes.run.building import read_building
 from scenes.run.inputs import named_spaces
@@ -98,7 +99,8 @@ def check_rooms(
     verdicts = assess_building([r.verdicts for r in rooms], [r.space.floor_area for r in rooms])
     return Compliance(
         check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
-        check.day, tuple(check.assumptions(rooms)), tuple(dict.fromkeys([*check.notes, *notes])),
+        check.day, tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
+        tuple(dict.fromkeys([*check.notes, *notes])),
         (*building.problems, *view_problems, *problems), check.seconds,
     )  # fmt: skip
 
@@ -295,41 +297,81 @@ class Check:
         verdicts = tuple(assess_room(rules, values, space, use))
         return CheckedRoom(space, use, verdicts, None, None, None)
 
-    def assumptions(self, rooms: list[CheckedRoom]) -> list[str]:
-        """What was assumed, in sentences."""
-        files, options = self.files, self.options
-        found = []
-        if "sun" in self.parts:
-            month, day = options.day
-            found.append(
-                f"Sunlight on {day:02d}.{month:02d}., the sun from "
-                f"{files.least_altitude_deg:g}° above the horizon ({files.altitude_source})."
-            )
-        if "view" in self.parts:
-            found.append(
-                f"View out: eyes {options.eye_height:g} m above the floor, 0.5 m apart and off the "
-                "walls, are the utilised area; furniture does not count."
-            )
-            found += self.glass
-        if "glare" in self.parts and not self.glaring:
-            found.append("Glare was not computed: --annual-glare rates every hour with daylight.")
-        elif self.glaring:
-            blinds = "blinds closed by LM-83's rule" if self.shaded else "every window open"
-            found.append(f"Glare is rated with {blinds}.")
-        if "heat" in self.parts:
-            blinds = "blinds closed when LM-83 closes some" if self.shaded else "no blinds"
-            found.append(
-                f"Temperatures are those without heating and cooling, {blinds}, "
-                f"{options.room.infiltration_ach:g} air changes an hour, gains of the hours of use."
-            )
-        if "open" in self.parts and self.calendar.median_diffuse is None:
-            found.append("The weather file has no diffuse illuminance: no daylight factor method.")
+    def assumptions(self, rooms: list[CheckedRoom], left: list[Space]) -> list[str]:
+        """What was assumed, in sentences; `left` are rooms that no rule was held against."""
+        found = [*self._ray_words(), *self._light_words()]
+        if left:
+            names = ", ".join(space.label for space in left)
+            found.append(f"Left out, without a window and not regularly occupied: {names}.")
         found += [
             f"{room.space.label}: {room.use.key}, {room.use.source}."
             for room in rooms
             if room.use.assumed
         ]
         return found
+
+    def _ray_words(self) -> Iterator[str]:
+        """What was assumed for sun and view."""
+        files, options = self.files, self.options
+        if "sun" in self.parts:
+            month, day = options.day
+            yield (
+                f"Sunlight on {day:02d}.{month:02d}., the sun from "
+                f"{files.least_altitude_deg:g}° above the horizon ({files.altitude_source})."
+            )
+        if "view" in self.parts:
+            yield (
+                f"View out: eyes {options.eye_height:g} m above the floor, 0.5 m apart and off the "
+                "walls, are the utilised area; furniture does not count."
+            )
+            yield from self.glass
+
+    def _light_words(self) -> Iterator[str]:
+        """What was assumed for light, glare and heat."""
+        room = self.options.room
+        if "glare" in self.parts and not self.glaring:
+            yield "Glare was not computed: --annual-glare rates every hour with daylight."
+        elif self.glaring:
+            yield glare_words(self.options, shaded=self.shaded)
+        if self.lit:
+            yield light_words(room)
+        if "heat" in self.parts:
+            blinds = "blinds closed when LM-83 closes some" if self.shaded else "no blinds"
+            yield (
+                f"Temperatures are those without heating and cooling, {blinds}, "
+                f"{room.infiltration_ach:g} air changes an hour, gains of the hours of use."
+            )
+        if "open" in self.parts and self.calendar.median_diffuse is None:
+            yield "The weather file has no diffuse illuminance: no daylight factor method."
+
+
+def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
+    """How glare is rated; `shaded`: with real blinds."""
+    blinds = "blinds closed by LM-83's rule" if shaded else "every window open"
+    seats = "one seat in the middle of each room"
+    if options.grid is not None:
+        seats = f"seats {options.grid:g} m apart"
+    start, end = options.room.occupancy.hours
+    return (
+        f"Glare is rated with {blinds}, at {seats}, {start} to {end} o'clock of every day, in "
+        f"pictures of {options.room.outputs.picture_size} pixels."
+    )
+
+
+def light_words(room: RoomOptions) -> str:
+    """How light is computed."""
+    sampling = room.sampling
+    return (
+        f"Light by the {room.method} method: {sampling.sensor_samples} paths from a sensor, "
+        f"{sampling.patch_samples} from a direction of a window, {sampling.sun_points} points of "
+        "a window that look for the sun."
+    )
+
+
+def left_out(spaces: list[Space], glazed: list[Space], dark: list[Space]) -> list[Space]:
+    """The spaces that have no window and are not regularly occupied."""
+    held = {space.guid for space in (*glazed, *dark)}
+    return [space for space in spaces if space.guid not in held]
 
 
 def free_shares(free: NDArray[np.bool_]) -> tuple[float, float]:

@@ -43,7 +43,7 @@ def sight_through(system: FenestrationSystem) -> SightThrough:
 def windows_without_view(
     windows: Iterable[Window], systems: Mapping[str, States]
 ) -> tuple[frozenset[str], tuple[str, ...]]:
-    """GUIDs of the windows that one does not see through when open, and a sentence on each system.
+    """GUIDs of the windows that one does not see through when open, and a sentence on each state.
 
     Windows whose system is not known are seen through.
     """
@@ -52,13 +52,21 @@ def windows_without_view(
     for window in windows:
         if window.guid not in systems:
             continue
-        system = systems[window.guid][0]
-        sight = known.setdefault(id(system), sight_through(system))
-        counts = "counts" if sight.is_view else "does not count"
-        notes[system.name] = (
-            f"{system.name}: {100 * sight.straight:.0f} % of the light straight on at normal "
-            f"incidence, haze {100 * sight.haze:.0f} %: {counts} as a view."
-        )
-        if not sight.is_view:
-            hidden.add(window.guid)
+        for number, system in enumerate(systems[window.guid]):
+            if id(system) not in known:
+                known[id(system)] = sight_through(system)
+            sight = known[id(system)]
+            notes[system.name] = (
+                f"{system.name}: {100 * sight.straight:.0f} % of the light straight on at normal "
+                f"incidence, haze {100 * sight.haze:.0f} %: {_said(sight, closed=number > 0)}."
+            )
+            if number == 0 and not sight.is_view:
+                hidden.add(window.guid)
     return frozenset(hidden), tuple(notes.values())
+
+
+def _said(sight: SightThrough, *, closed: bool) -> str:
+    """What a state, open or closed, means for the view."""
+    if closed:
+        return "leaves the view free where closed" if sight.is_view else "hides the view"
+    return "counts as a view" if sight.is_view else "does not count as a view"

@@ -134,7 +134,7 @@ class DgpExceeded(Need):
     def words(self) -> str:
         """The quantity in words."""
         return (
-            f"share of the hours of use with a daylight glare probability above {self.limit:g}, "
+            f"share of the hours of use with a daylight glare probability above {self.limit:.2f}, "
             "at the worst seat"
         )
 

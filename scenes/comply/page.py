@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
+from importlib import metadata
 
+import numpy as np
 from markupsafe import Markup
 
 from scenes.comply import tables
 from scenes.comply.drawings import plans, sun_bars
+from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import RuleTable
 from scenes.figures.chart import Chart
@@ -20,6 +24,8 @@ from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Column, Table
 
 FILES = page_files("scenes.comply")
+# what does not come apart at the end of a line: a sign and its number, a number and what it counts
+TOGETHER = re.compile(r"(?<=[≥≤]) (?=\d)|(?<=\d) (?=%|°|lx|h\b|m\b|K h|kWh|points?\b|credits?\b)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +60,7 @@ def dossier_html(result: Compliance, *, quick: bool = False) -> str:
         rules=[dossier_rule(result, name) for name in result.rules],
         rooms=rooms,
         problems=problems_table(result),
+        version=metadata.version("mitsuba-cfs"),
         seconds=", ".join(f"{name} {value:g} s" for name, value in result.seconds.items()),
         style=Markup("\n".join(style)),
     )  # fmt: skip
@@ -63,21 +70,21 @@ def dossier_rule(result: Compliance, name: str) -> DossierRule:
     """Tables of a rule."""
     return DossierRule(
         result.rules[name],
-        tables.building_table(result, name),
-        tables.rooms_table(result, name),
+        tied_table(tables.building_table(result, name)),
+        tied_table(tables.rooms_table(result, name)),
         tables.without_rooms(result, name),
     )
 
 
 def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierRoom:
     """Tables and drawings of a room."""
-    found = [tables.room_table(result, room, name) for name in result.rules]
+    found = [tied_table(tables.room_table(result, room, name)) for name in result.rules]
     return DossierRoom(
         f"room-{number}",
-        room.space.label,
+        f"Room {room.space.label}",
         room_facts(room),
         plans(result, room),
-        tuple(tables.missed(room)),
+        tuple(map(tied, tables.missed(room))),
         tuple(table for table in found if table.rows),
         sun_bars(result, room),
         tables.openings_table(room),
@@ -103,7 +110,30 @@ def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
         for some, every in {grid.view_free: None for grid in grids if grid.view_free}:
             words = f"{rounded(100 * some, 0)} %, through all {rounded(100 * every, 0)} %"
             rows.append(("View free through some window, of 8 to 18 o'clock", words))
+        if room.light.glare is not None:
+            rows.append(("Glare", glare_words(room.light.glare)))
     return tuple(rows)
+
+
+def glare_words(glare: SeatGlare) -> str:
+    """At how many seats glare was rated, and the worst of them."""
+    seats = len(np.unique(glare.eyes, axis=0))
+    ways = len(glare.eyes) // seats
+    where = f"{seats} seat{'s' * (seats > 1)}" + (f", {ways} directions each" if ways > 1 else "")
+    return (
+        f"{where}; at the worst DGP is above {glare.not_exceeded().max():.2f} in 5 % of the hours"
+    )
+
+
+def tied(text: str) -> str:
+    """A text whose numbers stay with their signs and units at the end of a line."""
+    return TOGETHER.sub("\N{NO-BREAK SPACE}", text)
+
+
+def tied_table(table: Table) -> Table:
+    """A table with all its cells `tied`."""
+    rows = tuple(tuple(tied(cell) for cell in row) for row in table.rows)
+    return replace(table, rows=rows)
 
 
 def summary(result: Compliance) -> tuple[tuple[str, str], ...]:

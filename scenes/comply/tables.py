@@ -148,7 +148,7 @@ def openings_table(room: CheckedRoom) -> Table | None:
         (one.name, *(f"{v:.2f}" for v in one.point), f"{one.hours:.2f}", spans(one.times))
         for one in room.sun.openings
     ]
-    return Table("Sunlight at the openings", tuple(columns), tuple(rows))
+    return Table("Sunlight at the openings' reference points", tuple(columns), tuple(rows))
 
 
 def spans(times: tuple[tuple[float, float], ...]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -139,3 +141,15 @@ def test_windows_without_view_are_no_view_openings():
     wanted = np.degrees(np.arctan2(1.75 - x, y) - np.arctan2(0.25 - x, y))
     np.testing.assert_allclose(found.sight_angle_deg, wanted, atol=0.1)
     assert windows_without_view(space.windows, {}) == (frozenset(), ())
+
+
+def test_a_closed_state_says_what_it_leaves_of_the_view():
+    """Panes that only darken leave it free; LM-83's shade hides it, and hides no window."""
+    space = shoebox(4.0, 6.0).spaces[0]
+    (window,) = space.windows
+    clear, dark = glazing(0.7), replace(glazing(0.2), name="dark")
+    for closed, said in ((dark, "leaves the view free where closed"), (None, "hides the view")):
+        states = open_and_closed({window.guid: (clear,)}, closed)
+        hidden, notes = windows_without_view([window], states)
+        assert not hidden and len(notes) == 2
+        assert notes[0].endswith("counts as a view.") and notes[1].endswith(f"{said}.")

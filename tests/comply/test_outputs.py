@@ -18,9 +18,10 @@ from scenes.commands.comply import command
 from scenes.comply.comply import check_rooms
 from scenes.comply.drawings import plans
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
+from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outputs import write_compliance, write_into_ifc
-from scenes.comply.page import dossier_html
+from scenes.comply.page import dossier_html, glare_words, tied
 from scenes.comply.results import GridSummary, RoomLights
 from scenes.comply.rules import read_rule
 from scenes.comply.uses import read_uses
@@ -115,7 +116,7 @@ def test_assumptions_name_what_was_assumed(result):
 def test_the_dossier_says_all(result):
     html = dossier_html(result)
     for wanted in ("&lt;House&gt;", "2026 &lt;draft&gt;", "clause 7.1", "View &amp; distance",
-                   "≥ 75 %", "Meeting room", "Sunlight at the openings", "mine"):  # fmt: skip
+                   "≥\xa075\xa0%", "Meeting room", "Sunlight at the openings", "mine"):  # fmt: skip
         assert wanted in html
     assert "<script" not in html and "http:" not in html.replace("http://www.w3.org", "")
 
@@ -129,6 +130,34 @@ def test_a_room_says_what_it_misses(result):
     assert "Not met:" not in sections["south"] and "Not met:" not in sections["north"]
     assert "rays, Sun (clause 7.2)" in sections["dark"]
     assert "0.00 h, ≥ 1.5 h for met" in sections["dark"].replace("\xa0", " ")
+
+
+def test_numbers_stay_with_their_units(result):
+    """A limit that ends a line with "≥" reads as another one's; so it did in print."""
+    assert tied("high ≥ 750 lx (≥ 100 %); 2 points: 5 h") == (
+        "high ≥\xa0750\xa0lx (≥\xa0100\xa0%); 2\xa0points: 5\xa0h"
+    )
+    html = dossier_html(result)
+    assert "≥\xa075\xa0%" in html and "≥ 75" not in html and "75 %" not in html
+
+
+def test_rooms_are_called_rooms_and_those_left_out_are_named(result):
+    """After a part's number "9. 4 Bedroom" has two numbers; a cell that no rule looks at."""
+    html = dossier_html(result)
+    assert html.count("Room Office south</h2>") == 1 and ">Room Office south</a>" in html
+    (left,) = (text for text in result.assumptions if text.startswith("Left out"))
+    assert left == "Left out, without a window and not regularly occupied: Cell."
+
+
+def test_a_room_says_how_glare_was_rated(result):
+    """Two seats, each in two directions; one of them exceeds 0.46 in 5 % of the hours."""
+    eyes = np.repeat([[1.0, 1.0, 1.2], [2.0, 1.0, 1.2]], 2, axis=0)
+    dgp = np.full((4, 1000), 0.3)
+    dgp[2, :60] = 0.46
+    found = glare_words(SeatGlare(eyes, eyes, dgp, operated=True))
+    assert found == "2 seats, 2 directions each; at the worst DGP is above 0.46 in 5 % of the hours"
+    one = glare_words(SeatGlare(eyes[:1], eyes[:1], dgp[:1], operated=True))
+    assert one.startswith("1 seat; at the worst DGP is above 0.30")
 
 
 def test_each_quantity_of_the_light_has_one_plan(result):

@@ -205,6 +205,13 @@ def test_the_building_is_a_mean_over_the_floor_area(calendar):
     assert mean.reached == NOT_COMPUTED
 
 
+def test_en_17037_is_for_occupied_rooms(calendar):
+    """Its scope: rooms that people use regularly; a store fails nothing."""
+    findings = Findings(calendar, light(np.zeros((8760, 2))), sun=SunExposure((), ()))
+    assert set(reached("en17037", findings, use=STORE).values()) == {NOT_FOR_IT}
+    assert reached("en17037", findings)["sunlight"] == NOT_MET
+
+
 def test_a_share_of_the_floor_area(calendar):
     """BREEAM: 80 % of the area of the offices."""
     criterion = read_rule("breeam-hea01").criterion[0]
