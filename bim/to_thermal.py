@@ -55,19 +55,14 @@ def thermal_room(
 
     Args: fenestration: of every window; None for a room without any.
     """
-    groups: dict[tuple, list[int]] = {}
-    for i, face in enumerate(space.faces):
-        key = (face.kind, face.adjacency, face.neighbour, face.construction)
-        key += tuple(np.round(face.normal, 2))
-        groups.setdefault(key, []).append(i)
+    groups = _faces_of_surfaces(space)
     surface_of_face = np.empty(len(space.faces), dtype=np.int64)
-    surfaces, points, neighbours = [], [], []
-    for number, members in enumerate(groups.values()):
+    surfaces, points = [], []
+    for number, members in enumerate(groups):
         faces = [space.faces[i] for i in members]
         surface_of_face[members] = number
         surfaces.append(_surface(f"{faces[0].kind} {number + 1}", faces, ground_level))
         points.append(_outdoor_point(max(faces, key=lambda face: face.area)))
-        neighbours.append(faces[0].neighbour)
     outdoor = [i for i, surface in enumerate(surfaces) if surface.outside == "outdoor"]
     zone = Zone(
         space.label,
@@ -84,7 +79,28 @@ def thermal_room(
         np.array(outdoor, dtype=np.int64),
         np.array([points[i] for i in outdoor]).reshape(-1, 3),
         np.array([surfaces[i].normal for i in outdoor]).reshape(-1, 3),
-        tuple(neighbours),
+        surface_neighbours(space),
+    )
+
+
+def surface_neighbours(space: Space) -> tuple[str | None, ...]:
+    """GUID of the room behind each surface [F] of a room's zone; None where there is none."""
+    return tuple(space.faces[members[0]].neighbour for members in _faces_of_surfaces(space))
+
+
+def same_surfaces(a: Space, b: Space) -> bool:
+    """Whether the faces of two equal rooms make the same surfaces of a zone in the same order.
+
+    What lies beyond may be another room, of the same kind.
+    """
+    if len(a.faces) != len(b.faces) or _faces_of_surfaces(a) != _faces_of_surfaces(b):
+        return False
+    return all(
+        (one.kind, one.adjacency, one.construction, one.neighbour is None)
+        == (other.kind, other.adjacency, other.construction, other.neighbour is None)
+        and one.normal @ other.normal > -OPPOSITE
+        and abs(one.area - other.area) <= SAME_AREA * one.area
+        for one, other in zip(a.faces, b.faces, strict=True)
     )
 
 
@@ -174,6 +190,16 @@ def door_links(spaces: Sequence[Space], flow: float) -> NDArray[np.float64]:
         for neighbour, _ in joined:
             doors[a, index[neighbour]] += 1.0
     return flow * np.maximum(doors, doors.T)
+
+
+def _faces_of_surfaces(space: Space) -> list[list[int]]:
+    """The faces of a room that are one surface of its zone."""
+    groups: dict[tuple, list[int]] = {}
+    for i, face in enumerate(space.faces):
+        key = (face.kind, face.adjacency, face.neighbour, face.construction)
+        key += tuple(np.round(face.normal, 2))
+        groups.setdefault(key, []).append(i)
+    return list(groups.values())
 
 
 def _other_side(

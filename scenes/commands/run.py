@@ -59,6 +59,10 @@ _DEFAULT = RoomOptions()
     help="Let daylight through glass between rooms; rooms lit by it alone are computed too.",
 )  # fmt: skip
 @click.option(
+    "--no-coupled-heat", is_flag=True,
+    help="Balance each room's heat alone, as if rooms of its own temperature lay around it.",
+)  # fmt: skip
+@click.option(
     "--explore", is_flag=True,
     help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
 )  # fmt: skip
@@ -79,6 +83,7 @@ def command(
     operation: Path | None,
     no_cache: bool,
     inner_glass: bool,
+    no_coupled_heat: bool,
     explore: bool,
     quick: bool,
     settings: tuple[str, ...],
@@ -100,6 +105,7 @@ def command(
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,
+        coupled_heat=not no_coupled_heat,
         u_value=u_value, g_value=g_value, surroundings=surroundings,
         surroundings_offset=surroundings_offset,
     )  # fmt: skip
@@ -127,10 +133,12 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
 
     if options.quick:
         click.echo(quick_run.NOTE)
+    lines = _RoomLines()
     with ProgressBar() as progress, compiled_beside():
         result = run_job(
-            options, progress, files, on_room=_print_summary, on_building=_print_account
-        )
+            options, progress, files,
+            on_room=lines.year, on_light=lines.light, on_building=_print_account,
+        )  # fmt: skip
         progress("results", 0.0)
         write_results(result, folder, write_report, write_explorer if options.explore else None)
         progress("results", 1.0)
@@ -149,23 +157,44 @@ def _print_account(building) -> None:
         click.echo(line)
 
 
-def _print_summary(room) -> None:
-    click.echo(summary_line(room))
+class _RoomLines:
+    """The headline figures of each room as it comes: of its light first where heat comes later."""
+
+    def __init__(self) -> None:
+        self._lit: set[str] = set()
+
+    def light(self, room) -> None:
+        """Print those of a room's light."""
+        self._lit.add(room.space.guid)
+        click.echo(f"{room.space.label}: {_light_figures(room)}")
+
+    def year(self, room) -> None:
+        """Print those of its heat, and of its light where that was not said."""
+        said = room.space.guid in self._lit
+        click.echo(f"{room.space.label}: {_heat_figures(room)}" if said else summary_line(room))
 
 
 def summary_line(room) -> str:
     """One line of headline figures of a room."""
-    daylight, heat = room.daylight.room_metrics, room.heat
+    return f"{room.space.label}: {_light_figures(room)}, {_heat_figures(room)}"
+
+
+def _light_figures(room) -> str:
+    daylight = room.daylight.room_metrics
     direct = f"ASE {daylight['ase1000_250']:.0f} %, " if "ase1000_250" in daylight else ""
-    loads = ""
+    return (
+        f"sDA {daylight['sda300_50']:.0f} %, "
+        f"{direct}mean DA {daylight['da300']:.0f} %, "
+        f"worst DGP {room.glare.worst:.2f}"
+    )
+
+
+def _heat_figures(room) -> str:
+    heat, loads = room.heat, ""
     if room.operation is not None:
         kwh = {name: room.operation.summary[f"{name}_kwh"] for name in LOADS}
         loads = "".join(f", {name} {value:.0f} kWh" for name, value in kwh.items() if value > 0)
     return (
-        f"{room.space.label}: "
-        f"sDA {daylight['sda300_50']:.0f} %, "
-        f"{direct}mean DA {daylight['da300']:.0f} %, "
-        f"worst DGP {room.glare.worst:.2f}, "
         f"operative {heat.temperatures['operative_c'].min():.1f} "
         f"to {heat.temperatures['operative_c'].max():.1f} C, "
         f"comfortable {heat.comfort_summary['within_80']:.0f} % of occupied hours{loads}"

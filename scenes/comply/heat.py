@@ -18,7 +18,7 @@ def room_heat(room: RoomSimulation, closed: NDArray[np.bool_] | None) -> RoomHea
     """
     if closed is not None:
         room.state = np.where(closed.any(axis=1), 1, 0)
-    temperatures = room.thermal()[0].temperatures
+    temperatures = room.thermal().temperatures
     return RoomHeat(
         temperatures["operative_c"].to_numpy(), np.asarray(room.weather.dry_bulb_c), room.occupied
     )

@@ -83,7 +83,8 @@ def method_words(result: RunResult) -> list[tuple[str, str]]:
             (
                 "Equal rooms",
                 f"Of rooms equal in shape, orientation, materials, windows and surroundings one is "
-                f"computed; its results are given for the others too ({', '.join(twins)}).",
+                f"computed; its {'light is' if _coupled(result) else 'results are'} given for the "
+                f"others too ({', '.join(twins)}).",
             )
         )
     return found
@@ -140,6 +141,11 @@ def _glare(result: RunResult) -> str:
     return text
 
 
+def _coupled(result: RunResult) -> bool:
+    """Whether heat flows between the rooms computed."""
+    return len(result.spaces) > 1 and bool(result.manifest.get("options", {}).get("coupled_heat"))
+
+
 def _heat(result: RunResult) -> str:
     text = (
         "The daylight matrix in the solar band gives the solar radiation passing into the room and "
@@ -154,6 +160,10 @@ def _heat(result: RunResult) -> str:
         "gives temperatures; comfort follows from the operative temperature and the running mean "
         "of the outdoor temperature."
     )
+    if _coupled(result):
+        text += " The rooms computed are balanced together: heat flows through what lies between."
+    elif len(result.spaces) > 1:
+        text += " Each room is balanced alone, with rooms of its own temperature around it."
     if _controlled(result):
         text += " Each hour's shading state holds for light, glare and heat together."
     return text

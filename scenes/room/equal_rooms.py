@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,10 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
 from scenes.results import RoomYear
+from scenes.room.heated import DaylitRoom
 from scenes.room.holes import moved_problem
 
+R = TypeVar("R", RoomYear, DaylitRoom)
 SAME_LIGHT = 0.005  # share of the light from anywhere that may come another way
 NEAR = 0.01  # [m] between the places of windows in their rooms
 
@@ -54,7 +57,15 @@ def same_light(
     return True
 
 
-def moved_result(result: RoomYear, space: Space) -> RoomYear:
+def moved_light(room: DaylitRoom, space: Space) -> DaylitRoom:
+    """The light of a template room for one equal to it, its zone between that one's neighbours."""
+    inputs = room.inputs
+    return replace(
+        moved_result(room, space), inputs=replace(inputs, zone=inputs.zone.moved_to(space))
+    )
+
+
+def moved_result(result: R, space: Space) -> R:
     """The results of a template room for one equal to it, moved to where that stands."""
     shift = corner(space) - corner(result.space)
     daylight, glare = result.daylight, result.glare

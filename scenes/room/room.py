@@ -1,11 +1,4 @@
-"""One room from Python objects to all of its results; no file is read or written.
-
-weather = read_weather(Path("city.epw"))
-system = read_system(Path("blind.xml"))                 # scenes.run.inputs
-building = read_ifc("house.ifc")                        # or bim.shoebox.shoebox(...)
-space = building.spaces[0]
-result = compute_room(building, space, in_all_windows(space, system), weather, RoomOptions())
-"""
+"""One room on its way from Python objects to its results; no file is read or written."""
 
 from __future__ import annotations
 
@@ -41,8 +34,6 @@ from scenes.results import (
     DaylightResult,
     ExploredRoom,
     GlareResults,
-    OperationResult,
-    RoomYear,
     ThermalResult,
 )
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
@@ -51,27 +42,23 @@ from scenes.room.daylight import room_daylight, room_scene
 from scenes.room.envelope import enveloped
 from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
+from scenes.room.heated import HeatInputs, heat_alone
 from scenes.room.holes import hole_problems
-from scenes.room.humidity import felt_by, room_humidity
-from scenes.room.inner_glass import borrowed_share, inner_glass
-from scenes.room.operation import Operation
+from scenes.room.inner_glass import inner_glass
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.picture_hours import wanted_hours
 from scenes.room.solar import RoomSun
-from scenes.room.thermal import fenestration_table, operated_year, thermal_result
+from scenes.room.thermal import fenestration_table
 from scenes.room.windows import room_windows
 from scenes.room.zone import (
     RoomZone,
-    balances,
     internal_gains,
     operated,
     plain_services,
     services_of,
     zone_surfaces,
 )
-from thermal.balance import ZoneResult
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -89,72 +76,10 @@ def skies_for(weather: Weather, method: str, sampling: Sampling, **choices: str)
     return annual_sky(weather, sampling.subdivision, sun=with_sun, solar=True, **choices)
 
 
-def compute_room(
-    building: Building,
-    space: Space,
-    systems: Mapping[str, States],
-    weather: Weather,
-    options: RoomOptions,
-    *,
-    operation: Operation | None = None,
-    skies: AnnualSky | None = None,
-    cache: MatrixCache | None = None,
-    pictures: bool = True,
-    explore: bool = False,
-    rate: tuple[str, NDArray[np.int64]] | None = None,
-    inner: bool = False,
-    progress: Progress = silent,
-) -> RoomYear:
-    """Daylight, glare, temperatures and comfort of one room, with one method.
-
-    Args:
-        building: what stands around the room is its `elements`.
-        systems: by window GUID the `FenestrationSystem` in each shading state, from open to
-            closed; one tuple of one system is the usual case, see `in_all_windows`.
-        options: method, sampling, sensors, occupancy, outputs; `RoomOptions()` is a full run.
-        operation: shading control, gains, set points; without it the first state holds all year
-            and the room floats freely.
-        skies: of `skies_for`, where several rooms share them.
-        cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
-            and weather do not enter V and D: variants of them cost only algebra.
-        pictures: False leaves the luminance pictures and their glare out.
-        explore: True gives every hour's picture in every state, for the explorer.
-        rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
-        inner: True lets light of rooms with windows in through glass; phase methods only.
-
-    Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
-        `ValueError` for a window without a system.
-    """
-    if operation is None:
-        systems = {guid: states[:1] for guid, states in systems.items()}
-    room = RoomSimulation(
-        building, space, systems, weather, options,
-        operation=None if operation is None else operation.tables,
-        skies=skies, cache=cache, inner=inner, progress=progress,
-    )  # fmt: skip
-    outputs, skies = options.outputs, room.skies
-    hours = wanted_hours(outputs.picture_hours, weather.midpoints, skies.lit)
-    daylight = room.timed("daylight", lambda: room.daylight)
-    holes = room.timed("holes", room.holes)
-    year, rated = None, GlareResults(room.scene.view, (), rating_of(outputs).rule)
-    if outputs.annual_glare:
-        year = room.timed("annual glare", room.annual_glare)
-    if pictures:
-        rated = room.timed("glare", lambda: room.glare(hours, year))
-    dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
-    explored = room.timed("explorer", room.explored) if explore else None
-    heat, balance = room.timed("thermal", room.thermal)
-    ran = None if operation is None else room.operation_result(balance)
-    return RoomYear(
-        space, daylight, rated, heat, room.seconds, ran, year, dgp=dgp, problems=holes,
-        explored=explored, borrowed=borrowed_share(space, room.light, room.inner),
-    )  # fmt: skip
-
-
 class RoomSimulation:
     """A room on its way: each step is computed when it is first asked for, and serves all others.
 
-    `cfs run` and `cfs study` ask for all of them (`compute_room`), `cfs thermal` for `zone`.
+    `cfs run` and `cfs study` ask for all of them (`lit_room`), `cfs thermal` for `zone`.
     """
 
     def __init__(
@@ -172,7 +97,7 @@ class RoomSimulation:
         inner: bool = False,
         progress: Progress = silent,
     ) -> None:
-        """See `compute_room`; grids: of the sensors in place of the options' one."""
+        """See `lit_room`; grids: of the sensors in place of the options' one."""
         if operation is not None:
             operation = operation.of_room(building, space)
         self.building, self.space, self.weather, self.options = building, space, weather, options
@@ -380,21 +305,13 @@ class RoomSimulation:
             self.space, room, solar, gains, state, lamps, self.occupied, plane, services
         )
 
-    def thermal(self) -> tuple[ThermalResult, ZoneResult]:
-        """Temperatures and comfort, and the balance they come from."""
-        step_s = self.options.heat_step_s
-        tables = self.operation or OperationTables()
-        (balance,) = balances(
-            [self.zone], self.weather, step_s, terrain=tables.terrain, progress=self.progress
-        )
-        self.progress("heat", 1.0)
-        table = fenestration_table(self.windows, self.thermals)
-        (humidity,) = room_humidity([self.zone], [balance], self.weather)
-        return thermal_result(
-            self.zone, balance, self.weather, felt_by(tables.comfort, balance, humidity), table
-        ), balance
-
-    def operation_result(self, balance: ZoneResult) -> OperationResult:
-        """What control, heating, cooling and lamps did."""
+    def heat_inputs(self) -> HeatInputs:
+        """What the heat balance takes, and what its tables name."""
+        table = tuple(fenestration_table(self.windows, self.thermals))
         names = tuple(system.name for system in max(self.windows.systems, key=len, default=()))
-        return operated_year(self.zone, balance, self.weather, names, self.operation.control.rule)
+        return HeatInputs(self.zone, table, names, self.operation)
+
+    def thermal(self) -> ThermalResult:
+        """Temperatures and comfort of the room alone."""
+        step_s, progress = self.options.heat_step_s, self.progress
+        return heat_alone(self.heat_inputs(), self.weather, step_s, progress)[0]

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Space
-from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, thermal_room
+from bim.to_thermal import (
+    ThermalRoom,
+    coupled_rooms,
+    door_links,
+    surface_neighbours,
+    thermal_room,
+)
 from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.progress import Progress, silent
@@ -61,6 +67,12 @@ class RoomZone:
     def zone(self) -> Zone:
         """The zone of the room."""
         return self.room.zone
+
+    def moved_to(self, space: Space) -> RoomZone:
+        """The zone of an equal room (`bim.to_thermal.same_surfaces`), among its own neighbours."""
+        zone = replace(self.zone, name=space.label)
+        room = replace(self.room, zone=zone, neighbours=surface_neighbours(space))
+        return replace(self, space=space, room=room)
 
     def with_view_factors(self, among: FloatArray) -> RoomZone:
         """The room with view factors [N, N] between its surfaces, then its windows."""

@@ -38,6 +38,7 @@ class JobOptions(BuildingOptions):
     surroundings: tuple[Path, ...] = ()  # files of what stands around
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     inner_glass: bool = False  # light passes glass between rooms
+    coupled_heat: bool = True  # heat flows between the rooms that are computed
     explore: bool = False  # every hour's picture in every shading state, for the explorer
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence

@@ -33,6 +33,7 @@ class RoomSeries(Generic[R]):
     file: Path | None = None  # that messages name
     alike: Callable[[Space, Space], bool] = lambda one, other: True  # beside shape and light
     on_room: Callable[[R], None] = lambda result: None  # called with each result in turn
+    given: str = "results are"  # what an equal room has of the one that was computed
 
     def results(self, progress: Progress = silent) -> tuple[list[R], list[Problem], list[str]]:
         """The results in the rooms' order, what was left out, and what was given twice.
@@ -50,7 +51,7 @@ class RoomSeries(Generic[R]):
                     result = self.move(computed[twin.guid], space)
                     notes.append(
                         f"Room {space.label} is like {twin.label} in shape, orientation, "
-                        "materials, windows and in what shades it: its results are those."
+                        f"materials, windows and in what shades it: its {self.given} those."
                     )
                 else:
                     result = computed[space.guid] = self.compute(space, steps)

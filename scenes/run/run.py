@@ -5,12 +5,14 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
+from typing import TypeVar
 
 from bim.account import NOT_USABLE
 from bim.model import Building, Problem, Space
+from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -25,19 +27,24 @@ from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.drawn_shades import traced_building
-from scenes.room.equal_rooms import moved_result
+from scenes.room.equal_rooms import moved_light, moved_result
+from scenes.room.heated import DaylitRoom, coupled_years
 from scenes.room.inner_glass import lending_rooms
 from scenes.room.operation import Operation, check_states
-from scenes.room.room import compute_room, skies_for
+from scenes.room.operation_tables import OperationTables
+from scenes.room.room import skies_for
+from scenes.room.room_year import compute_room, lit_room
 from scenes.run.building import read_building
 from scenes.run.files import JobFiles, read_files
 from scenes.run.inputs import chosen_spaces, sha256
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 
+R = TypeVar("R")
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
 
+OnLight = Callable[[DaylitRoom], None]  # called with each room's light where its heat comes later
 OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
 OnBuilding = Callable[[Building], None]  # called with the building as soon as it is read
 
@@ -59,6 +66,7 @@ def run_job(
     files: JobFiles | None = None,
     *,
     on_room: OnRoom | None = None,
+    on_light: OnLight | None = None,
     on_building: OnBuilding | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
@@ -66,6 +74,8 @@ def run_job(
     Args:
         files: what `read_files` has read of the options; read now without.
         on_room: called with each room as soon as it is computed, in the rooms' order.
+        on_light: called with the light of each room as soon as that is there, where rooms'
+            heat is balanced together.
         on_building: called with the building before anything is traced.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
@@ -74,7 +84,7 @@ def run_job(
     inputs = read_inputs(options, progress, files)
     if on_building is not None:
         on_building(inputs.building)
-    return run_inputs(inputs, options, progress, on_room=on_room, start=start)
+    return run_inputs(inputs, options, progress, on_room=on_room, on_light=on_light, start=start)
 
 
 def run_inputs(
@@ -83,6 +93,7 @@ def run_inputs(
     progress: Progress = silent,
     *,
     on_room: OnRoom | None = None,
+    on_light: OnLight | None = None,
     start: float | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the rooms of `inputs`.
@@ -103,7 +114,8 @@ def run_inputs(
     room = options.room
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     progress("sky", 1.0)
-    results, problems, notes = _rooms(inputs, skies, options, progress, on_room)
+    heard = {"on_room": on_room, "on_light": on_light}
+    results, problems, notes = _rooms(inputs, skies, options, progress, **heard)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
     holes = [problem for result in results for problem in result.problems]
@@ -202,10 +214,70 @@ def _rooms(
     skies: AnnualSky,
     options: JobOptions,
     progress: Progress,
+    *,
     on_room: OnRoom | None = None,
+    on_light: OnLight | None = None,
 ) -> tuple[list[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
+    if not options.coupled_heat or len(inputs.spaces) == 1:
+        compute = _computed(compute_room, inputs, skies, options)
+        series = _series(inputs, inputs.spaces, options, compute, moved_result)
+        return replace(series, on_room=on_room or (lambda room: None)).results(progress)
+
+    def compute_light(space: Space, steps: Progress) -> DaylitRoom:
+        found = light(space, steps)
+        steps("heat", 1.0)
+        return found
+
+    light = _computed(lit_room, inputs, skies, options)
+    spaces = shared_constructions(inputs.spaces)
+    together = _series(inputs, spaces, options, compute_light, moved_light, same_surfaces)
+    heard = on_light or (lambda room: None)
+    together = replace(together, on_room=heard, given="daylight, glare and sun are")
+    found, problems, notes = together.results(progress)
+    years, said = _coupled(found, inputs, options, progress)
+    for room in years if on_room is not None else ():
+        on_room(room)
+    return years, problems, [*notes, *said]
+
+
+def _coupled(
+    rooms: list[DaylitRoom], inputs: JobInputs, options: JobOptions, progress: Progress
+) -> tuple[list[RoomYear], tuple[str, ...]]:
+    """The years of rooms balanced together, and what that means in words."""
+    if not rooms:
+        return [], ()
+    tables = OperationTables() if inputs.operation is None else inputs.operation.tables
+    step_s = options.room.heat_step_s
+    years, said = coupled_years(rooms, inputs.weather, step_s, tables, progress)
+    return years, (said,) if len(years) > 1 else ()
+
+
+def _computed(
+    compute: Callable[..., R], inputs: JobInputs, skies: AnnualSky, options: JobOptions
+) -> Callable[[Space, Progress], R]:
+    """What computes a room of the run: `compute_room` or `lit_room`."""
     cache = MatrixCache.of_user() if options.cache else None
+
+    def computed(space: Space, steps: Progress) -> R:
+        return compute(
+            inputs.building, space, inputs.systems, inputs.weather, options.room,
+            operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
+            inner=options.inner_glass, progress=steps,
+        )  # fmt: skip
+
+    return computed
+
+
+def _series(
+    inputs: JobInputs,
+    spaces: Sequence[Space],
+    options: JobOptions,
+    compute: Callable[[Space, Progress], R],
+    move: Callable[[R, Space], R],
+    alike: Callable[[Space, Space], bool] = lambda one, other: True,
+) -> RoomSeries[R]:
+    """The rooms of a run; alike: whether one of two equal rooms may stand for the other."""
 
     def borrows(*spaces: Space) -> bool:
         """Whether what a room gets depends on a neighbour: then none stands for another."""
@@ -213,25 +285,19 @@ def _rooms(
             lending_rooms(inputs.building, space) for space in spaces
         )
 
-    def compute(space: Space, steps: Progress) -> RoomYear:
-        return compute_room(
-            inputs.building, space, inputs.systems, inputs.weather, options.room,
-            operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
-            inner=options.inner_glass, progress=steps,
-        )  # fmt: skip
-
     return RoomSeries(
         inputs.building,
-        inputs.spaces,
+        spaces,
         inputs.systems,
         options.room.sampling,
-        cache,
+        MatrixCache.of_user() if options.cache else None,
         compute,
-        moved_result,
+        move,
         options.building,
-        lambda one, other: not borrows(one, other) and _operated_alike(inputs, one, other),
-        on_room or (lambda room: None),
-    ).results(progress)
+        lambda one, other: (
+            not borrows(one, other) and _operated_alike(inputs, one, other) and alike(one, other)
+        ),
+    )
 
 
 def _operated_alike(inputs: JobInputs, one: Space, other: Space) -> bool:

@@ -30,7 +30,8 @@ from scenes.results import RoomYear
 from scenes.room.drawn_shades import traced_building
 from scenes.room.operation import check_states, read_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room import compute_room, skies_for
+from scenes.room.room import skies_for
+from scenes.room.room_year import compute_room
 from scenes.run.inputs import read_weather
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult

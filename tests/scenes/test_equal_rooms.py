@@ -14,7 +14,7 @@ from mitsuba_cfs.progress import silent
 from scenes.room.equal_rooms import moved_result, same_light, same_systems
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room import compute_room
+from scenes.room.room_year import compute_room, lit_room
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions
 from tests.scenes.small_box import BOX, ROOM, SMALL
@@ -70,9 +70,9 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
 
     def noted(building, space, *others, **options):
         computed.append(space.name)
-        return compute_room(building, space, *others, **options, pictures=False)
+        return lit_room(building, space, *others, **options, pictures=False)
 
-    monkeypatch.setattr(run, "compute_room", noted)
+    monkeypatch.setattr(run, "lit_room", noted)
     room = RoomOptions.of(
         method="three-phase", sky_subdivision=1, sensor_spacing=2.0,
         sensor_samples=1024, patch_samples=1024,
@@ -83,7 +83,9 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
     assert computed == ["room", "other"] and not problems
     assert [r.space.name for r in results] == ["room", "other", "twin"]
     assert [r.template for r in results] == ["", "", "room"]
-    assert len(notes) == 1 and "twin" in notes[0] and "room" in notes[0]
+    assert len(notes) == 2 and "twin" in notes[0] and "sun are those" in notes[0]
+    assert results[2].heat is not results[0].heat
+    np.testing.assert_allclose(results[2].heat.air_c, results[0].heat.air_c, atol=0.01)
 
 
 def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
@@ -102,7 +104,7 @@ def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
 
     monkeypatch.setattr(run, "compute_room", noted)
     monkeypatch.setattr(run, "moved_result", lambda result, space: result)
-    options = JobOptions(Path(), Path(), cache=False, room=SMALL)
+    options = JobOptions(Path(), Path(), cache=False, room=SMALL, coupled_heat=False)
     path = tmp_path / "operation.toml"
     cooler = '[[rooms]]\nspaces = ["twin"]\n[rooms.loads]\nheating_c = 16\n'
     for rooms, names in (("", ["room"]), (cooler, ["room", "twin"])):

@@ -22,7 +22,8 @@ from scenes.heat.study_file import read_study
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation, compute_room
+from scenes.room.room import RoomSimulation
+from scenes.room.room_year import compute_room
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions
 from scenes.run.run import run_job

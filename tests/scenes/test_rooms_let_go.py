@@ -20,7 +20,8 @@ from mitsuba_cfs.trace import scene as traced_scenes
 from mitsuba_cfs.trace.scene import TracedScene
 from scenes.comply.light import lights_of
 from scenes.room.options import SensorGrid
-from scenes.room.room import RoomSimulation, compute_room
+from scenes.room.room import RoomSimulation
+from scenes.room.room_year import compute_room
 from scenes.room.solar import RoomSun
 from scenes.room.windows import in_all_windows
 from tests.scenes.small_box import BOX, ROOM, SMALL

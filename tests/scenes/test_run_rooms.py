@@ -19,7 +19,7 @@ from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.room.annual import worst_hours
 from scenes.room.control import shading_states
 from scenes.room.operation import check_states, read_operation
-from scenes.room.room import compute_room
+from scenes.room.room_year import compute_room
 from scenes.room.windows import in_all_windows, room_windows
 from tests.scenes.small_box import BOX, HOURS, ROOM, SMALL, clear
 
