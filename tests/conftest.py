@@ -87,3 +87,18 @@ def variant() -> str:
     from mitsuba_cfs import variants
 
     return variants.activate("llvm_ad_mono")
+
+
+@pytest.fixture
+def shade(tmp_path) -> Path:
+    """A BSDF file of a Lambertian sheet that passes 0.1 and reflects 0.5."""
+    import numpy as np
+
+    from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+    from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
+
+    t, r = (np.full((KLEMS_FULL.size,) * 2, share / np.pi) for share in (0.1, 0.5))
+    sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, t, t, r, r)
+    path = tmp_path / "sheet.xml"
+    write_bsdf_xml(BsdfFile({"Visible": sheet, "Solar": sheet}, name="sheet"), path)
+    return path

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSunLight
 from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.methods.subdivision import coarse_sky
+from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.sky.annual import AnnualSky
 
 
@@ -44,6 +48,37 @@ def matrix_variance(
                 found += seen.error_of(mean) ** 2
             left += _left_by_means(traced, straight, (g, j), sky, some)
         found += left**2
+    return found
+
+
+def exchange_variance(
+    traced: PhaseScene,
+    mirrored: WindowReflection,
+    optics: Sequence[SystemOptics],
+    sky: AnnualSky,
+    hours: NDArray[np.int64],
+    reflected: ReflectedSunLight | None,
+) -> NDArray[np.float64]:
+    """Variance of each sensor's mean over the sky's hours by the noise of W and X [S].
+
+    Args:
+        optics: of the parts [Q] in some of the hours.
+        hours: which; in the others the light is taken as none.
+        reflected: as for `matrix_variance`.
+    """
+    found = np.zeros(len(traced.scene.sensors()[0]))
+    inwards, outwards = mirrored.reflects(optics), mirrored.reflects_outdoors(optics)
+    if not inwards and not outwards:
+        return found
+    before = traced.daylight.values @ (sky.whole[:, hours].sum(axis=1) / len(sky.lit))
+    if inwards:
+        through = np.stack([o.transmission @ i for o, i in zip(optics, before, strict=True)])
+        found += mirrored.variance_by_room(optics, through)
+    if outwards:
+        if reflected is not None:
+            some = np.isin(np.arange(len(sky.lit)), hours)
+            before = before + reflected.replaced(some) / len(sky.lit)
+        found += mirrored.variance_by_outdoors(optics, before)
     return found
 
 

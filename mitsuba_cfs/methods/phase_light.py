@@ -13,7 +13,7 @@ from mitsuba_cfs import phases
 from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.methods.group_light import SensorLight, WindowLight
 from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
-from mitsuba_cfs.methods.phase_error import matrix_variance
+from mitsuba_cfs.methods.phase_error import exchange_variance, matrix_variance
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
 from mitsuba_cfs.methods.straight_views import StraightViews, sun_beam
@@ -190,9 +190,9 @@ class PhaseLight:
     def relative_error(self, state: State | None = None) -> NDArray[np.float64]:
         """Standard error of each sensor's mean over the hours [S], from the tracing.
 
-        That of V, D, B, C_ds and the reflected sun; those of different groups are taken as
-        independent.  What D as a mean over a part leaves is among them
-        (`mitsuba_cfs.methods.subdivision`).
+        That of V, D, B, C_ds, the reflected sun, and W and X of what windows reflect; those of
+        different groups and states are taken as independent.  What D as a mean over a part leaves
+        is among them (`mitsuba_cfs.methods.subdivision`).
         """
         state = self._state(state)
         variance = matrix_variance(
@@ -202,6 +202,11 @@ class PhaseLight:
             share = np.bincount(row, minlength=len(self.sensors[g])) / len(row)
             sun = sum(w * s.sun_error for w, s in zip(share, self.sensors[g], strict=True))
             variance = variance + (sun / len(row)) ** 2
+        for kind, hours in combinations(state):
+            variance = variance + exchange_variance(
+                self._traced, self.filled.mirrored, self.filled.optics(kind), self.sky, hours,
+                self._reflected_sun,
+            )  # fmt: skip
         mean = self._of_all(state).mean(axis=1)
         error = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
         return error[: len(self._traced.scene.points)]

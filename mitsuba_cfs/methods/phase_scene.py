@@ -34,7 +34,9 @@ BATCHES = 8  # independent repetitions that the standard errors come from
 INDOOR_DEPTH, OUTDOOR_DEPTH = 32, 16  # segments of a path
 CELL_SHARE = 0.06  # paths of the cells that a group's parts follow from, of those of its D
 EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room, in each batch
+OUTDOOR_SHARE = 4  # ... that looks outdoors: few meet a mirrored sun, and they are short
 PART_BATCHES = 2  # of D where groups are cut
+PART_SHARE = 2  # paths of all parts of a group for D, for each of a whole group
 INNER_PART = 0.75  # of glass between rooms, about: in the room beyond D changes along it [m]
 INNER_SHARE = 8  # paths of a patch for D, for each of a part of glass between rooms
 
@@ -147,36 +149,36 @@ class PhaseScene:
         return self._sensors(1, 0.9, 1.0).values
 
     @cached_property
-    def exchange(self) -> NDArray[np.float64]:
+    def exchange(self) -> Estimate:
         """W [Q, K, Q * K]: what the windows see of the room that they light."""
         parts = self.parts.groups
         return window_exchange(
             self.scene.interior,
             parts,
-            samples=self._exchange_samples(parts),
+            samples=self._exchange_samples(parts, EXCHANGE_SHARE),
             max_depth=INDOOR_DEPTH,
             stopping=Stopping(batches=2),
             seed=self.sampling.seed,
             cache=self.cache,
-        ).values
+        )
 
     @cached_property
-    def outdoor_exchange(self) -> NDArray[np.float64]:
+    def outdoor_exchange(self) -> Estimate:
         """X [Q, K, Q * K]: what the windows that look outdoors see of what they light there."""
         parts = self.parts.groups[: self.parts.outdoors(self.scene)]
         return outdoor_exchange(
             self.scene.exterior,
             parts,
-            samples=self._exchange_samples(parts),
+            samples=self._exchange_samples(parts, OUTDOOR_SHARE),
             max_depth=OUTDOOR_DEPTH,
             stopping=Stopping(batches=2),
             seed=self.sampling.seed,
             cache=self.cache,
         )
 
-    def _exchange_samples(self, parts: Sequence[WindowGroup]) -> int:
+    def _exchange_samples(self, parts: Sequence[WindowGroup], share: int) -> int:
         """Paths of each patch between windows: fewer the more windows there are."""
-        return max(self.sampling.patch_samples // EXCHANGE_SHARE // len(parts), 8)
+        return max(self.sampling.patch_samples // share // len(parts), 8)
 
     @cached_property
     def view(self) -> ViewMatrices:
@@ -261,8 +263,8 @@ class PhaseScene:
         chosen, groups = self.sampling, self.scene.outdoor_groups
         parts = self.parts.groups[: self.parts.outdoors(self.scene)]
         samples, batches = chosen.patch_samples, BATCHES
-        if len(parts) > len(groups):  # at about the cost of the whole groups
-            samples = samples * len(groups) // len(parts)
+        if len(parts) > len(groups):
+            samples = PART_SHARE * samples * len(groups) // len(parts)
             batches = PART_BATCHES
         return daylight_matrix(
             self.scene.exterior if exterior is None else exterior,

@@ -77,8 +77,8 @@ class ReflectedSun:
         return kept_scene(self.traced.scene.exterior, parts, centre=centre)
 
     @cached_property
-    def cells(self) -> RoomCells:
-        """The room's surfaces."""
+    def cells(self) -> tuple[RoomCells, RoomCells]:
+        """The room's surfaces, in cells of two widths."""
         return room_cells(self.inside, self.traced.scene.interior)
 
     def seed(self, batch: int) -> int:
@@ -101,7 +101,7 @@ class ReflectedSun:
         if batch not in self._rooms:
             scene = self.traced.scene
             self._rooms[batch] = room_shares(
-                self.cells, self.inside, scene.interior, scene.sensors(),
+                self.cells, self.inside, scene.sensors(),
                 samples=self._samples(ROOM_SHARE), seed=self.seed(batch),
             )  # fmt: skip
         return self._rooms[batch]
@@ -186,7 +186,7 @@ class ReflectedSunLight:
                 light += outdoor_light(seen, found.outside, *self._suns)
         if beam:
             light += room_light(
-                found.cells, found.room(number), (found.inside, found.outside), g,
+                found.cells[0], found.room(number), (found.inside, found.outside), g,
                 found.systems[g][j].scattering, self._suns, seed=found.seed(number),
             )  # fmt: skip
         return light

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.trace.estimate import Estimate
 
 # of reflection in the windows: a fifth is below 0.001 in a bright room with a front of glass
 ORDERS = 4
@@ -40,7 +41,7 @@ class WindowReflection:
         self, optics: Sequence[SystemOptics], luminance: NDArray[np.floating]
     ) -> NDArray[np.float64]:
         """Luminance [Q, K, H] that is added to that of the parts' windows [Q, K, H]."""
-        exchange, added = self._traced.exchange, np.zeros(luminance.shape)
+        exchange, added = self._traced.exchange.values, np.zeros(luminance.shape)
         source = luminance
         for _ in range(ORDERS):
             flat = source.reshape(-1, luminance.shape[-1])
@@ -59,10 +60,40 @@ class WindowReflection:
             back = np.zeros((len(view), view[0].size))
             for q, one in enumerate(optics):
                 if one.reflection is not None:
-                    back += (found[:, q] @ one.reflection) @ traced.exchange[q]
+                    back += (found[:, q] @ one.reflection) @ traced.exchange.values[q]
             found = back.reshape(view.shape)
             total = total + back
         return total
+
+    def variance_by_room(
+        self, optics: Sequence[SystemOptics], luminance: NDArray[np.floating]
+    ) -> NDArray[np.float64]:
+        """Variance of the sensors' light [S] by the noise of W, that of its first order.
+
+        Args: luminance: L [Q, K].
+        """
+        view, exchange = self._traced.sensors.values, self._traced.exchange
+        noise = _row_variance(exchange, luminance)
+        found = np.zeros(len(view))
+        for q, one in enumerate(optics):
+            if one.reflection is not None:
+                found += (view[:, q] @ one.reflection) ** 2 @ noise[q]
+        return found
+
+    def variance_by_outdoors(
+        self, optics: Sequence[SystemOptics], before: NDArray[np.floating]
+    ) -> NDArray[np.float64]:
+        """Variance of the sensors' light [S] by the noise of X, that of its first order.
+
+        Args: before: I [Q, K].
+        """
+        exchange = self._traced.outdoor_exchange
+        sent = np.zeros((len(exchange.values), KLEMS_FULL.size))
+        for q, one in enumerate(optics[: len(sent)]):
+            if one.outdoor_reflection is not None:
+                sent[q] = one.outdoor_reflection @ before[q]
+        noise = _row_variance(exchange, sent)
+        return self.shares(optics)[:, : noise.size] ** 2 @ noise.ravel()
 
     def reflects_outdoors(self, optics: Sequence[SystemOptics]) -> bool:
         """Whether anything outdoors is lit by the parts' systems [Q]."""
@@ -79,7 +110,7 @@ class WindowReflection:
 
         Args: shares: F [n, Q * K] of what comes to the windows otherwise.
         """
-        exchange, K = self._traced.outdoor_exchange, KLEMS_FULL.size
+        exchange, K = self._traced.outdoor_exchange.values, KLEMS_FULL.size
         found, parts = shares.reshape(len(shares), -1), len(exchange)
         flat, total = exchange.reshape(parts * K, -1), np.zeros(found.shape)
         for _ in range(OUTDOOR_ORDERS):
@@ -99,3 +130,11 @@ class WindowReflection:
             view = view + self.sensors(optics).reshape(view.shape)
         through = [view[:, q] @ one.transmission for q, one in enumerate(optics)]
         return np.concatenate(through, axis=1)
+
+
+def _row_variance(exchange: Estimate, luminance: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Variance [Q, K] of the sums of W or X times luminances [Q, K].
+
+    A path ends on one patch of one window, so the entries of a row are taken as independent.
+    """
+    return exchange.standard_error**2 @ luminance.ravel() ** 2

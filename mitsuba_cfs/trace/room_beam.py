@@ -3,9 +3,10 @@
     E[s] = sum over cells c of W[s, c] flux[c] / area[c],   W = A + A F + A F F + ...
 
 A is what rays from the sensors have of the cells of the surfaces, F what rays from a cell have of
-the others, each times the reflectance met; all sensors share F.  The flux on the cells follows from
-rays of the sun through points of the windows, hour by hour, each to where it falls.  A narrow strip
-of sun has as many rays for its light as a wide one.
+the others, each times the reflectance met; all sensors share F.  F and what follows on it is of
+cells twice as wide, since light that is reflected twice is smooth.  The flux on the cells follows
+from rays of the sun through points of the windows, hour by hour, each to where it falls.  A narrow
+strip of sun has as many rays for its light as a wide one.
 
 Source: Goral, Torrance, Greenberg, Battaile 1984, "Modeling the interaction of light between
 diffuse surfaces"; the cells' irradiance is a mean over each.
@@ -28,12 +29,13 @@ from mitsuba_cfs.trace.sun_discs import Scattering
 from mitsuba_cfs.trace.sun_paths import Places, face_places, on_disc_of
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
-CELLS = 1024  # into which the surfaces' area is divided, about, on either side
+CELLS = 4096  # into which the surfaces' area is divided, about, on either side
+WIDER = 2  # edge of the cells that light is reflected between, in edges of those
 AREA_POINTS = 2**18  # by which the cells' areas are counted
 CELL_RAYS = 64  # from each cell, in each batch
 LAST = 1e-4  # share of a sensor's light by the last reflection that is counted
 BOUNCES = 256  # at most; light falls to `LAST` before in all but white rooms
-WINDOW_POINTS = 64  # on each group in each batch, that the sun is followed from
+WINDOW_POINTS = 256  # on each group in each batch, that the sun is followed from
 EDGE_POINTS = 1024  # where the sun does not reach all of them
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 RAYS = 2**21  # at once
@@ -46,6 +48,7 @@ class RoomCells:
     edge: float  # of the cubes [m]
     low: NDArray[np.float64]  # [3] of all
     keys: NDArray[np.int64]  # [c] sorted
+    area: NDArray[np.float64]  # [c] [m2]
     points: Places  # evenly over the area, cell after cell
     first: NDArray[np.int64]  # [c + 1] of each cell's points
 
@@ -61,22 +64,29 @@ class RoomCells:
         return np.where(self.keys[found] == keys, found, -1)
 
 
-def room_cells(inside: TracedScene, interior: Surfaces) -> RoomCells:
-    """The cells of a room's surfaces."""
+def room_cells(inside: TracedScene, interior: Surfaces) -> tuple[RoomCells, RoomCells]:
+    """The cells of a room's surfaces, and the wider ones that these lie in."""
     area = float(interior.areas.sum())
     edge = float(np.sqrt(max(area, 1e-6) / CELLS))
     low = (interior.triangles.min(axis=(0, 1)) - inside.centre) - 0.37 * edge
     points = _points_on(interior, inside)
+    return _cells(points, low, edge, area), _cells(points, low, WIDER * edge, area)
+
+
+def _cells(points: Places, low: NDArray[np.float64], edge: float, area: float) -> RoomCells:
+    """Cells of an edge from points even over the area [m2]."""
     keys = _keys(points, low, edge)
     order = np.argsort(keys, kind="stable")
     found, first = np.unique(keys[order], return_index=True)
-    return RoomCells(edge, low, found, points.some(order), np.append(first, len(order)))
+    first = np.append(first, len(order))
+    return RoomCells(
+        edge, low, found, np.diff(first) * (area / AREA_POINTS), points.some(order), first
+    )
 
 
 def room_shares(
-    cells: RoomCells,
+    cells: tuple[RoomCells, RoomCells],
     inside: TracedScene,
-    interior: Surfaces,
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
     samples: int,
@@ -90,16 +100,19 @@ def room_shares(
     """
     points, normals = (np.atleast_2d(v) for v in sensors)
     local = Places((points - inside.centre).astype(np.float32), normals.astype(np.float32))
-    between = _reflected(cells, inside, _starts(cells), cells.size, CELL_RAYS, seed)
-    step = _reflected(cells, inside, local, local.size, samples, seed ^ 0x6A09E667).toarray()
-    found = step.copy()
+    narrow, wide = cells
+    first = _reflected(narrow, inside, local, local.size, samples, seed ^ 0x6A09E667)
+    holder = wide.of(narrow.points.some(narrow.first[:-1]))  # [c] the wide cell of each
+    entries = np.ones(narrow.size), (np.arange(narrow.size), holder)
+    step = (first @ sparse.csr_array(entries, shape=(narrow.size, wide.size))).toarray()
+    between = _reflected(wide, inside, _starts(wide), wide.size, CELL_RAYS, seed)
+    whole, found = step.sum(), np.zeros_like(step)
     for _ in range(BOUNCES):
         step = step @ between
         found += step
-        if step.sum() <= LAST * found.sum():
+        if step.sum() <= LAST * (whole + found.sum()):
             break
-    area = np.diff(cells.first) * float(interior.areas.sum()) / AREA_POINTS
-    return found / area
+    return first.toarray() / narrow.area + (found / wide.area)[:, holder]
 
 
 def room_light(

@@ -8,7 +8,6 @@ from dataclasses import replace
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -59,7 +58,7 @@ def window_exchange(
             mi.Bool(True),
             row=paths.patch,
             apart=dr.opaque(mi.UInt32, 0),
-            stream=paths.patch,
+            stream=paths.stream,
             sample=path - paths.patch * dr.opaque(mi.UInt32, n),
             generator=paths.generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),
@@ -85,7 +84,7 @@ def outdoor_exchange(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
-) -> NDArray[np.float64]:
+) -> Estimate:
     """Radiance that meets the windows from outdoors, per unit that they send there [G, K, G * K].
 
         I[g, k] = sum over g', k' of X[g, k, g' k'] L[g', k']
@@ -95,11 +94,16 @@ def outdoor_exchange(
     found = window_exchange(
         surfaces, [_turned(group) for group in groups], samples=samples, max_depth=max_depth,
         stopping=stopping, seed=seed, cache=cache,
-    ).values  # fmt: skip
+    )  # fmt: skip
     theta, phi = KLEMS_FULL.centres()
     patch = KLEMS_FULL.index(theta, np.pi - phi)  # x of the turned windows is that of the others, -
     columns = (np.arange(len(groups))[:, None] * KLEMS_FULL.size + patch).ravel()
-    return found[:, patch][:, :, columns]
+    return replace(
+        found,
+        values=found.values[:, patch][:, :, columns],
+        standard_error=found.standard_error[:, patch][:, :, columns],
+        sum_error=found.sum_error[:, patch],
+    )
 
 
 def _turned(group: WindowGroup) -> WindowGroup:

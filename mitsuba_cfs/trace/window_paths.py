@@ -23,6 +23,7 @@ class WindowPaths:
     patch: mi.UInt32  # [K * n]
     position: mi.Point3f  # on the window
     outward: mi.Vector3f  # world direction in the patch, outdoors
+    stream: mi.UInt32  # of stratified samples: of the patch in this batch
     generator: mi.PCG32
 
 
@@ -51,7 +52,7 @@ def window_batches(
         local = bins.sample(patch, lattice_2d(sample, stream, 0))
         position = tracer.sample_group(group, lattice_2d(sample, stream, 2))
         outward, generator = tracer.to_world(group, local), path_generator(path, opaque_key)
-        follow(matrix, WindowPaths(group, patch, position, outward, generator))
+        follow(matrix, WindowPaths(group, patch, position, outward, stream, generator))
         return sums_of(matrix, (K, columns)) / samples
 
     def batch(number: int) -> NDArray[np.float64]:

@@ -5,11 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 import scenes.demo
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.solar import solar_sentence, solar_sentences
 from scenes.fenestration.ratings import rated_state
@@ -33,19 +29,14 @@ def test_the_shipped_blind_by_its_file():
     assert "g_tot 0.21 at normal incidence (as the heat balance takes it), class 2 of" in text
 
 
-def test_layers_are_rated_by_the_standard(tmp_path):
+def test_layers_are_rated_by_the_standard(shade):
     """Where the layers are known the line is `cfs bsdf thermal`'s row of ISO 52022-3."""
-    shape = (KLEMS_FULL.size, KLEMS_FULL.size)
-    t, r = np.full(shape, 0.1 / np.pi), np.full(shape, 0.5 / np.pi)
-    sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, t, t, r, r)
-    path = tmp_path / "sheet.xml"
-    write_bsdf_xml(BsdfFile({"Visible": sheet, "Solar": sheet}, name="sheet"), path)
-    path.with_suffix(".toml").write_text(LAYERS)
+    shade.with_suffix(".toml").write_text(LAYERS)
     rows = {
-        row["method"]: row for row in rated_state(path, place=None, glazing=None, kappa=0.4).rows()
+        row["method"]: row for row in rated_state(shade, place=None, glazing=None, kappa=0.4).rows()
     }
     wanted = rows["ISO 52022-3, reference"]
-    text = solar_sentence(read_system(path))
+    text = solar_sentence(read_system(shade))
     assert f"g_tot {wanted['g_tot']:.2f} at normal incidence (ISO 52022-3, reference)" in text
     assert f"class {wanted['class of g_tot']} of EN 14501" in text
 

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from scenes import cli
 from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.thermal_file import ThermalFile
@@ -67,17 +66,6 @@ def test_layers_by_every_standard():
     shaded = GlazingUnit((*unit.layers, sheet_layer(0.05)), (*unit.gaps, GasGap(0.05)))
     methods = [r.method for r in layered_ratings(shaded, 0.1, np.array([0.2, 0.1, 0.2]))]
     assert "EN 673, EN 410" not in methods and len(methods) == 3
-
-
-@pytest.fixture
-def shade(tmp_path):
-    """A Lambertian sheet that passes 0.1 and reflects 0.5."""
-    shape = (KLEMS_FULL.size, KLEMS_FULL.size)
-    t, r = np.full(shape, 0.1 / np.pi), np.full(shape, 0.5 / np.pi)
-    sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, t, t, r, r)
-    path = tmp_path / "sheet.xml"
-    write_bsdf_xml(BsdfFile({"Visible": sheet, "Solar": sheet}, name="sheet"), path)
-    return path
 
 
 LAYERS = """

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 
 from . import rooms
 from .test_subdivision import clear_glass, overhang
@@ -123,39 +123,79 @@ def test_the_sun_reflected_below_an_overhang_is_that_of_paths(sun):
     agrees(found, expected, error)
 
 
+def square(k: int, at: float) -> np.ndarray:
+    """A side of a cube of 3 m, across axis k."""
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float) * 3
+    return rooms.quad(*np.insert(corners, k, at, axis=1))
+
+
+def hole() -> WindowGroup:
+    """A square metre in the cube's side y = 0."""
+    corners = rooms.quad((1, 1e-3, 1), (2, 1e-3, 1), (2, 1e-3, 2), (1, 1e-3, 2))
+    return WindowGroup("south", (WindowSurface("hole", corners),))
+
+
 def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     """A closed room of one reflectance: rho / (1 - rho) of the flux over its area, on average."""
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
     from mitsuba_cfs.trace.room_beam import room_cells, room_light, room_shares
     from mitsuba_cfs.trace.scene import TracedScene
 
-    def square(k: int, at: float):
-        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float) * 3
-        return rooms.quad(*np.insert(corners, k, at, axis=1))
-
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
-    hole = rooms.quad((1, 1e-3, 1), (2, 1e-3, 1), (2, 1e-3, 2), (1, 1e-3, 2))
-    group = WindowGroup("south", (WindowSurface("hole", hole),))
+    group = hole()
     inside, outside = TracedScene(room, [group]), TracedScene(rooms.NOTHING, [group])
     cells, rng = room_cells(inside, room), np.random.default_rng(1)
-    assert np.diff(cells.first).sum() == cells.points.size
+    for part in cells:
+        assert np.diff(part.first).sum() == part.points.size
+        assert part.area.sum() == pytest.approx(2 * 54, rel=1e-3)  # either side
     # sensors evenly over the surfaces, facing inwards: their mean is the room's
     n = 128
     places = rng.random((6 * n, 3)) * 2.99 + 0.005
     side, normals = np.repeat(np.arange(6), n), np.zeros((6 * n, 3))
     places[np.arange(6 * n), side // 2] = np.where(side % 2, 2.995, 0.005)
     normals[np.arange(6 * n), side // 2] = np.where(side % 2, -1.0, 1.0)
-    share = room_shares(cells, inside, room, (places, normals), samples=256)
+    share = room_shares(cells, inside, (places, normals), samples=256)
     sun = towards(40, 20)[None]
     way = BsdfOptics(clear_glass()).scattering
-    lux = room_light(cells, share, (inside, outside), 0, way, (sun, np.array([LUX])))
+    lux = room_light(cells[0], share, (inside, outside), 0, way, (sun, np.array([LUX])))
     flux = 0.8 * LUX * -sun[0, 1] * 1.0
     wall = TracedScene(rooms.surfaces([(9 * square(1, 0.0) - 12, 0.0)]), [group])
-    hidden = room_light(cells, share, (inside, wall), 0, way, (sun, np.array([LUX])))
+    hidden = room_light(cells[0], share, (inside, wall), 0, way, (sun, np.array([LUX])))
     assert np.all(hidden == 0)
     # light that the black hole of 1 m2 in 54 takes: twice, as it hides the wall behind it
     assert lux.mean() == pytest.approx(0.6 / (1 - 0.6 * (1 - 1 / 54)) * flux / 54, rel=0.03)
+
+
+def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
+    """One wall reflects: the flux of points of the hole over their distances, by quadrature.
+
+    The horizon of a sensor that looks up cuts the spot 0.3 m away; cells of 0.12 m have 5 % too
+    much of what is below it, cells twice as wide 17 %.
+    """
+    from mitsuba_cfs.methods.optics import BsdfOptics
+    from mitsuba_cfs.trace.room_beam import room_cells, room_light, room_shares
+    from mitsuba_cfs.trace.scene import TracedScene
+
+    sides = [(k, at) for k in range(3) for at in (0.0, 3.0)]
+    room = rooms.surfaces([(square(k, at), 0.5 if (k, at) == (0, 0.0) else 0.0) for k, at in sides])
+    inside, outside = TracedScene(room, [hole()]), TracedScene(rooms.NOTHING, [hole()])
+    sun, place = towards(20, 60), np.array([0.3, 1.4, 1.0])
+    middle = (np.arange(400) + 0.5) / 400 + 1
+    x, z = (v.ravel() for v in np.meshgrid(middle, middle))
+    lit = np.stack([0 * x, -x / sun[0] * sun[1], z - x / sun[0] * sun[2]], axis=1)
+    way = lit - place
+    distance = np.linalg.norm(way, axis=1)
+    cosines = np.maximum(way[:, 2], 0) * -way[:, 0] / distance**2
+    expected = 0.8 * LUX * -sun[1] * 0.5 / np.pi * np.mean(cosines / distance**2)
+
+    cells, beam = room_cells(inside, room), BsdfOptics(clear_glass()).scattering
+    found = []
+    for seed in range(3):
+        sensor = place[None], np.array([[0.0, 0.0, 1.0]])
+        share = room_shares(cells, inside, sensor, samples=65_536, seed=seed)
+        suns = sun[None], np.array([LUX])
+        found.append(room_light(cells[0], share, (inside, outside), 0, beam, suns, seed=seed)[0, 0])
+    assert np.mean(found) == pytest.approx(expected, rel=0.08)  # 0.05, and 0.02 of noise
 
 
 def test_the_beam_that_the_room_reflects_is_that_of_paths():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import normalize
@@ -37,7 +38,7 @@ def test_windows_that_face_each_other_see_what_leaves_towards_them() -> None:
     far = rooms.surfaces([(rooms.quad((0, 9, 9), (1, 9, 9), (1, 9, 8), (0, 9, 8)), 0.0)])
     places = np.array([[0.0, 0.0, 1.0], [1.0, -0.8, 1.6]])
     groups = [small("north", places[0], [0, -1, 0]), small("south", places[1], [0, 1, 0])]
-    found = outdoor_exchange(far, groups, samples=4096).reshape(2, K, 2, K)
+    found = outdoor_exchange(far, groups, samples=4096).values.reshape(2, K, 2, K)
     for here, there in ((0, 1), (1, 0)):
         way = normalize(places[there] - places[here])
         came, went = np.unravel_index(np.argmax(found[here, :, there]), (K, K))
@@ -67,18 +68,18 @@ def test_all_that_leaves_into_a_white_box_comes_back() -> None:
     )
     pane = rooms.quad((-1, 0, 0), (3, 0, 0), (3, 0, 3), (-1, 0, 3))
     groups = [WindowGroup("front", (WindowSurface("front", pane),))]
-    found = outdoor_exchange(box, groups, samples=256, max_depth=64)
+    found = outdoor_exchange(box, groups, samples=256, max_depth=64).values
     assert found.sum(axis=2) == pytest.approx(1.0, abs=0.12)
     assert OMEGA @ found[0].sum(axis=1) / np.pi == pytest.approx(1.0, rel=0.01)
 
 
-def mirroring(front: float):
-    """Glass of 0.6 that mirrors outdoors."""
+def mirroring(front: float, back: float = 0.0):
+    """Glass of 0.6 that mirrors so much outdoors and into the room."""
     from mitsuba_cfs.bsdf.klems import KlemsBsdf
     from mitsuba_cfs.methods.optics import BsdfOptics
 
-    through, mirror = np.diag(0.6 / OMEGA), np.diag(front / OMEGA)
-    return BsdfOptics(KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, mirror, np.zeros((K, K))))
+    through, outdoors, inwards = (np.diag(share / OMEGA) for share in (0.6, front, back))
+    return BsdfOptics(KlemsBsdf(KLEMS_FULL, KLEMS_FULL, through, through, outdoors, inwards))
 
 
 def between_fins():
@@ -155,6 +156,35 @@ def test_the_sun_on_the_fins_comes_to_panes_hour_by_hour_as_in_their_sum() -> No
     assert found[:, 1].max() > 100 and not found[:, 0].any()
     whole = light.replaced(np.array([True, True]))
     np.testing.assert_allclose(found.sum(axis=1), whole.ravel(), rtol=1e-4, atol=0.1)
+
+
+@pytest.mark.parametrize("shares", [(0.4, 0.0), (0.0, 0.4)], ids=["outdoors", "room"])
+def test_the_stated_error_has_the_noise_of_what_windows_send_one_another(shares) -> None:
+    """All else is that of one seed; the spread over 24 seeds by chi-square, one time in 1,000."""
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+
+    scene, seeds = replace(between_fins(), view=None), 24
+    few = Sampling(sensor_samples=8192, patch_samples=512, subdivision=1, window_parts=1)
+    first = PhaseScene(scene, few, five_phase=False)
+
+    def light(seed: int, *mirrors: float):
+        traced = PhaseScene(scene, replace(few, seed=seed), five_phase=False)
+        for name in ("parts", "daylight", "sensors"):
+            setattr(traced, name, getattr(first, name))
+        return PhaseSystems(traced, [[mirroring(*mirrors)]]).light(hours(1))
+
+    runs = [light(seed, *shares) for seed in range(seeds)]
+    found = np.stack([run.illuminance().mean(axis=1) for run in runs])
+    said = np.stack([run.relative_error() for run in runs]) * found
+    black = light(0, 0.0)
+    others = black.relative_error() * black.illuminance().mean(axis=1)
+    expected = (said**2).mean(axis=0) - others**2
+    spread = (seeds - 1) * found.var(axis=0, ddof=1) / expected
+    low, high = stats.chi2.ppf([0.0005, 0.9995], seeds - 1)
+    print(spread / (seeds - 1), np.sqrt(expected) / found.mean(axis=0))
+    assert np.all((low < spread) & (spread < high))
 
 
 @pytest.mark.slow
