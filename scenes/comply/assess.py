@@ -101,6 +101,18 @@ def applies(criterion: CriterionTable, space: Space, use: RoomUse) -> bool:
     return roof == (criterion.openings == "roof")
 
 
+def asked_of(rules: Mapping[str, RuleTable], space: Space, use: RoomUse) -> frozenset[str]:
+    """The parts of `Findings` that the criteria which are for a room need."""
+    return frozenset(
+        part
+        for rule in rules.values()
+        for criterion in rule.criterion
+        if applies(criterion, space, use)
+        for need in criterion.needs
+        for part in need.parts
+    )
+
+
 def assess_building(
     verdicts: Sequence[Sequence[RoomVerdict]], areas: Sequence[float]
 ) -> list[BuildingVerdict]:

@@ -18,7 +18,7 @@ from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded
 from mitsuba_cfs.metrics.lm83 import sunlit_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from scenes.comply.assess import assess_building, assess_room, values_of
+from scenes.comply.assess import asked_of, assess_building, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
@@ -85,6 +85,7 @@ def check_rooms(
     if not glazed:
         raise DataError("no space has a window", file=options.building, element="IfcWindow")
     views, view_problems = check.views(glazed)
+    check.asked = {s.guid: asked_of(files.rules, s, uses[s.guid]) for s in glazed}
     lights, problems, notes = check.lights(glazed)
     rooms = []
     for space in spaces:
@@ -133,6 +134,7 @@ class Check:
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
         self.outdoors: OutdoorMesh = outdoors_of(self.building)
         self.seconds: dict[str, float] = {}
+        self.asked: Mapping[str, frozenset[str]] = {}  # parts that a room's own criteria need
 
     @property
     def lit(self) -> bool:
@@ -205,10 +207,15 @@ class Check:
         results, problems, notes = RoomSeries(
             self.building, spaces, self.systems, options.room.sampling, cache, compute,
             moved_lights, options.building,
+            alike=lambda one, other: self._costly(one) == self._costly(other),
         ).results(self.progress)  # fmt: skip
         left = time.monotonic() - start - sum(self.seconds.get(name, 0.0) for name in PARTS)
         self._took({"what else light takes": max(left, 0.0)})
         return {result.space.guid: result for result in results}, problems, notes
+
+    def _costly(self, space: Space) -> frozenset[str]:
+        """What of glare and heat a rule looks at in a room."""
+        return self.asked[space.guid] & {"glare", "heat"}
 
     def _light(
         self, space: Space, skies: AnnualSky, cache: MatrixCache | None, progress: Progress
@@ -231,9 +238,9 @@ class Check:
         closed = next((one.closed for one in found if one.closed is not None), None)
         closed = closed if self.shaded else None
         glare = heat = None
-        if self.glaring:
+        if self.glaring and "glare" in self._costly(space):
             glare = room.timed(GLARE, lambda: self._glare(room, closed))
-        if "heat" in self.parts:
+        if "heat" in self._costly(space):
             heat = room.timed(HEAT, lambda: room_heat(room, closed))
         self._took(room.seconds)
         of_room = Findings(self.calendar, glare=glare, heat=heat)

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenes.comply.findings import Findings
 from scenes.comply.need import Need
-from thermal.comfort import comfort_by_outdoors, degree_hours
+from thermal.comfort import ADAPTIVE_BANDS, comfort_by_outdoors, degree_hours
 
 
 class DegreeHours(Need):
@@ -52,6 +52,8 @@ class ComfortShare(Need):
     def words(self) -> str:
         """The quantity in words."""
         found = f"share of the hours of use in the adaptive band {self.band}, where it applies"
+        if self.cold_from_c >= ADAPTIVE_BANDS[self.band][-1]:
+            return f"{found}; too cold does not count"
         if math.isfinite(self.cold_from_c):
             found += f"; too cold counts from {self.cold_from_c:g} °C of running mean outdoors"
         return found

@@ -1,4 +1,4 @@
-"""Sentences on how much of the sun's heat the windows' systems let in: g_tot and its class."""
+"""Sentences on how much of the sun's heat the windows' systems let in: g_tot, maybe its class."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scenes.fenestration.ratings import system_ratings
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
 from thermal.errors import ThermalInputError
-from thermal.ratings import ThermalRating
+from thermal.ratings import CLASSES, ThermalRating
 
 STANDARD = "ISO 52022-3, reference"  # the method that is named where a system's layers are known
 
@@ -37,11 +37,13 @@ def solar_sentence(system: FenestrationSystem) -> str:
     heat = thermal_system(system)
     found = {rating.method: rating for rating in system_ratings(system, heat)}
     rating: ThermalRating = found.get(STANDARD) or found["heat balance"]
+    limits = ", ".join(f"{limit:.2f}" for limit in CLASSES["g"])
     source = "as the heat balance takes it" if rating.method == "heat balance" else rating.method
     return " ".join(
         (
             f"{system.name}: g_tot {rating.g_value:.2f} at normal incidence ({source}), "
-            f"class {rating.solar_class('g')} of EN 14501:2021.",
+            f"class {rating.solar_class('g')} if EN 14501's limits are {limits}, which could not "
+            "be checked.",
             *heat.notes,
         )
     )

@@ -67,7 +67,12 @@ def test_a_cold_room_counts_where_nothing_heats(calendar):
     assert share(need, 18.0, 16.0) == 0.0 and share(need, 20.1, 16.0) == 1.0
     assert share(need, 26.2, 13.0) == 0.0
     rule = read_rule("en16798-1")
-    assert {one.cold_from_c for criterion in rule.criterion for one in criterion.needs} == {15}
+    both, upper = rule.criterion
+    assert {one.cold_from_c for one in both.needs} == {15}
+    assert all("too cold does not count" in one.words for one in upper.needs)
+    (third, second, first) = upper.needs
+    assert share(third, 10.0, 29.0) == 1.0 and share(third, 32.5, 29.0) == 0.0
+    assert share(second, 31.3, 29.0) == 1.0 and share(first, 31.3, 29.0) == 0.0  # 28.37 + 3, + 2
 
 
 def test_comfort_of_half_hours_is_that_of_hours(calendar):

@@ -15,6 +15,7 @@ from scenes.comply.assess import (
     NOT_COMPUTED,
     NOT_FOR_IT,
     RoomVerdict,
+    asked_of,
     assess_building,
     assess_room,
     values_of,
@@ -210,6 +211,15 @@ def test_en_17037_is_for_occupied_rooms(calendar):
     findings = Findings(calendar, light(np.zeros((8760, 2))), sun=SunExposure((), ()))
     assert set(reached("en17037", findings, use=STORE).values()) == {NOT_FOR_IT}
     assert reached("en17037", findings)["sunlight"] == NOT_MET
+
+
+def test_what_the_rules_of_a_room_ask():
+    """Nobody rates the glare of a store, nor the heat of a corridor: both take long."""
+    rules = {name: read_rule(name) for name in ("en17037", "din4108-2")}
+    space = shoebox().spaces[0]
+    assert asked_of(rules, space, OFFICE) == {"open", "view", "sun", "glare", "heat"}
+    assert asked_of(rules, space, STORE) == frozenset()
+    assert "heat" not in asked_of(rules, space, RoomUse("workshop", True, ""))
 
 
 def test_a_share_of_the_floor_area(calendar):

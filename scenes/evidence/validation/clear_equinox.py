@@ -1,6 +1,9 @@
 """LEED's option 2 and LM-83's direct sun against Radiance under the same skies and suns.
 
-    python -m scenes.evidence.validation.clear_equinox [--rooms ROOM ...]
+    python -m scenes.evidence.validation.clear_equinox [--rooms ROOM ...] [--runs N]
+
+With several runs, whose paths differ in both programs, the noise of the sensors near a limit of
+option 2 is told instead.
 
 Ours is what `cfs comply` computes of a room; theirs is rtrace with every hour's sky patches and
 the sun's disc, and rcontrib without reflections for the sun of each hour of the year.
@@ -44,7 +47,8 @@ TAU, SUBDIVISION = 0.88, 2
 GRID = SensorGrid(spacing=1.0, height=0.76, margin=0.0)
 NEED = Equinox(what="equinox", low=300, high=3000, clocks=(9, 15), at_least=0.55)
 ASE = SunlightExposure(what="ase", lux=1000, hours=250, at_most=0.1)
-POINT = "-ab 7 -ad 2048 -lr -12 -lw 1e-6 -as 0 -aa 0"
+DIVISIONS = 2048  # of rtrace's hemisphere; another number is another sample of paths
+POINT = "-ab 7 -lr -12 -lw 1e-6 -as 0 -aa 0"
 SUN_OMEGA = 2 * np.pi * (1 - np.cos(SUN_RADIUS))
 ROOMS = {
     "south-east": shoebox(4.0, 6.0, facing_deg=150),
@@ -78,6 +82,12 @@ class Sides:
         found = [need.value(Findings(self.calendar, light)) for light in lights]
         return 100 * (found[0] or 0.0), 100 * (found[1] or 0.0)
 
+    def clocks(self) -> FloatArray:
+        """Illuminance [2, C, S] [lx] at the clock hours of option 2, ours and theirs."""
+        lights = (self.ours.open, self.theirs.open)
+        hours = [self.calendar.clear_hours(clock) for clock in NEED.clocks]
+        return np.array([[light[h].mean(axis=0) for h in hours] for light in lights], dtype=float)
+
     def sunlit(self) -> tuple[FloatArray, FloatArray]:
         """Hours with 1000 lx of direct sun of each sensor [S], ours and theirs."""
         ours, theirs = (
@@ -92,12 +102,14 @@ def glass() -> FenestrationSystem:
     return FenestrationSystem("clear", klems, klems, source="made")
 
 
-def compared(building: Building, folder: Path, sensor_samples: int = 4096) -> Sides:
-    """A room in both programs."""
+def compared(
+    building: Building, folder: Path, sensor_samples: int = 4096, *, seed: int = 0
+) -> Sides:
+    """A room in both programs; each seed is another sample of paths in both."""
     weather, space = read_epw(WEATHER), building.spaces[0]
     options = RoomOptions.of(
         sky_subdivision=SUBDIVISION, sensor_samples=sensor_samples, patch_samples=1024,
-        sun_points=128,
+        sun_points=128, seed=seed,
     )  # fmt: skip
     skies = skies_for(weather, "five-phase", options.sampling)
     room = RoomSimulation(
@@ -108,7 +120,11 @@ def compared(building: Building, folder: Path, sensor_samples: int = 4096) -> Si
     scene = _scene(building, folder)
     up = np.tile([0.0, 0.0, 1.0], (len(room.scene.points), 1))
     sensors = radiance.sensors_text(room.scene.points, up)
-    clear = [_traced(scene, skies, int(h), sensors) for h in np.searchsorted(skies.lit, hours)]
+    options_of_point = f"{POINT} -ad {DIVISIONS + 7 * seed}"
+    clear = [
+        _traced(scene, skies, int(h), sensors, options_of_point)
+        for h in np.searchsorted(skies.lit, hours)
+    ]
     direct = _direct(scene, skies, sensors)
     (ours,) = lights_of(room, ())
     whole = skies.whole_year(direct.astype(np.float32).T).T
@@ -128,12 +144,14 @@ def _scene(building: Building, folder: Path) -> RenderedScene:
     return RenderedScene(folder, "room.rad glass.rad", "", POINT)
 
 
-def _traced(scene: RenderedScene, skies: AnnualSky, hour: int, sensors: bytes) -> FloatArray:
+def _traced(
+    scene: RenderedScene, skies: AnnualSky, hour: int, sensors: bytes, options: str
+) -> FloatArray:
     """Illuminance [S] [lx] of an hour by rtrace."""
     luminance = float(skies.illuminance[hour]) / SUN_OMEGA
     patches = skies.without_sun(slice(hour, hour + 1))[:, 0]
     scene.set_sky(patches, SUBDIVISION, skies.direction[hour], luminance)
-    command = f"rtrace -h -I+ -dc 1 -dt 0 -dj 0 -ds 0.1 -st 0 {POINT} scene.oct"
+    command = f"rtrace -h -I+ -dc 1 -dt 0 -dj 0 -ds 0.1 -st 0 {options} scene.oct"
     lines = radiance.run(command, scene.folder, sensors).decode().split()
     return np.array(lines, dtype=float).reshape(-1, 3)[:, 0] * EFFICACY
 
@@ -159,12 +177,42 @@ def _direct(scene: RenderedScene, skies: AnnualSky, sensors: bytes) -> FloatArra
     return found
 
 
+def near_limits(runs: FloatArray) -> list[str]:
+    """Sensors within 10 % of a limit: mean and deviation of both programs' runs [N, 2, C, S]."""
+    mean, off = runs.mean(axis=0), runs.std(axis=0, ddof=1)
+    found = []
+    for limit in (NEED.low, NEED.high):
+        for c, sensor in np.argwhere((np.abs(mean / limit - 1) < 0.1).any(axis=0)):
+            ours, theirs = (f"{mean[i, c, sensor]:.0f} ± {off[i, c, sensor]:.0f}" for i in (0, 1))
+            where = f"{NEED.clocks[c]} o'clock, sensor {sensor}"
+            found.append(f"  {where}: {ours} lx, Radiance {theirs} lx, limit {limit:g}")
+    return found
+
+
+def told_runs(name: str, count: int) -> None:
+    """Print a room's sensors near a limit over several runs."""
+    shares, clocks = [], []
+    for seed in range(count):
+        with tempfile.TemporaryDirectory() as place:
+            both = compared(ROOMS[name], Path(place), seed=seed)
+        shares.append("{:.1f} {:.1f}".format(*both.shares(NEED)))
+        clocks.append(both.clocks())
+    print(f"{name}: option 2 of each run, ours and Radiance's: {'; '.join(shares)}")
+    print("\n".join(near_limits(np.array(clocks))))
+
+
 def main() -> None:
     """Print both programs' figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=list(ROOMS))
+    parser.add_argument("--runs", type=int, default=1)
+    asked = parser.parse_args()
+    if asked.runs > 1:
+        for name in asked.rooms:
+            told_runs(name, asked.runs)
+        return
     print("room: ours/Radiance, half of the sensors within; option 2, ASE [%]; hours off")
-    for name in parser.parse_args().rooms:
+    for name in asked.rooms:
         with tempfile.TemporaryDirectory() as place:
             both = compared(ROOMS[name], Path(place))
         light, wanted = both.ours.open[both.hours], both.clear
