@@ -15,7 +15,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help demo test test-all lint format docs clean
 
 help:
-	@echo "make demo      run the whole job on the office that the repository ships"
+	@echo "make demo      compare the office that the repository ships, blind up, down and controlled"
 	@echo "make test      lint and the quick tests"
 	@echo "make test-all  lint, all tests, the slow ones too, with coverage, and the documentation"
 	@echo "make lint      check style and types; make format repairs what it can"

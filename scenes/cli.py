@@ -18,7 +18,7 @@ from scenes.streams import open_streams
 COMMANDS = {
     "run": "IFC, weather and fenestration to daylight, glare, heat and comfort.",
     "comply": "Rooms against EN 17037, LM-83, LEED, BREEAM: a dossier that prints.",
-    "demo": "The whole job on the office that comes with the program.",
+    "demo": "An office with its blind up, down and controlled, compared.",
     "explore": "Any hour of a run's results in a browser: pictures, plans, temperatures.",
     "doctor": "Versions, the variant that traces the rays, and a self-test.",
     "ifc": "What an IFC file holds, and what is wrong with it.",

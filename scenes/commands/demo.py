@@ -1,4 +1,4 @@
-"""`cfs demo`: the main job on the office, weather and blind that come with the program."""
+"""`cfs demo`: a study of the office, weather and blind that come with the program."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from scenes.commands.run import run_to_folder
-from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.run.options import JobOptions
+from scenes.commands.study import study_to_folder
+from scenes.demo import STUDY
 
 
 @click.command()
@@ -17,5 +16,7 @@ from scenes.run.options import JobOptions
     help="Folder of results.",
 )  # fmt: skip
 def command(out: Path) -> None:
-    """Run the main job on a two-room office with exterior venetian blinds in Chicago."""
-    run_to_folder(JobOptions(OFFICE, WEATHER, VENETIAN_BLIND), out, "demo")
+    """Compare an office in Chicago with its blind up, down and controlled."""
+    from scenes.study.study_file import read_study
+
+    study_to_folder(STUDY, read_study(STUDY), out)

@@ -14,7 +14,9 @@ from scenes.commands.room_options import method_option, out_folder_option, write
 
 if TYPE_CHECKING:
     from scenes.study.plan import StudyPlan
+    from scenes.study.store import Store
     from scenes.study.study import StudyResult
+    from scenes.study.study_file import Study
 
 
 @click.command()
@@ -48,24 +50,25 @@ def command(
     results: the same command goes on after an interruption, and a longer grid computes only what
     is new.
     """
-    from mitsuba_cfs.files import check_file
-    from mitsuba_cfs.matrices.cache import default_folder
-    from scenes.study.files import check_files, one_building
-    from scenes.study.schedule import check_dask
-    from scenes.study.store import Store
     from scenes.study.study_file import read_study
 
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
-    store = Store(out, inputs=(study, *parsed.files))
-    default_folder()  # of the cache, or one line that it cannot be one
-    if write_ifc is not None:
-        check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
-        one_building(room.building for room in parsed.room)
-    if scheduler is not None:
-        check_dask()
-    check_files(parsed)  # before anything heavy is loaded
+    study_to_folder(study, parsed, out, processes, scheduler, write_ifc)
+
+
+def study_to_folder(
+    file: Path,
+    parsed: Study,
+    out: Path,
+    processes: int = 1,
+    scheduler: str | None = None,
+    write_ifc: Path | None = None,
+) -> None:
+    """Compute a study with a progress bar, say what comes out case by case, write its files."""
+    store = _checked(file, parsed, out, scheduler, write_ifc)
+    from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
@@ -77,7 +80,7 @@ def command(
         click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
     _print_plan(plan)
-    with ProgressBar() as progress:
+    with ProgressBar() as progress, compiled_beside():
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
             progress=progress, on_case=_print_case,
@@ -99,6 +102,27 @@ def command(
             f"{failed} of {total} cases failed, the first: {result.first_error}; "
             f"the others are kept, and the same command tries these again"
         )
+
+
+def _checked(
+    file: Path, parsed: Study, out: Path, scheduler: str | None, write_ifc: Path | None
+) -> Store:
+    """The folder of results; `DataError` for what cannot be, before anything heavy is loaded."""
+    from mitsuba_cfs.files import check_file
+    from mitsuba_cfs.matrices.cache import default_folder
+    from scenes.study.files import check_files, one_building
+    from scenes.study.schedule import check_dask
+    from scenes.study.store import Store
+
+    store = Store(out, inputs=(file, *parsed.files))
+    default_folder()  # of the cache, or one line that it cannot be one
+    if write_ifc is not None:
+        check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
+        one_building(room.building for room in parsed.room)
+    if scheduler is not None:
+        check_dask()
+    check_files(parsed)
+    return store
 
 
 def _print_plan(plan: StudyPlan) -> None:

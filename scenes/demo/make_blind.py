@@ -1,4 +1,6 @@
-"""Makes `venetian_blind.xml` and `.toml`: an exterior blind before a double low-e glazing.
+"""Makes the demo's systems: a double low-e glazing, and an exterior blind before it.
+
+Each is an XML file with a `.toml` beside it: `glazing`, `venetian_blind`.
 
     python -m scenes.demo.make_blind
 
@@ -31,53 +33,78 @@ PANES = {  # outer, inner: normal transmittance, front and back reflectance
 }
 GLAZING_U = 1.1  # [W/(m2 K)] EN 673, 16 mm argon, emissivity 0.03
 OUTER_FILM, INNER_FILM = 0.04, 0.13  # [m2 K/W] that are part of 1 / U
+GAP = 1 / GLAZING_U - OUTER_FILM - INNER_FILM
+PANES_THICKNESS = 0.024  # [m]
 BLIND_TO_GLASS, BLIND_TO_AIR = 6.0, 18.0  # [W/(m2 K)] EN 13363-1, external blind
 PATHS = 262_144  # for each incident patch and side
 
 
 def main() -> None:
-    """Trace the blind, put it before the glazing, write the files."""
+    """Trace the blind, put it before the glazing, write both."""
     layer = venetian_blind(
         BLIND, depth=0.080, radius=0.104, spacing=0.072, tilt=np.radians(TILT_DEG)
     )
     blind = generate_klems(layer, samples=PATHS, seed=1).bsdf[0]
-    systems = {
-        band: combine_layers([blind, *(specular_klems(pane, KLEMS_FULL) for pane in panes)])
-        for band, panes in PANES.items()
+    panes = {
+        band: [specular_klems(pane, KLEMS_FULL) for pane in pair] for band, pair in PANES.items()
     }
+    blinds = {band: combine_layers([blind, *pair]) for band, pair in panes.items()}
+    name = f"Exterior venetian blind at {TILT_DEG:.0f} degrees, double low-e glazing"
+    before = (1 / BLIND_TO_AIR, 1 / BLIND_TO_GLASS)
+    text = thermal_values(blinds["Solar"], (*before, GAP), 1 / GLAZING_U + sum(before))
+    _write("venetian_blind", blinds, name, layer.thickness + PANES_THICKNESS, 0.9, text)
+    glazings = {band: combine_layers(pair) for band, pair in panes.items()}
+    text = thermal_values(glazings["Solar"], (OUTER_FILM, GAP), 1 / GLAZING_U)
+    _write("glazing", glazings, "Double low-e glazing", PANES_THICKNESS, 0.84, text)
+
+
+def _write(
+    stem: str,
+    systems: dict[str, LayeredSystem],
+    name: str,
+    thickness: float,
+    emissivity: float,
+    thermal: str,
+) -> None:
+    """Write a system's XML file, and the `.toml` beside it."""
     file = BsdfFile(
         {band: system.bsdf for band, system in systems.items()},
-        name=f"Exterior venetian blind at {TILT_DEG:.0f} degrees, double low-e glazing",
+        name=name,
         manufacturer="mitsuba-cfs",
-        thickness=layer.thickness + 0.024,
-        emissivity_front=0.9,
+        thickness=thickness,
+        emissivity_front=emissivity,
         emissivity_back=0.84,
     )
-    write_bsdf_xml(file, FOLDER / "venetian_blind.xml", digits=5)
-    (FOLDER / "venetian_blind.toml").write_text(thermal_values(systems["Solar"]), encoding="utf-8")
+    write_bsdf_xml(file, FOLDER / f"{stem}.xml", digits=5)
+    (FOLDER / f"{stem}.toml").write_text(thermal, encoding="utf-8")
 
 
-def thermal_values(system: LayeredSystem) -> str:
+def thermal_values(system: LayeredSystem, resistances: tuple[float, ...], total: float) -> str:
     """U, g and the absorptances as TOML; the inward shares are those of EN 13363-1.
 
     Each layer's heat is divided by the resistances on its two sides.
+
+    Args:
+        resistances: on the way in to each layer, from the one before or outdoors [m2 K/W].
+        total: 1 / U [m2 K/W].
     """
-    outside = np.array([1 / BLIND_TO_AIR, 1 / BLIND_TO_AIR + 1 / BLIND_TO_GLASS, 0.0])
-    outside[2] = outside[1] + (1 / GLAZING_U - OUTER_FILM - INNER_FILM)
-    total = 1 / GLAZING_U + 1 / BLIND_TO_AIR + 1 / BLIND_TO_GLASS
-    inward = outside / total
+    inward = np.cumsum(resistances) / total
     tau = system.bsdf.direct_hemispherical(system.bsdf.transmission_front)
     g = tau + inward @ system.absorptance_front
     u_value = 1 / total
+    names = ("blind", "outer pane", "inner pane")[-len(resistances) :]
     lines = [
         "# written by scenes/demo/make_blind.py",
-        f"u_value = {u_value:.3f}  # [W/(m2 K)] with the blind's air layer, EN 13363-1",
+        f"u_value = {u_value:.3f}  # [W/(m2 K)]"
+        + (" with the blind's air layer, EN 13363-1" if "blind" in names else ""),
         f"g_value = {g[0]:.4f}  # at normal incidence (Klems patch 0)",
-        f"inward_fractions = {_numbers(inward)}  # of the heat in blind, outer and inner pane",
+        f"inward_fractions = {_numbers(inward)}  # of the heat in "
+        + ("blind, outer and inner pane" if "blind" in names else "outer and inner pane"),
         f"g_value_by_patch = {_numbers(g)}",
-        f"absorptance_blind = {_numbers(system.absorptance_front[0])}",
-        f"absorptance_outer_pane = {_numbers(system.absorptance_front[1])}",
-        f"absorptance_inner_pane = {_numbers(system.absorptance_front[2])}",
+        *(
+            f"absorptance_{name.replace(' ', '_')} = {_numbers(values)}"
+            for name, values in zip(names, system.absorptance_front, strict=True)
+        ),
     ]
     return "\n".join(lines) + "\n"
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.figures.carpet import carpet
 from scenes.figures.chart import Chart
@@ -16,8 +19,11 @@ from scenes.results import RoomYear, RunResult
 DARK_LX = 1.0  # less than this is night, left empty
 
 
-def plans(room: RoomYear) -> tuple[FloorPlan, ...]:
-    """Plans of daylight autonomy, useful illuminance, daylight factor, direct sun and the mean."""
+def plans(room: RoomYear, beside: Sequence[RoomYear] = ()) -> tuple[FloorPlan, ...]:
+    """Plans of daylight autonomy, useful illuminance, daylight factor, direct sun and the mean.
+
+    Args: beside: rooms, or cases of this one, whose values the scales reach to as well.
+    """
     daylight, view = room.daylight, room.glare.view
     eye = (np.asarray(view.position), np.asarray(view.direction)) if room.glare.pictures else None
     frame = plan_frame(room.space, daylight.points, eye)
@@ -32,22 +38,30 @@ def plans(room: RoomYear) -> tuple[FloorPlan, ...]:
             )
     if column := sensor_column(room, "daylight_factor", "df"):
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
-        scale = _from_zero(values, "Daylight factor", "%")
+        scale = _from_zero(_of_all(column, room, beside), "Daylight factor", "%")
         digits = 1 if scale.high > 1 else 2
         text = _mean(values, "%", quantity("daylight_factor").meaning)
         pictures.append(
             plan(frame, values, scale, title="Daylight factor", explanation=text, digits=digits)
         )
-    if (column := sensor_column(room, "sunlit_hours")) and daylight.sensor_metrics[column].any():
+    column = sensor_column(room, "sunlit_hours")
+    if column and (every := _of_all(column, room, beside)).any():
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
-        scale = _from_zero(values, "Sunlit hours", "h")
+        scale = _from_zero(every, "Sunlit hours", "h")
         text = quantity("sunlit_hours").meaning
         pictures.append(plan(frame, values, scale, title="Sunlit hours", explanation=text))
     values = daylight.illuminance.mean(axis=0)
-    scale = _from_zero(values, "Annual mean illuminance", "lx")
+    every = np.concatenate([one.daylight.illuminance.mean(axis=0) for one in (room, *beside)])
+    scale = _from_zero(every, "Annual mean illuminance", "lx")
     text = _mean(values, "lx", quantity("annual_mean").meaning)
     pictures.append(plan(frame, values, scale, title="Annual mean illuminance", explanation=text))
     return tuple(pictures)
+
+
+def _of_all(column: str, room: RoomYear, beside: Sequence[RoomYear]) -> NDArray[np.float64]:
+    """A metric of the sensors of a room and those beside it."""
+    found = [one.daylight.sensor_metrics for one in (room, *beside)]
+    return np.concatenate([one[column].to_numpy(dtype=float) for one in found if column in one])
 
 
 def useful_column(room: RoomYear, names: tuple[str, ...]) -> str | None:

@@ -66,12 +66,18 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     )  # fmt: skip
 
 
-def duration_curve(room: RoomYear) -> Chart:
-    """Hours of the year above each temperature."""
+def duration_curve(room: RoomYear, beside: Sequence[RoomYear] = ()) -> Chart:
+    """Hours of the year above each temperature.
+
+    Args: beside: rooms, or cases of this one, whose temperatures the axis reaches to as well.
+    """
     temperatures = room.heat.temperatures
     hours = len(temperatures) * step_hours(temperatures.index)
     curves = {name: temperatures[name].to_numpy() for name in CURVES if name in temperatures}
-    y_range = round_limits(np.concatenate([*curves.values(), [WARM_C]]))
+    others = [
+        one.heat.temperatures[n] for one in beside for n in curves if n in one.heat.temperatures
+    ]
+    y_range = round_limits(np.concatenate([*curves.values(), *others, [WARM_C]]))
     share = np.linspace(0, 1, 241)
     sorted_curves = {name: np.quantile(v, 1 - share) for name, v in curves.items()}
     x_range = (0.0, hours)

@@ -155,18 +155,27 @@ def _autonomies(room: RoomYear, explored: ExploredRoom) -> tuple[float, float]:
 
 
 def _limits(result: RunResult, cards: Sequence[Sequence[Card]]) -> Table:
-    """The figures that a rule limits, with the error of each where it is known."""
+    return limits_table(
+        [(r.space.label, r, own) for r, own in zip(result.spaces, cards, strict=True)]
+    )
+
+
+def limits_table(rooms: Sequence[tuple[str, RoomYear, Sequence[Card]]], of: str = "Room") -> Table:
+    """The figures that a rule limits, with the error of each where it is known.
+
+    Args: rooms: name, results and headline figures; of: what the names are of.
+    """
     columns = (
-        Column("Room", numeric=False), Column("Figure", numeric=False),
+        Column(of, numeric=False), Column("Figure", numeric=False),
         Column("Value", numeric=False, short=True), Column("Against the limit", numeric=False),
         Column("Standard error", numeric=False),
     )  # fmt: skip
     rows = []
-    for room, own in zip(result.spaces, cards, strict=True):
+    for name, room, own in rooms:
         for card in own:
             if card.verdict:
                 value = f"{card.value} {card.unit}".strip()
-                line = (room.space.label, card.label, value, card.verdict, _error(room, card))
+                line = (name, card.label, value, card.verdict, _error(room, card))
                 rows.append(line)
     return Table("Figures against the limits of the standards", columns, tuple(rows))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -91,11 +90,11 @@ def work_of(cases: list[Case]) -> Workload:
 def case_traits(cases: list[Case], plan: StudyPlan) -> list[Traits]:
     """What a method's error goes by, of each system in each room under each climate."""
     rooms: dict[tuple, tuple[float, float]] = {}
-    systems: dict[str | Path, list[tuple[float, float, float, float]]] = {}
+    systems: dict[tuple, list[tuple[float, float, float, float]]] = {}
     found: dict[Traits, None] = {}
     for case in cases:
         building, space = plan.rooms[case.scene]
-        filled = case.scene if case.bsdf is None else case.bsdf.path
+        filled = (case.scene, case.bsdf, case.operation)
         if filled not in systems:
             systems[filled] = filled_traits(case, space)
         seen = (case.scene, case.weather, case.orientation_deg)

@@ -10,11 +10,11 @@ from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.box import box_building
-from scenes.room.operation import check_states, read_operation
+from scenes.room.operation import Operation, check_states, read_operation
 from scenes.room.operation_hours import check_schedules
 from scenes.run.files import check_names
 from scenes.run.inputs import read_weather
-from scenes.study.study_file import Study
+from scenes.study.study_file import Study, SystemTable
 
 
 def check_files(study: Study) -> None:
@@ -28,17 +28,29 @@ def check_files(study: Study) -> None:
             check_building_file(room.building)
         else:
             box_building(room.box)
-    operation = None if study.operation is None else read_operation(study.operation)
-    if operation is not None:
-        if study.system:
-            check_states(operation, 1)
+    operations = [_checked_operation(study, system) for system in study.system or (None,)]
     for climate in study.climate:
         weather = read_weather(climate.weather)
-        if operation is not None:
-            check_schedules(operation.tables, weather, operation.file)
+        for operation in operations:
+            if operation is not None:
+                check_schedules(operation.tables, weather, operation.file)
     for system in study.system:
-        read = read_system(system.bsdf, u_value=system.u_value, g_value=system.g_value)
-        checked_system(read, system.bsdf)
+        if system.bsdf is not None:
+            read = read_system(system.bsdf, u_value=system.u_value, g_value=system.g_value)
+            checked_system(read, system.bsdf)
+
+
+def _checked_operation(study: Study, system: SystemTable | None) -> Operation | None:
+    """The operation of a system, its states checked; None as for a study that names no system."""
+    path = system.operation or study.operation if system is not None else study.operation
+    if path is None:
+        return None
+    operation = read_operation(path)
+    for one, file in zip(operation.systems, operation.files, strict=False):
+        checked_system(one, file)
+    if system is not None:
+        check_states(operation, len(operation.systems) or 1)
+    return operation
 
 
 def one_building(buildings: Iterable[Path | None]) -> Path:

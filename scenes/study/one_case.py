@@ -28,7 +28,7 @@ from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
 from scenes.results import RoomYear
 from scenes.room.drawn_shades import traced_building
-from scenes.room.operation import check_states, read_operation
+from scenes.room.operation import Operation, check_states, read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room import skies_for
 from scenes.room.room_year import compute_room
@@ -60,7 +60,8 @@ def _computed(case: Case) -> CaseResult:
             raise DataError("is not the file that it was when the study began", file=source.path)
     variants.activate()
     building, space = _room(case)
-    systems = case_systems(case, space)
+    operation = None if case.operation is None else read_operation(case.operation.path)
+    systems = case_systems(case, space, operation)
     building = traced_building(building, systems)
     weather = _weather(case.weather, case.orientation_deg)
     chosen = case.options
@@ -68,7 +69,6 @@ def _computed(case: Case) -> CaseResult:
         case.weather, case.orientation_deg, chosen.method, chosen.sampling, *chosen.sky.items()
     )
     cache = MatrixCache.of_user()
-    operation = None if case.operation is None else read_operation(case.operation.path)
     if operation is not None:
         check_states(operation, max(map(len, systems.values())))
     hours = _rated_hours(weather, case.options)
@@ -123,9 +123,14 @@ def _skies(
     return skies_for(_weather(source, angle), method, sampling, **dict(sky))
 
 
-def case_systems(case: Case, space: Space) -> dict[str, States]:
-    """The systems by state of each window of a case's room, by its GUID."""
-    states: States = ()
+def case_systems(case: Case, space: Space, operation: Operation | None = None) -> dict[str, States]:
+    """The systems by state of each window of a case's room, by its GUID.
+
+    Args: operation: of the case; read now without.
+    """
+    if operation is None and case.operation is not None:
+        operation = read_operation(case.operation.path)
+    states: States = () if operation is None else operation.systems
     if case.bsdf is not None:
         given = {"u_value": case.u_value, "g_value": case.g_value}
         states = (read_system(case.bsdf.path, **given),)

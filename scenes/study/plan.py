@@ -13,10 +13,9 @@ from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
 from scenes.run.inputs import chosen_spaces
 from scenes.study.case import AUTO, Case, InputFile, program_version
-from scenes.study.study_file import RoomTable, Study
+from scenes.study.study_file import RoomTable, Study, SystemTable
 
 AS_HELD = "as in the building's file"  # the system of a study that names none
-NOTHING_GIVEN = {"u_value": None, "g_value": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,32 +32,15 @@ def plan_of(study: Study) -> StudyPlan:
 
     Raises: `DataError` for a file that cannot be read or has no such room.
     """
-    systems = []
-    for system in study.system:
-        beside = system.bsdf.with_suffix(".toml")
-        systems.append(
-            {
-                "system": system.name,
-                "bsdf": InputFile.of(system.bsdf),
-                "thermal": InputFile.of(beside) if beside.is_file() else None,
-                "u_value": system.u_value,
-                "g_value": system.g_value,
-            }
-        )
-    systems = systems or [{"system": AS_HELD, "bsdf": None, "thermal": None} | NOTHING_GIVEN]
+    held = SystemTable.model_construct(name=AS_HELD)
+    systems = [_of_system(study, system) for system in study.system or (held,)]
     climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
-    operation = None if study.operation is None else InputFile.of(study.operation)
-    operated = () if study.operation is None else read_operation(study.operation).files
-    named = tuple(
-        InputFile.of(file) for system in study.system for file in files_beside(system.bsdf)[1:]
-    )
     found: list[Case] = []
     rooms = {}
     for room in study.room:
         building, spaces = rooms_of(room)
         source = room.box if room.box is not None else InputFile.of(room.building)
-        referenced = named if study.system else _referenced(building)
-        referenced += tuple(map(InputFile.of, operated))
+        held_files = () if study.system else _referenced(building)
         for space in spaces:
             about = {
                 "room": room.name,
@@ -66,13 +48,30 @@ def plan_of(study: Study) -> StudyPlan:
                 "space_name": room.name if room.box else space.label,
                 "building": source,
                 "specular": room.specular,
-                "operation": operation,
-                "referenced": referenced,
             }
-            of_space = list(_of_space(study, about, systems, climates))
+            mine = [one | {"referenced": (*held_files, *one["referenced"])} for one in systems]
+            of_space = list(_of_space(study, about, mine, climates))
             rooms[of_space[0].scene] = building, space
             found += of_space
     return StudyPlan(tuple(found), rooms)
+
+
+def _of_system(study: Study, system: SystemTable) -> dict:
+    """What a case is told of its system, and of the operation with it."""
+    beside = None if system.bsdf is None else system.bsdf.with_suffix(".toml")
+    operation = system.operation or study.operation
+    referenced = () if system.bsdf is None else files_beside(system.bsdf)[1:]
+    if operation is not None:
+        referenced += read_operation(operation).files
+    return {
+        "system": system.name,
+        "bsdf": None if system.bsdf is None else InputFile.of(system.bsdf),
+        "thermal": InputFile.of(beside) if beside is not None and beside.is_file() else None,
+        "u_value": system.u_value,
+        "g_value": system.g_value,
+        "operation": None if operation is None else InputFile.of(operation),
+        "referenced": tuple(map(InputFile.of, referenced)),
+    }
 
 
 def _of_space(

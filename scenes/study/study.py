@@ -18,7 +18,7 @@ from scenes.report.glare_figures import compass
 from scenes.study.automatic import settled
 from scenes.study.case import Case
 from scenes.study.one_case import compute_case
-from scenes.study.plan import StudyPlan, plan_of
+from scenes.study.plan import AS_HELD, StudyPlan, plan_of
 from scenes.study.schedule import Compute, computed
 from scenes.study.store import CaseResult, Store
 from scenes.study.study_file import Study
@@ -159,9 +159,8 @@ def described(case: Case, space: Space) -> dict:
 
 def source_of(case: Case) -> str:
     """Where a case's systems come from, in words."""
-    return (
-        "held by the building's file" if case.bsdf is None else f"[[system]] {case.bsdf.path.name}"
-    )
+    file = case.bsdf or (case.operation if case.system != AS_HELD else None)
+    return "held by the building's file" if file is None else f"[[system]] {file.path.name}"
 
 
 def facing(space: Space, orientation_deg: float) -> str:

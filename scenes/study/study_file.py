@@ -52,12 +52,24 @@ class RoomTable(_Table):
 
 
 class SystemTable(_Table):
-    """A fenestration system: its BSDF file, and U and g where that has none beside it."""
+    """A fenestration system: its BSDF file, and U and g where that has none beside it.
+
+    An operation file of its own goes before the study's; with `[[system]]` tables it is the states.
+    """
 
     name: str = ""
-    bsdf: Path
+    bsdf: Path | None = None
+    operation: Path | None = None
     u_value: Annotated[float, Field(ge=0.1, le=7)] | None = None  # [W/(m2 K)]
     g_value: Annotated[float, Field(ge=0, le=1)] | None = None
+
+    @model_validator(mode="after")
+    def _of_a_file(self) -> SystemTable:
+        if self.bsdf is None and self.operation is None:
+            raise ValueError("give `bsdf`, or `operation` with [[system]] tables in it")
+        if self.bsdf is None and not (self.u_value is None and self.g_value is None):
+            raise ValueError("`u_value` and `g_value` belong to a `bsdf`")
+        return self
 
 
 class ClimateTable(_Table):
@@ -125,6 +137,7 @@ class Study(_Table):
     def files(self) -> tuple[Path, ...]:
         """Every file that the study names."""
         named = [room.building for room in self.room] + [system.bsdf for system in self.system]
+        named += [system.operation for system in self.system]
         named += [climate.weather for climate in self.climate] + [self.operation]
         return tuple(path for path in named if path is not None)
 
@@ -171,7 +184,7 @@ def _name_entries(table: dict) -> None:
         entries = table.get(key)
         for number, entry in enumerate(entries if isinstance(entries, list) else [], 1):
             if isinstance(entry, dict) and "name" not in entry:
-                source = entry.get(file)
+                source = entry.get(file, entry.get("operation"))
                 named = Path(source).stem if isinstance(source, str) else f"{key} {number}"
                 entry["name"] = named
 
@@ -179,7 +192,9 @@ def _name_entries(table: dict) -> None:
 def _with_places(study: Study, path: Path) -> Study:
     """The study with absolute paths of files that are there."""
 
-    def there(name: Path, key: str) -> Path:
+    def there(name: Path | None, key: str) -> Path | None:
+        if name is None:
+            return None
         place = (path.parent / name).absolute()
         if not place.is_file():
             raise DataError(f"no such file: {name}", file=path, field=key)
@@ -189,13 +204,22 @@ def _with_places(study: Study, path: Path) -> Study:
     for key, file in (("room", "building"), ("system", "bsdf"), ("climate", "weather")):
         entries = []
         for number, entry in enumerate(getattr(study, key)):
-            name = getattr(entry, file)
-            update = {} if name is None else {file: there(name, f"{key}.{number}.{file}")}
+            named = [name for name in (file, "operation") if name in type(entry).model_fields]
+            update = {n: there(getattr(entry, n), f"{key}.{number}.{n}") for n in named}
             entries.append(entry.model_copy(update=update))
         found[key] = tuple(entries)
-    if study.operation is not None:
-        found["operation"] = there(study.operation, "operation")
-        if read_operation(found["operation"]).systems:
-            message = "the systems of a study are its own: leave [[system]] out"
-            raise DataError(message, file=found["operation"], field="system")
+    found["operation"] = there(study.operation, "operation")
+    _check_systems(found["operation"], states=False)
+    for system in found["system"]:
+        _check_systems(system.operation, states=system.bsdf is None)
     return study.model_copy(update=found)
+
+
+def _check_systems(operation: Path | None, *, states: bool) -> None:
+    """Raise `DataError` for an operation file that lacks the states wanted of it, or has others."""
+    if operation is None or bool(read_operation(operation).systems) == states:
+        return
+    message = "the systems of a study are its own: leave [[system]] out"
+    if states:
+        message = "is missing: a system of a study without `bsdf` has its states in its operation"
+    raise DataError(message, file=operation, field="system")

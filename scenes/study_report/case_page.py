@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,10 +47,18 @@ class CasePage:
         return f"case-{self.number}"
 
 
-def case_page(study: StudyResult, number: int, case: Case, result: CaseResult) -> CasePage:
-    """Figures and tables of a case that has a result."""
+def case_page(
+    study: StudyResult, number: int, room: RoomYear, beside: Sequence[RoomYear] = ()
+) -> CasePage:
+    """Figures and tables of a case.
+
+    Args:
+        number: from 1, in the table's order.
+        room: its results, of `room_of`.
+        beside: those of all cases, which share its scales.
+    """
+    case, result = study.plan.cases[number - 1], study.results[number - 1]
     building, _ = study.plan.rooms[case.scene]
-    room = room_of(study, case, result)
     times = room.heat.temperatures.index
     run = RunResult(building, times, np.empty((0, 3)), (room,), (), {})
     median = result.arrays["median_illuminance"][:, None]
@@ -59,12 +68,12 @@ def case_page(study: StudyResult, number: int, case: Case, result: CaseResult) -
         case_label(study, case),
         method_words(case),
         case.chosen,
-        daylight_figures.plans(room),
+        daylight_figures.plans(room, beside),
         error_words(room),
         daylight_figures.illuminance_carpet(run, by_hour),
         glare_map(times, case, result) if "dgp" in result.arrays else None,
         thermal_figures.comfort_carpet(run, room),
-        thermal_figures.duration_curve(room),
+        thermal_figures.duration_curve(room, beside),
         figures_table(result),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mitsuba_cfs.glare.classes import CLASSES
@@ -19,7 +20,7 @@ SHAPES = ("round", "square", "diamond", "ring")
 COLUMNS = (
     "sda300_50", "ase1000_250", "da300", "udi_300_3000", "daylight_factor", "dgp_max",
     "glare_perceptible_h", "glare_disturbing_h", "glare_intolerable_h", "glare_protection",
-    "comfortable_80_h", "warm_h", "operative_max_c", "heating_kwh", "cooling_kwh",
+    "comfortable_80_h", "warm_h", "operative_max_c", "heating_kwh", "cooling_kwh", "lighting_kwh",
     "illuminance_error_mean", "seconds",
 )  # fmt: skip
 
@@ -48,6 +49,7 @@ class Scatter:
     y_ticks: tuple[Tick, ...]
     dots: tuple[Dot, ...]
     systems: tuple[tuple[str, str, str], ...]  # colour, shape, name
+    front: tuple[tuple[float, float], ...]  # [%] of the axes: what no other case beats in both
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,14 +95,27 @@ def scatter(study: StudyResult) -> Scatter:
     return Scatter(
         "Daylight against glare" if rated else "Daylight against warmth",
         "Each case is a mark in the colour of its system; further right is more daylight, further "
-        "down less " + ("glare" if rated else "heat") + ". A click shows the case.",
+        "down less "
+        + ("glare" if rated else "heat")
+        + ". No case beats those on the line in both. "
+        "A click shows a case.",
         "Daylight autonomy: mean over the work plane of the occupied hours above 300 lx [%]",
         "Occupied hours with DGP above 0.40 [%]" if rated else "Occupied hours above 26 °C [%]",
         axis_ticks(x0, x1),
         axis_ticks(y0, y1),
         dots,
         tuple((*looks[name], name) for name in names),
+        pareto_front([(dot.x, dot.y) for dot in dots]),
     )
+
+
+def pareto_front(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Those of the points (x, y) that no other is right of and below, from right to left."""
+    front: list[tuple[float, float]] = []
+    for x, y in sorted(set(points), key=lambda one: (-one[0], one[1])):
+        if not front or y < front[-1][1]:
+            front.append((x, y))
+    return tuple(front)
 
 
 def bars(study: StudyResult) -> tuple[Bar, ...]:

@@ -15,7 +15,7 @@ from scenes.report.names import glossary
 from scenes.report.numbers import rounded, share
 from scenes.report.page_files import page_files
 from scenes.study.study import StudyResult
-from scenes.study_report.case_page import case_page
+from scenes.study_report.case_page import case_page, room_of
 from scenes.study_report.comparison import (
     bars,
     clock_table,
@@ -25,8 +25,10 @@ from scenes.study_report.comparison import (
     scatter,
 )
 from scenes.study_report.model import study_model
+from scenes.study_report.verdict import counted, study_verdict
 
 FILES = page_files("scenes.study_report")
+MOST_BESIDE = 3  # cases that are shown at a time
 MOST_CASES = 60  # that have a section of their own: some 200 kB each
 
 
@@ -40,7 +42,9 @@ def study_report_html(study: StudyResult) -> str:
     done = finished(study)
     if not done:
         raise ValueError("a report needs at least one case with a result")
-    pages = tuple(case_page(study, number, case, r) for number, case, r in done[:MOST_CASES])
+    rooms = {number: room_of(study, case, r) for number, case, r in done[:MOST_CASES]}
+    every = tuple(rooms.values())
+    pages = tuple(case_page(study, number, room, every) for number, room in rooms.items())
     errors = [r.figures["illuminance_error_mean"] for _, _, r in done]
     worst = max(r.figures["illuminance_error_max"] for _, _, r in done)
     styles = (run_page.FILES["style.css"], FILES["study.css"])
@@ -49,6 +53,9 @@ def study_report_html(study: StudyResult) -> str:
         study=study,
         title=study.title or "Study of fenestration systems",
         facts=facts(study),
+        verdict=study_verdict(study),
+        beside=len(done) if len(done) <= MOST_BESIDE else 1,
+        most_beside=min(len(pages), MOST_BESIDE),
         scatter=scatter(study),
         bars=bars(study),
         table=comparison_table(study),
@@ -86,8 +93,12 @@ def facts(study: StudyResult) -> tuple[tuple[str, str], ...]:
         ("Climates", named(c.climate for c in cases)),
         ("Turned by", named(f"{c.orientation_deg:g}°" for c in cases)),
         ("Methods", named(c.options.method for c in cases)),
-        ("Computed in", f"{rounded(study.seconds, 0)} s, {study.reused} cases from before"),
+        ("Computed in", f"{rounded(study.seconds, 0)} s" + _reused(study)),
     )
+
+
+def _reused(study: StudyResult) -> str:
+    return f", {counted(study.reused, 'case')} from before" if study.reused else ""
 
 
 def problems_table(study: StudyResult) -> tables.Table:

@@ -11,12 +11,16 @@ import pandas as pd
 import pytest
 
 from bim.model import Problem
+from scenes.report.daylight_figures import plans
+from scenes.report.numbers import percent
 from scenes.study.case import Case, InputFile
 from scenes.study.one_case import glare_figures, room_figures
 from scenes.study.plan import StudyPlan
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
+from scenes.study_report.comparison import finished, glare_share, pareto_front
 from scenes.study_report.page import study_report_html
+from scenes.study_report.verdict import counted, study_verdict
 from tests.report.browser import chromium, inspect
 from tests.report.synthetic import run_result
 
@@ -30,6 +34,14 @@ USE = """
     report.shown.push(shown());
     click("case-next");
     report.shown.push(shown());
+    const beside = document.querySelector("select.beside");
+    beside.value = "1";
+    beside.dispatchEvent(new Event("change"));
+    report.shown.push(shown());
+    const tops = [...document.querySelectorAll("section.case:not([hidden])")].map((s) => box(s));
+    report.sideways = tops[0].right <= tops[1].left;
+    click("case-back");
+    click("case-next");
     report.pressed = [...document.querySelectorAll("button.dot[aria-pressed='true']")]
       .map((d) => d.dataset.case);
     const pictures = [await later(() => {})];
@@ -125,6 +137,48 @@ def test_problems_of_the_building_are_those_of_its_file():
     assert len(found.problems) == len({(p.where, p.what) for p in found.problems})
 
 
+def test_few_cases_stand_side_by_side_at_once():
+    assert 'class="beside" data-first="2"' in study_report_html(study(systems=1, failed=False))
+    assert 'class="beside" data-first=""' in study_report_html(study())
+
+
+def test_cases_share_their_scales():
+    """A room with ten times the light of its twin: both plans reach to the brighter one's light."""
+    dim = run_result(picture_size=48, pictures=1).spaces[0]
+    light = dim.daylight
+    metrics = light.sensor_metrics.assign(daylight_factor=10 * light.sensor_metrics.daylight_factor)
+    light = replace(light, illuminance=10 * light.illuminance, sensor_metrics=metrics)
+    bright = replace(dim, daylight=light)
+    alone, shared, other = plans(dim), plans(dim, (dim, bright)), plans(bright, (dim, bright))
+    for title in ("Daylight factor", "Annual mean illuminance"):
+        first, second, third = (
+            next(p.scale.high for p in some if p.title == title) for some in (alone, shared, other)
+        )
+        assert first < second == third, title
+
+
+def test_the_front_is_what_no_other_case_beats():
+    points = [tuple(p) for p in np.random.default_rng(3).integers(0, 12, (40, 2)).astype(float)]
+
+    def beaten(p):
+        return any(q[0] >= p[0] and q[1] <= p[1] and q != p for q in points)
+
+    assert set(pareto_front(points)) == {p for p in points if not beaten(p)}
+
+
+def test_the_verdict_names_best_and_worst():
+    found = study()
+    said = dict(study_verdict(found).sentences)
+    glare = {c.system: glare_share(r) for _, c, r in finished(found)}
+    assert max(glare.values()) > min(glare.values())
+    worst = max(glare, key=lambda name: glare[name])
+    assert f"{worst} has a DGP above 0.40 in {percent(glare[worst])} %" in said["Glare"]
+    assert "system <0> has 300 lx of daylight in 70 %" in said["Daylight"]
+    assert "system <1> in 61 %" in said["Daylight"]
+    assert "without heating and cooling" in said["Heat and energy"].lower()
+    assert counted(1, "case") == "1 case" and counted(0, "case") == "0 cases"
+
+
 @pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
 @pytest.mark.parametrize("width", [1400, 375], ids=["wide", "phone"])
 def test_page_works_in_a_browser(page, tmp_path, width):
@@ -135,7 +189,8 @@ def test_page_works_in_a_browser(page, tmp_path, width):
     sizes = {name: size for name, *size in found["figures"] if size and size[0][0]}
     for name in ("Daylight against glare", "DA 300", "Glare through the year", "3D model"):
         assert all(w >= 100 and h >= 90 for w, h in sizes[name]), (name, sizes.get(name))
-    assert found["shown"] == [["1"], ["3"], ["2"], ["3"]] and found["pressed"] == ["3"]
+    assert found["shown"] == [["1"], ["3"], ["2"], ["3"], ["1", "3"]] and found["pressed"] == ["3"]
+    assert found["sideways"] == (width > 1000), "cases stand beside each other where there is room"
     assert found["scenes"] == 4, "a control of the 3D view changed nothing"
     assert found["scalesShown"] == 3
     assert found["column"] == sorted(found["column"]) and len(found["column"]) == 4

@@ -176,8 +176,8 @@ def quick_work(give: Callable[[object, str, object], object] = setattr, among: s
     Args: among: only for modules that this command needs; the others load for long.
     """
     needs = {
-        "run": "scenes.run", "demo": "scenes.run", "thermal": "scenes.heat.study", "pv": "photovol",
-        "comply": "scenes.comply",
+        "run": "scenes.run", "demo": "scenes.study", "thermal": "scenes.heat.study",
+        "pv": "photovol", "comply": "scenes.comply",
         "dgp": "year_of_glare", "picture": "view_picture", "calibrate": "calibration",
         "bench": "benchmarks", "bsdf": "bsdf_generation", "study": "scenes.study",
     }  # fmt: skip

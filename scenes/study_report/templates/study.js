@@ -1,28 +1,41 @@
-// One case at a time: chosen in the list, by a dot of the scatter or with the arrows.
+// A case, or several side by side: chosen in the lists, by a dot of the scatter or with the arrows.
 (() => {
   "use strict";
   const list = document.getElementById("case-choice");
+  const besides = [...document.querySelectorAll("select.beside")];
+  const cases = document.querySelector(".cases");
   const sections = [...document.querySelectorAll("section.case")];
   const dots = [...document.querySelectorAll("button.dot[data-case]")];
   function show(number) {
-    for (const section of sections) section.hidden = section.dataset.case !== number;
-    for (const dot of dots) dot.setAttribute("aria-pressed", String(dot.dataset.case === number));
     list.value = number;
+    const chosen = new Set([number, ...besides.map((one) => one.value)].filter(Boolean));
+    for (const section of sections) section.hidden = !chosen.has(section.dataset.case);
+    for (const dot of dots) dot.setAttribute("aria-pressed", String(chosen.has(dot.dataset.case)));
+    cases.classList.toggle("side", chosen.size > 1);
+    cases.style.setProperty("--beside", chosen.size);
   }
-  list.addEventListener("change", () => show(list.value));
+  const alone = (number) => {
+    for (const one of besides) one.value = "";
+    show(number);
+  };
+  for (const one of [list, ...besides]) one.addEventListener("change", () => show(list.value));
   for (const dot of dots) {
     dot.addEventListener("click", () => {
       if (![...list.options].some((o) => o.value === dot.dataset.case)) return;
-      show(dot.dataset.case);
+      alone(dot.dataset.case);
       document.getElementById("cases").scrollIntoView();
     });
   }
   const step = (by) => {
-    const at = sections.findIndex((s) => !s.hidden);
-    show(sections[(at + by + sections.length) % sections.length].dataset.case);
+    const at = sections.findIndex((s) => s.dataset.case === list.value);
+    alone(sections[(at + by + sections.length) % sections.length].dataset.case);
   };
   document.getElementById("case-back").addEventListener("click", () => step(-1));
   document.getElementById("case-next").addEventListener("click", () => step(1));
   document.querySelector(".chooser").hidden = false;
+  for (const one of besides) {  // as many as the page is of, where they are few
+    const first = sections[Number(one.dataset.first) - 1];
+    if (one.dataset.first && first) one.value = first.dataset.case;
+  }
   show(sections[0].dataset.case);
 })();

@@ -1,0 +1,119 @@
+"""The verdict at the head of a study's report: what was asked, what is best and worst, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mitsuba_cfs.glare.classes import CLASSES
+from scenes.report.headline import PROTECTION, WARM_C, Card, cards
+from scenes.report.numbers import percent, rounded
+from scenes.report.tables import Table
+from scenes.report.verdict import Verdict, limits_table
+from scenes.results import RunResult
+from scenes.study.store import CaseResult
+from scenes.study.study import StudyResult
+from scenes.study_report.case_page import case_label, room_of
+from scenes.study_report.comparison import finished, glare_share, warm_share
+
+ENERGIES = ("heating_kwh", "cooling_kwh", "lighting_kwh")
+MOST_CASES = 12  # whose figures stand against the limits; all are in the table below
+
+
+def study_verdict(study: StudyResult) -> Verdict:
+    """The verdict of a study with at least one result."""
+    cases = study.plan.cases
+
+    def named(values: list[str], what: str) -> str:
+        values = list(dict.fromkeys(values))
+        return _and(values) if len(values) <= 3 else f"{len(values)} {what}"
+
+    asked = (
+        f"Daylight, glare and temperatures of {named([c.place for c in cases], 'rooms')} in a year "
+        f"of {named([c.climate for c in cases], 'climates')}, compared for "
+        f"{named([c.system for c in cases], 'systems')}: {counted(len(cases), 'case')}."
+    )
+    found = (("Daylight", _daylight), ("Glare", _glare), ("Heat and energy", _heat))
+    sentences = tuple((heading, sentence(study)) for heading, sentence in found)
+    return Verdict(asked, sentences, _limits(study))
+
+
+def counted(number: int, noun: str) -> str:
+    """So many of something."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _and(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _extremes(
+    study: StudyResult, value: Callable[[CaseResult], float]
+) -> tuple[tuple[str, float], tuple[str, float]]:
+    """Name and value of the case with least and of that with most."""
+    found = [(case_label(study, case), value(result)) for _, case, result in finished(study)]
+    return min(found, key=lambda one: one[1]), max(found, key=lambda one: one[1])
+
+
+def _daylight(study: StudyResult) -> str:
+    least, most = _extremes(study, lambda result: float(result.figures["da300"]))
+    text = f"{most[0]} has 300 lx of daylight in {percent(most[1])} % of the occupied hours, as a "
+    text += "mean over the work plane"
+    return text + (f"; {least[0]} in {percent(least[1])} %." if least[0] != most[0] else ".")
+
+
+def _glare(study: StudyResult) -> str:
+    done = [result for _, _, result in finished(study)]
+    if any(f"glare_{CLASSES[0]}_h" not in result.figures for result in done):
+        return "Glare was not rated in every case."
+    least, most = _extremes(study, glare_share)
+    text = f"{most[0]} has a DGP above 0.40 in {percent(most[1])} % of the occupied hours"
+    return text + (f", {least[0]} in {percent(least[1])} %." if least[0] != most[0] else ".")
+
+
+def _heat(study: StudyResult) -> str:
+    """Which case takes least for heat, cold and lamps; how warm the warmest gets."""
+    cool, warm = _extremes(study, warm_share)
+    text = f"{warm[0]} is above {WARM_C:.0f} °C in {percent(warm[1])} % of the occupied hours"
+    text += f", {cool[0]} in {percent(cool[1])} %." if cool[0] != warm[0] else "."
+    if any(not set(ENERGIES) <= set(result.figures) for _, _, result in finished(study)):
+        return f"{text} Without heating and cooling in every case."
+    least, most = _extremes(study, lambda result: sum(result.figures[e] for e in ENERGIES))
+    if most[1] <= 0:
+        return f"{text} Without heating and cooling."
+    parts = _parts(study, least[0])
+    text += (
+        f" Least heating, cooling and light together: {least[0]} with {rounded(least[1], 0)} kWh a "
+    )
+    text += f"year ({parts})"
+    if least[0] != most[0]:
+        text += f"; most: {most[0]} with {rounded(most[1], 0)} kWh ({_parts(study, most[0])})"
+    return text + ". That is heat and cold of the room and power of the lamps, added as they are."
+
+
+def _parts(study: StudyResult, label: str) -> str:
+    figures = next(r.figures for _, c, r in finished(study) if case_label(study, c) == label)
+    return " + ".join(rounded(float(figures[name]), 0) for name in ENERGIES)
+
+
+def _limits(study: StudyResult) -> Table:
+    """The figures of the cases that a rule limits."""
+    rows = []
+    for _, case, result in finished(study)[:MOST_CASES]:
+        building, _ = study.plan.rooms[case.scene]
+        room = room_of(study, case, result)
+        times = room.heat.temperatures.index
+        run = RunResult(building, times, np.empty((0, 3)), (room,), (), {})
+        own = (*cards(run, room), *_protection(result))
+        rows.append((case_label(study, case), room, own))
+    return limits_table(rows, "Case")
+
+
+def _protection(result: CaseResult) -> tuple[Card, ...]:
+    """EN 17037's protection from glare as a headline figure."""
+    level = result.figures.get("glare_protection")
+    if level is None:
+        return ()
+    verdict = "above 0.45" if level == "none" else f"DGP at most {PROTECTION[level]}"
+    return (Card("Protection from glare", str(level).capitalize(), "", "", verdict),)
