@@ -60,6 +60,8 @@ def room_picture(
         options.building, options.space, options.join, files.given, view_of, steps,
         furniture=options.furniture,
         apertures=options.apertures,
+        surroundings=options.surroundings,
+        surroundings_offset=options.surroundings_offset,
     )  # fmt: skip
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)

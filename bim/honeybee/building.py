@@ -16,6 +16,7 @@ from bim.defaults import FACADE_REFLECTANCE
 from bim.drawn_building import DrawnModel, drawn_building
 from bim.fenestration import ShadingState
 from bim.honeybee.energy import EnergyLibrary, OpaqueValues
+from bim.honeybee.left_out import left_out
 from bim.honeybee.library import OUTDOORS, PARTS
 from bim.honeybee.radiance import ModifierLibrary
 from bim.honeybee.schema import (
@@ -99,6 +100,7 @@ class _Reader:
         if many:
             what = f"multipliers of {', '.join(many[:4])}"
             self.problems.append(Problem(self.path.name, what, "each such room is counted once"))
+        self.problems += left_out(model, self.path)
         return DrawnModel(
             self.path, model.label, rooms, tuple(elements), furniture, tuple(self.problems)
         )

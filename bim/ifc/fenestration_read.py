@@ -50,6 +50,7 @@ from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, Openings
 from thermal.gvalue import TYPICAL_SYSTEMS
 
 Entity = ifcopenshell.entity_instance
+HOLDERS = ("IfcWindow", "IfcDoor", "IfcPlate", "IfcCurtainWall")  # whose sets are read
 
 
 def read_fenestration(path: str | PathLike[str]) -> dict[str, tuple[ShadingState, ...]]:
@@ -67,7 +68,7 @@ def read_states(
     """
     found: dict[str, tuple[ShadingState, ...]] = {}
     cache: dict[int, ShadingState] = {}
-    for kind in ("IfcWindow", "IfcDoor", "IfcPlate", "IfcCurtainWall"):
+    for kind in HOLDERS:
         for element in model.by_type(kind):
             states: dict[str, ShadingState] = {}
             element_type = None

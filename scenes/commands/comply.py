@@ -64,6 +64,8 @@ def command(
     join: tuple[str, ...],
     furniture: bool,
     apertures: tuple[str, ...],
+    surroundings: tuple[Path, ...],
+    surroundings_offset: tuple[float, float, float] | None,
     day: str,
     write_ifc: Path | None,
     quick: bool,
@@ -79,14 +81,16 @@ def command(
     chosen |= named
     options = ComplyOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
-        RoomOptions.of(**chosen), day=day_of(day), **own,
+        RoomOptions.of(**chosen), surroundings, surroundings_offset, day=day_of(day), **own,
     )  # fmt: skip
     from mitsuba_cfs.files import check_file
     from scenes.comply.files import read_files
     from scenes.result_folder import ResultFolder
 
     folder = ResultFolder(
-        out, "comply", inputs=(building, weather, system, own["closed"], own["uses"])
+        out,
+        "comply",
+        inputs=(building, weather, system, own["closed"], own["uses"], *surroundings),
     )
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=(building,))

@@ -28,6 +28,8 @@ from scenes.commands.room_options import (
     space_option,
     subdivide_option,
     sun_option,
+    surroundings_offset_option,
+    surroundings_option,
     system_option,
     view_option,
     weather_option,
@@ -46,6 +48,8 @@ _DEFAULT = YearOptions(Path(), Path())
 @join_option
 @furniture_option
 @aperture_option
+@surroundings_option
+@surroundings_offset_option
 @view_option("views", "or a file of them", several=True)
 @grid_option
 @directions_option
@@ -99,7 +103,7 @@ def command(
 
     if chosen["quick"]:
         chosen |= quick.picks(quick.VIEWS, given())
-    files = (building, weather, system, *map(Path, chosen["views"]))
+    files = (building, weather, system, *map(Path, chosen["views"]), *chosen["surroundings"])
     options = YearOptions(*room_files(building, weather, system), **chosen)
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded

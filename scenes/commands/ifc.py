@@ -15,7 +15,13 @@ from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.parameters import FILE, IFC_FILE
-from scenes.commands.room_options import furniture_option, join_option, space_option, u_option
+from scenes.commands.room_options import (
+    furniture_option,
+    join_option,
+    out_folder_option,
+    space_option,
+    u_option,
+)
 from scenes.result_folder import ResultFolder
 
 if TYPE_CHECKING:
@@ -282,6 +288,22 @@ def _export_rooms(
             continue
         written += [name] if space.windows else []
     return written
+
+
+@command.command()
+@out_folder_option
+def templates(out: Path) -> None:
+    """Write the property set that windows hold as definitions for other programs.
+
+    An IFC library with its IfcPropertySetTemplate, and an IDS that checks models for it.
+    """
+    folder = ResultFolder(out, "ifc templates")
+    from bim.ifc.property_templates import write_ids, write_templates
+
+    with folder.replaced() as place:
+        write_templates(place / "fenestration_templates.ifc")
+        write_ids(place / "fenestration.ids")
+    click.echo(out)
 
 
 @command.command()

@@ -23,6 +23,8 @@ from scenes.commands.room_options import (
     sky_ground_option,
     space_option,
     sun_option,
+    surroundings_offset_option,
+    surroundings_option,
     system_option,
     view_option,
     weather_option,
@@ -41,6 +43,8 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @join_option
 @furniture_option
 @aperture_option
+@surroundings_option
+@surroundings_offset_option
 @view_option("view", "not parallel", several=False)
 @eye_height_option
 @size_option("size", 800, "as evalglare wants them")

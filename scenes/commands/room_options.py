@@ -137,6 +137,8 @@ def building_options(spaces: str) -> Option:
         join_option,
         furniture_option,
         aperture_option,
+        surroundings_option,
+        surroundings_offset_option,
         annual_glare_option,
         subdivide_option,
         glare_sources_option,

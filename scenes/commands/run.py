@@ -15,8 +15,6 @@ from scenes.commands.room_options import (
     method_option,
     named_settings,
     size_option,
-    surroundings_offset_option,
-    surroundings_option,
     u_option,
 )
 from scenes.room.options import RoomOptions
@@ -28,8 +26,6 @@ _DEFAULT = RoomOptions()
 
 @click.command()
 @building_options("all with a window")
-@surroundings_option
-@surroundings_offset_option
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")

@@ -66,6 +66,8 @@ def check_building(
         join=options.join,
         furniture=options.furniture,
         apertures=options.apertures,
+        surroundings=options.surroundings,
+        surroundings_offset=options.surroundings_offset,
         progress=steps,
     )
     reading = round(time.monotonic() - start, 1)

@@ -23,6 +23,8 @@ class BuildingOptions:
     cache: bool = True  # keep traced matrices and find them again
     quick: bool = False  # said in the results; what it chooses is in `scenes.quick`
     room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
+    surroundings: tuple[Path, ...] = ()  # files of what stands around
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
 
     def named(self) -> dict[str, Any]:
         """Every choice by its name, those of the rooms first."""
@@ -35,8 +37,6 @@ class JobOptions(BuildingOptions):
     """Inputs and choices of a run."""
 
     operation: Path | None = None
-    surroundings: tuple[Path, ...] = ()  # files of what stands around
-    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     inner_glass: bool = False  # light passes glass between rooms
     coupled_heat: bool = True  # heat flows between the rooms that are computed
     explore: bool = False  # every hour's picture in every shading state, for the explorer

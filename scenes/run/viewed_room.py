@@ -49,6 +49,8 @@ def read_viewed_room(
     *,
     furniture: bool = False,
     apertures: Sequence[str] = (),
+    surroundings: Sequence[Path] = (),
+    surroundings_offset: tuple[float, float, float] | None = None,
 ) -> ViewedRoom:
     """The room of a building file, seen in the visible band.
 
@@ -58,9 +60,16 @@ def read_viewed_room(
         view_of: the view of a room; it refuses one that is not in it.
         furniture: whether what stands in the room is seen.
         apertures: materials of a Radiance scene's windows.
+        surroundings, surroundings_offset: as of `read_building`.
     """
     building = read_building(
-        file, join=join, furniture=furniture, apertures=apertures, progress=progress
+        file,
+        join=join,
+        furniture=furniture,
+        apertures=apertures,
+        surroundings=surroundings,
+        surroundings_offset=surroundings_offset,
+        progress=progress,
     )
     room = chosen_spaces(building, () if space is None else (space,), file)[0]
     view = view_of(room)

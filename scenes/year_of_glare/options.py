@@ -20,6 +20,8 @@ class YearOptions:
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
     furniture: bool = False  # whether what stands in the room is in its light and views
     apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows; none: all of glass
+    surroundings: tuple[Path, ...] = ()  # files of what stands around
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     views: tuple[str, ...] = ()  # Radiance view options, or files of them
     grid: float | None = None  # [m] spacing of eyes all over the room, in place of one
     directions: int = 1  # at every eye, the first towards the biggest window

@@ -90,6 +90,7 @@ def read_year(
     viewed = read_viewed_room(
         options.building, options.space, options.join, files.given, view_of, steps,
         furniture=options.furniture, apertures=options.apertures,
+        surroundings=options.surroundings, surroundings_offset=options.surroundings_offset,
     )  # fmt: skip
     variants.activate()
     sampling = sampling_of(options)
@@ -101,8 +102,10 @@ def read_year(
     chosen = [options.method, options.metric, options.samples, options.seed, options.join]
     chosen += [options.window_parts, options.glare_sources, options.glare_sun]
     chosen += [options.sun_model, options.sky_ground, options.furniture, options.apertures]
+    chosen.append(options.surroundings_offset)
     # corrections change rooms and surroundings, as --join does, under the same GUID
     files_read = (options.building, options.weather, *files_beside(options.building))
+    files_read += options.surroundings
     hashes = [sha256(path) for path in files_read]
     # not of files: the model may name others, which change by themselves
     hashes.append(content_digest(*([s.visible, s.fine, s.angular] for s in viewed.systems)))

@@ -14,6 +14,9 @@ from bim.building_file import read_building_file
 from bim.honeybee.building import read_honeybee
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.view import parse_view
+from thermal.glazing_unit import Environment, GlazingLayer, GlazingUnit
+from thermal.iso15099 import Conditions, iso15099_g_values, iso15099_u_value
 
 
 @pytest.fixture
@@ -140,6 +143,53 @@ def test_panes_and_gaps_give_u_and_g(tmp_path):
         (window,) = read_honeybee(write(model, tmp_path)).space("Office").windows
         u_values.append(window.u_value)
     assert u_values[0] < 1.9 and u_values[1] > 2.4
+
+
+def test_what_is_no_part_of_a_building_is_named(tmp_path):
+    model = two_rooms()
+    model["units"] = "Centimeters"
+    energy, radiance = (model["properties"][name] for name in ("energy", "radiance"))
+    energy["program_types"] = [{"type": "ProgramTypeAbridged", "identifier": "Office"}]
+    model["rooms"][0]["properties"]["energy"]["program_type"] = "Office"
+    sensors = [{"pos": [1, 1, 0.8], "dir": [0, 0, 1]}] * 7
+    radiance["sensor_grids"] = [{"identifier": "desks", "sensors": sensors}]
+    radiance["views"] = [
+        {"identifier": "desk", "position": [200, 300, 120], "direction": [0, -1, 0],
+         "view_type": "a", "h_size": 180, "v_size": 180},
+        {"identifier": "nowhere", "position": [1, None, "x"]},
+    ]  # fmt: skip
+    states = [{"modifier": "a"}, {"modifier": "b"}]
+    shade = model["rooms"][0]["faces"][0]["apertures"][0]["outdoor_shades"][0]
+    shade["properties"]["radiance"]["states"] = states
+    shade["properties"]["energy"]["transmittance_schedule"] = "Tree"
+    said = {p.what: p.consequence for p in read_honeybee(write(model, tmp_path)).problems}
+    assert "1 sensor grid(s) with 7 sensors: desks" in said
+    assert said["view nowhere"] == "left out"
+    options = said["view desk"].split("'")[1]
+    view = parse_view(options)
+    assert (view.kind, view.horizontal_deg) == ("angular", 180)
+    np.testing.assert_allclose(view.position, [2.0, 3.0, 1.2])
+    np.testing.assert_allclose(view.direction, [0, -1, 0], atol=1e-12)
+    assert "1 room(s) with loads, schedules or systems: Office" in said
+    assert said["1 shade(s) with states: Overhang"] == "their own modifier holds all year"
+    assert said["1 shade(s) let light through by a schedule: Overhang"] == "opaque"
+
+
+def test_u_is_of_nfrcs_winter_and_g_of_its_summer(tmp_path):
+    """NFRC 100: -18 and 21 degC, 5.5 m/s; NFRC 200: 32 and 24 degC, 2.75 m/s, 783 W/m2."""
+    model = two_rooms()
+    pane = {"type": "EnergyWindowMaterialGlazing", "identifier": "Clear", "thickness": 0.006,
+            "solar_transmittance": 0.6, "solar_reflectance": 0.1, "conductivity": 1.0}  # fmt: skip
+    default = model["properties"]["energy"]["global_construction_set"]
+    default["materials"] += [pane]
+    default["constructions"][2]["materials"] = ["Clear"]
+    (window,) = read_honeybee(write(model, tmp_path)).space("Office").windows
+    unit = GlazingUnit((GlazingLayer(0.006, 1.0, (0.84, 0.84)),), (), height=1.5)
+    winter = Conditions(Environment(-18.0, 26.0), Environment(21.0, None))
+    summer = Conditions(Environment(32.0, 15.0), Environment(24.0, None), 783.0)
+    assert window.u_value == pytest.approx(iso15099_u_value(unit, winter), rel=1e-6)
+    assert window.g_value == pytest.approx(iso15099_g_values(unit, summer, 0.6, [0.3]), rel=1e-6)
+    assert abs(iso15099_u_value(unit, summer) / window.u_value - 1) > 0.05
 
 
 def test_the_glass_of_a_modifier_goes_before_the_construction(tmp_path):

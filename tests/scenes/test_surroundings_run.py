@@ -1,16 +1,20 @@
-"""`cfs run --surroundings`: taken by a run, named in its manifest."""
+"""`--surroundings`: read by every command of a room, named in a run's manifest."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from mitsuba_cfs.progress import silent
+from scenes import cli
 from scenes.demo import WEATHER
 from scenes.run.files import read_files
 from scenes.run.options import JobOptions
 from scenes.run.run import _manifest, read_inputs
+from scenes.year_of_glare.options import YearOptions
+from scenes.year_of_glare.year import read_year
 from tests.conftest import REPOSITORY
 
 TUTORIALS = REPOSITORY / "docs" / "tutorials"
@@ -36,3 +40,34 @@ def test_the_manifest_names_the_files(options):
     manifest = json.loads(json.dumps(_manifest(options, "llvm", inputs, [], [])))
     assert manifest["inputs"]["surroundings_0"]["path"] == str(QUARTER)
     assert manifest["options"]["surroundings"] == [str(QUARTER)]
+
+
+@pytest.mark.parametrize("command", ["run", "comply", "dgp", "picture"])
+def test_every_command_of_a_room_reads_them(command, tmp_path, capfd):
+    """A file that cannot be used is named, so it was read."""
+    broken = tmp_path / "broken.city.json"
+    broken.write_text("{")
+    words = [
+        command, TUTORIALS / "two_rooms.hbjson", "--weather", WEATHER, "--surroundings", broken,
+        "--out", tmp_path / ("out.png" if command == "picture" else "out"),
+    ]  # fmt: skip
+    more = {"comply": ["--standard", "en17037"], "picture": ["--at", "06-21 12:00"]}
+    assert cli.run([str(word) for word in [*words, *more.get(command, [])]]) == 1
+    said = capfd.readouterr().err.strip().splitlines()
+    assert "broken.city.json" in said[-1]
+
+
+def test_ratings_of_a_year_are_not_found_again_for_other_surroundings(tmp_path, variant):
+    wall = tmp_path / "wall.obj"
+    wall.write_text("v -9 -3 0\nv 9 -3 0\nv 9 -3 6\nv -9 -3 6\nf 1 2 3 4\n")
+    options = YearOptions(
+        TUTORIALS / "two_rooms.hbjson", WEATHER, space="Office", surroundings=(wall,)
+    )
+    digests = [read_year(one).digest for one in (
+        options, options, replace(options, surroundings_offset=(0.0, -1.0, 0.0)),
+        replace(options, surroundings=()),
+    )]  # fmt: skip
+    wall.write_text(wall.read_text().replace("6", "7"))
+    digests.append(read_year(options).digest)
+    assert digests[0] == digests[1]
+    assert len(set(digests)) == 4

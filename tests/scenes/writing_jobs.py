@@ -103,6 +103,7 @@ JOBS = {
     "ifc export --epjson": Job(lambda _, out: ["ifc", "export", OFFICE, "--epjson", out],
                                "out.epJSON"),
     "ifc export --gltf": Job(lambda _, out: ["ifc", "export", OFFICE, "--gltf", out], "out.glb"),
+    "ifc templates": to_folder("ifc", "templates"),
     "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
     "bsdf plot": Job(
         lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out],
