@@ -16,7 +16,7 @@ from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words
-from scenes.report.numbers import rounded
+from scenes.report.numbers import counted
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
@@ -117,7 +117,7 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     if "system" not in inputs and manifest.get("system"):
         rows.append(("Fenestration", str(manifest["system"])))
     first, last = result.times[0], result.times[-1]
-    rows.append(("Period", f"{first:%d %b} to {last:%d %b}, {rounded(len(result.times), 0)} hours"))
+    rows.append(("Period", f"{first:%d %b} to {last:%d %b}, {counted(len(result.times), 'hour')}"))
     others = len(building.spaces) - len(result.spaces)
     rooms = f"{len(result.spaces)} computed"
     rows.append(("Rooms", rooms + (f", {others} more in the file" if others > 0 else "")))
