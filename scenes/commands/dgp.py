@@ -108,6 +108,7 @@ def command(
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.report.numbers import counted
     from scenes.year_of_glare import outputs, page
     from scenes.year_of_glare.year import rate_views, read_year
 
@@ -122,12 +123,13 @@ def command(
             page.write_page(year, table, place / "report.html")
     worst = table.loc[table["highest_dgp"].idxmax()]
     click.echo(
-        f"{year.room}: {len(table)} view(s), {len(year.sky.lit)} hours with the sun up.  Highest "
+        f"{year.room}: {counted(len(table), 'view')}, "
+        f"{counted(len(year.sky.lit), 'hour')} with the sun up.  Highest "
         f"{year.options.metric} {worst['highest_dgp']:.2f}{_error(worst)} "
         f"({worst['view']}, {worst['worst_hour']})"
     )
     for level, count in table["protection_en17037"].value_counts().items():
-        click.echo(f"protection {level}: {count} view(s)")
+        click.echo(f"protection {level}: {counted(count, 'view')}")
     for note in year.notes:
         click.echo(f"note: {note}")
     click.echo(f"{out / 'views.csv'}")

@@ -124,6 +124,7 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
     from scenes.commands.progress_bar import ProgressBar
     from scenes.explore.folder import write_explorer
     from scenes.report import write_report
+    from scenes.report.numbers import counted
     from scenes.run.outputs import EXPLORER, write_results
     from scenes.run.run import run_job
 
@@ -142,7 +143,8 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
         if note != quick_run.NOTE:
             click.echo(f"note: {note}")
     if result.problems:
-        click.echo(f"{len(result.problems)} problems in the model: {out / 'problems.csv'}")
+        found = counted(len(result.problems), "problem")
+        click.echo(f"{found} in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
     if options.explore:
         click.echo(f"explorer: {out / EXPLORER / 'index.html'}")

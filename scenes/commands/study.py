@@ -138,9 +138,11 @@ def _print_plan(plan: StudyPlan) -> None:
 
 def _print_outcome(result: StudyResult, out: Path) -> None:
     """How many cases there are, and what they took."""
+    from scenes.report.numbers import counted
+
     click.echo(
-        f"{len(result.results)} cases: {result.reused} were there, {result.failed} failed, "
-        f"{result.seconds:.0f} s; table: {out / 'results.parquet'}"
+        f"{counted(len(result.results), 'case')}: {result.reused} were there, "
+        f"{result.failed} failed, {result.seconds:.0f} s; table: {out / 'results.parquet'}"
     )
     if result.clock:
         click.echo(f"auto: {result.clock}")

@@ -108,8 +108,8 @@ def drawn(frame: PlanFrame, inside: list[str]) -> tuple[tuple[str, float], str]:
     west, south, east, north = frame.outline.bounds
     x0, y0 = west - MARGIN, -(north + MARGIN)
     width, height = east - west + 2 * MARGIN, north - south + 2 * MARGIN
-    parts = [f'<path class="floor" d="{_rings(frame.outline)}"/>', *inside]
-    parts.append(f'<path class="wall" d="{_rings(frame.outline)}"/>')
+    parts = [f'<path class="floor" d="{rings(frame.outline)}"/>', *inside]
+    parts.append(f'<path class="wall" d="{rings(frame.outline)}"/>')
     for ends in frame.windows:
         name = "skylight" if len(ends) > 2 else "window"
         parts.append(f'<path class="{name}" d="{_path(ends, closed=len(ends) > 2)}"/>')
@@ -128,7 +128,7 @@ def _cells(frame: PlanFrame, values, scale: ColourScale, digits: int) -> list[st
         text = "no value" if np.isnan(value) else f"{value:.{digits}f} {scale.unit}"
         where = f"x {point[0]:.2f} m, y {point[1]:.2f} m"
         parts.append(
-            f'<path class="cell" fill="{scale.hex(value)}" d="{_rings(cell)}">'
+            f'<path class="cell" fill="{scale.hex(value)}" d="{rings(cell)}">'
             f"<title>{text} at {where}</title></path>"
         )
         if numbered and not np.isnan(value):
@@ -155,13 +155,13 @@ def _eye(position: NDArray[np.float64], direction: NDArray[np.float64]) -> str:
     return f'<path class="eye" d="{_path(shape, closed=True)}"><title>view point</title></path>'
 
 
-def _rings(geometry: shapely.Geometry) -> str:
+def rings(geometry: shapely.Geometry) -> str:
     """SVG path of polygons with their holes."""
-    rings = []
+    found = []
     for part in shapely.get_parts(geometry):
         if part.geom_type == "Polygon":
-            rings += [part.exterior, *part.interiors]
-    return "".join(_path(shapely.get_coordinates(ring)[:-1], closed=True) for ring in rings)
+            found += [part.exterior, *part.interiors]
+    return "".join(_path(shapely.get_coordinates(ring)[:-1], closed=True) for ring in found)
 
 
 def _path(points: NDArray[np.float64], *, closed: bool) -> str:

@@ -18,6 +18,11 @@ def rounded(value: float, digits: int) -> str:
     return text
 
 
+def counted(number: int, noun: str) -> str:
+    """So many of something, in English."""
+    return f"{rounded(number, 0)} {noun}{'' if number == 1 else 's'}"
+
+
 def significant(value: float, digits: int = 3) -> str:
     """So many significant digits, without an exponent from 1e-4 to 1e9."""
     if value is None or not math.isfinite(value):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import jinja2
@@ -16,15 +16,16 @@ from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words
-from scenes.report.numbers import rounded
+from scenes.report.numbers import counted
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
+from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
 from scenes.report.verdict import verdict
 from scenes.results import RunResult
 
 FILES = page_files("scenes.report")  # that other pages share
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
-SCRIPTS = ("tables.js", "pointer.js", "viewer.js")
+SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
 
 
 def write_report(result: RunResult, path: Path) -> None:
@@ -39,12 +40,17 @@ def report_html(result: RunResult) -> str:
     rooms = tuple(room_page(result, room, i) for i, room in enumerate(result.spaces, start=1))
     manifest = result.manifest
     model = model3d(result)
+    several = len(rooms) > 1
+    metrics = room_metrics(result) if several else ()
     return environment().get_template("report.html.j2").render(
         result=result,
         rooms=rooms,
         verdict=verdict(result, [room.cards for room in rooms]),
         model=model,
         comparison=comparison(result, rooms),
+        metrics=metrics,
+        storeys=storey_plans(result) if several else (),
+        storey_data=storey_data(metrics, len(rooms)),
         summary=summary(result),
         problems=tables.problems_table(result),
         inputs=inputs_table(manifest.get("inputs", {})),
@@ -57,6 +63,20 @@ def report_html(result: RunResult) -> str:
         style=Markup(FILES["style.css"]),
         scripts=Markup("\n".join(FILES[name] for name in SCRIPTS)),
     )  # fmt: skip
+
+
+def storey_data(metrics: Sequence[RoomMetric], rooms: int) -> list[dict]:
+    """Words and colours of every room, for the plans of the storeys."""
+    return [
+        {
+            "unit": one.scale.unit,
+            "rooms": [
+                [one.words(i), one.scale.hex(one.values[i]), one.scale.ink(one.values[i])]
+                for i in range(rooms)
+            ],
+        }
+        for one in metrics
+    ]
 
 
 def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
@@ -97,7 +117,7 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     if "system" not in inputs and manifest.get("system"):
         rows.append(("Fenestration", str(manifest["system"])))
     first, last = result.times[0], result.times[-1]
-    rows.append(("Period", f"{first:%d %b} to {last:%d %b}, {rounded(len(result.times), 0)} hours"))
+    rows.append(("Period", f"{first:%d %b} to {last:%d %b}, {counted(len(result.times), 'hour')}"))
     others = len(building.spaces) - len(result.spaces)
     rooms = f"{len(result.spaces)} computed"
     rows.append(("Rooms", rooms + (f", {others} more in the file" if others > 0 else "")))

@@ -19,7 +19,7 @@ from scenes.report import (
 )
 from scenes.report.glare_figures import compass
 from scenes.report.headline import Card, cards
-from scenes.report.numbers import rounded, share
+from scenes.report.numbers import counted, rounded, share
 from scenes.results import RoomYear, RunResult
 
 
@@ -129,5 +129,6 @@ def error_words(room: RoomYear) -> str:
     error = room.daylight.relative_error
     return (
         f"Relative standard error of the annual mean illuminance: {share(float(error.mean()))} % "
-        f"as a mean over {len(error)} sensors, {share(float(error.max()))} % at the worst one."
+        f"as a mean over {counted(len(error), 'sensor')}, {share(float(error.max()))} % at the "
+        "worst one."
     )

@@ -12,7 +12,7 @@ from scenes.quick import NOTE
 from scenes.report import page as run_page
 from scenes.report import tables
 from scenes.report.names import glossary
-from scenes.report.numbers import rounded, share
+from scenes.report.numbers import counted, rounded, share
 from scenes.report.page_files import page_files
 from scenes.study.study import StudyResult
 from scenes.study_report.case_page import case_page, room_of
@@ -25,7 +25,7 @@ from scenes.study_report.comparison import (
     scatter,
 )
 from scenes.study_report.model import study_model
-from scenes.study_report.verdict import counted, study_verdict
+from scenes.study_report.verdict import study_verdict
 
 FILES = page_files("scenes.study_report")
 MOST_BESIDE = 3  # cases that are shown at a time

@@ -8,7 +8,7 @@ import numpy as np
 
 from mitsuba_cfs.glare.classes import CLASSES
 from scenes.report.headline import PROTECTION, WARM_C, Card, cards
-from scenes.report.numbers import percent, rounded
+from scenes.report.numbers import counted, percent, rounded
 from scenes.report.tables import Table
 from scenes.report.verdict import Verdict, limits_table
 from scenes.results import RunResult
@@ -37,11 +37,6 @@ def study_verdict(study: StudyResult) -> Verdict:
     found = (("Daylight", _daylight), ("Glare", _glare), ("Heat and energy", _heat))
     sentences = tuple((heading, sentence(study)) for heading, sentence in found)
     return Verdict(asked, sentences, _limits(study))
-
-
-def counted(number: int, noun: str) -> str:
-    """So many of something."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _and(names: list[str]) -> str:

@@ -9,7 +9,7 @@ import pytest
 from scenes.report import tables
 from scenes.report.headline import WARM_C, named_like
 from scenes.report.names import glossary, quantity
-from scenes.report.numbers import cell, percent, rounded, significant
+from scenes.report.numbers import cell, counted, percent, rounded, significant
 from scenes.report.thermal_figures import duration_curve, extreme_weeks, gains_chart
 from tests.report.synthetic import run_result
 
@@ -17,6 +17,11 @@ from tests.report.synthetic import run_result
 @pytest.fixture(scope="module")
 def room():
     return run_result(picture_size=32, pictures=2).spaces[0]
+
+
+def test_one_of_a_thing_is_not_several() -> None:
+    assert counted(1, "hour") == "1 hour" and counted(0, "hour") == "0 hours"
+    assert counted(8760, "hour") == "8\u202f760 hours"
 
 
 def test_digits() -> None:

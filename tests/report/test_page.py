@@ -72,7 +72,7 @@ def test_key_numbers_are_those_of_the_result(result, page) -> None:
         occupied = room.heat.comfort["occupied"]
         worst = max(picture.glare["dgp"] for picture in room.glare.pictures)
         cards = dict(
-            re.findall(r'">([^<>]+)</abbr></h4>\s*<p class="value"><b>([^<]+)</b>', section)
+            re.findall(r'">([^<>]+)</abbr></h3>\s*<p class="value"><b>([^<]+)</b>', section)
         )
         assert (
             cards["Spatial daylight autonomy"] == f"{room.daylight.room_metrics['sda300_50']:.0f}"

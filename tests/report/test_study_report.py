@@ -20,7 +20,7 @@ from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.comparison import finished, glare_share, pareto_front
 from scenes.study_report.page import study_report_html
-from scenes.study_report.verdict import counted, study_verdict
+from scenes.study_report.verdict import study_verdict
 from tests.report.browser import chromium, inspect
 from tests.report.synthetic import run_result
 
@@ -176,7 +176,6 @@ def test_the_verdict_names_best_and_worst():
     assert "system <0> has 300 lx of daylight in 70 %" in said["Daylight"]
     assert "system <1> in 61 %" in said["Daylight"]
     assert "without heating and cooling" in said["Heat and energy"].lower()
-    assert counted(1, "case") == "1 case" and counted(0, "case") == "0 cases"
 
 
 @pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
