@@ -28,7 +28,8 @@ def left_out(model: HoneybeeModel, file: Path) -> Iterator[Problem]:
     radiance = model.properties.radiance
     grids = _objects(radiance, "sensor_grids")
     if grids:
-        count = sum(len(grid.get("sensors") or ()) for grid in grids)
+        listed = (grid.get("sensors") for grid in grids)
+        count = sum(len(sensors) for sensors in listed if isinstance(sensors, list))
         what = f"{len(grids)} sensor grid(s) with {count} sensors: {_names(grids)}"
         yield Problem(file.name, what, "left out; --spacing and --height make the sensors")
     for view in _objects(radiance, "views"):

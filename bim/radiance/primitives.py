@@ -16,6 +16,7 @@ from mitsuba_cfs.errors import DataError
 VOID = "void"
 WORD = re.compile(r'"([^"]*)"|\'([^\']*)\'|(\S+)')
 LARGEST_FILE = 512 * 2**20  # of text [bytes]
+MOST = 1e30  # of a number: products of a few coordinates are still numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +148,7 @@ class _Words:
             value = float(word)
         except ValueError:
             value = float("nan")
-        if not abs(value) < float("inf"):
+        if not abs(value) < MOST:
             self._refuse(start, f"a number is expected, got {word!r}")
         return value
 

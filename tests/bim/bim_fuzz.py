@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -44,3 +46,38 @@ def mutations(content: bytes, count: int, seed: int = 0) -> Iterator[bytes]:
                         piece = PIECES[int(random.integers(len(PIECES)))]
                         spoilt[numbers[0] : numbers[0] + 1] = piece
         yield bytes(spoilt)
+
+
+ODD = (None, [], {}, "", "x", True, 0, -1, 0.5, 1e12, 1e308, [1], [[1, 2, 3]], {"type": "x"})
+
+
+def odd_values(content: Any, count: int, seed: int = 0) -> Iterator[Any]:
+    """`count` copies of a JSON document in which one or two values are odd or gone."""
+    random = np.random.default_rng(seed)
+    paths = list(_paths(content))
+    for _ in range(count):
+        spoilt = copy.deepcopy(content)
+        for _ in range(int(random.integers(1, 3))):
+            *above, last = paths[int(random.integers(len(paths)))]
+            try:
+                owner = spoilt
+                for step in above:
+                    owner = owner[step]
+                if random.random() < 0.15:
+                    del owner[last]
+                else:
+                    owner[last] = ODD[int(random.integers(len(ODD)))]
+            except (KeyError, IndexError, TypeError):
+                continue  # the first one took it away
+        yield spoilt
+
+
+def _paths(content: Any, path: tuple = ()) -> Iterator[tuple]:
+    items: Any = ()
+    if isinstance(content, dict):
+        items = content.items()
+    elif isinstance(content, list):
+        items = enumerate(content)
+    for key, value in items:
+        yield (*path, key)
+        yield from _paths(value, (*path, key))

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from bim_fuzz import mutations
+from bim_fuzz import mutations, odd_values
 from honeybee_models import two_rooms, write
 
 import bim
@@ -145,7 +145,8 @@ def test_panes_and_gaps_give_u_and_g(tmp_path):
     assert u_values[0] < 1.9 and u_values[1] > 2.4
 
 
-def test_what_is_no_part_of_a_building_is_named(tmp_path):
+def used_rooms() -> dict:
+    """The rooms in centimetres with sensors, views, a use, states of a shade."""
     model = two_rooms()
     model["units"] = "Centimeters"
     energy, radiance = (model["properties"][name] for name in ("energy", "radiance"))
@@ -162,6 +163,11 @@ def test_what_is_no_part_of_a_building_is_named(tmp_path):
     shade = model["rooms"][0]["faces"][0]["apertures"][0]["outdoor_shades"][0]
     shade["properties"]["radiance"]["states"] = states
     shade["properties"]["energy"]["transmittance_schedule"] = "Tree"
+    return model
+
+
+def test_what_is_no_part_of_a_building_is_named(tmp_path):
+    model = used_rooms()
     said = {p.what: p.consequence for p in read_honeybee(write(model, tmp_path)).problems}
     assert "1 sensor grid(s) with 7 sensors: desks" in said
     assert said["view nowhere"] == "left out"
@@ -275,3 +281,17 @@ def test_random_bytes_give_one_line(tmp_path):
             refused += 1
             assert "\n" not in str(error)
     assert refused > 20
+
+
+def test_odd_values_give_one_line(tmp_path):
+    refused = 0
+    wrong = used_rooms()  # of which no other field says so
+    wrong["properties"]["radiance"]["sensor_grids"][0]["sensors"] = 0.5
+    for content in (wrong, *odd_values(used_rooms(), 100)):
+        path = write(content, tmp_path)
+        try:
+            read_honeybee(path)
+        except DataError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert 10 < refused < 90

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bim_fuzz import mutations
 
 import bim
 from bim.radiance.scene import read_radiance
 from mitsuba_cfs.errors import CfsError, DataError
 from mitsuba_cfs.surfaces import triangle_areas
+from tests.conftest import REPOSITORY
 from tests.radiance import run
 
 GREY = "void plastic grey\n0\n0\n5 .5 .5 .5 0 0\n"
@@ -309,3 +311,17 @@ def test_glass_passes_what_radiance_says():
 def test_no_glass_has_no_transmittance():
     with pytest.raises(DataError, match="cloth: is trans, not glass"):
         bim.glass_shares(bim.RadianceMaterial("cloth", "trans"))
+
+
+def test_random_bytes_give_one_line(tmp_path):
+    whole = (REPOSITORY / "docs" / "tutorials" / "office.rad").read_bytes()
+    refused = 0
+    for content in mutations(whole, 120):
+        path = tmp_path / "spoilt.rad"
+        path.write_bytes(content)
+        try:
+            read_radiance(path)
+        except DataError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert 60 < refused < 120

@@ -51,7 +51,10 @@ def test_every_command_of_a_room_reads_them(command, tmp_path, capfd):
         command, TUTORIALS / "two_rooms.hbjson", "--weather", WEATHER, "--surroundings", broken,
         "--out", tmp_path / ("out.png" if command == "picture" else "out"),
     ]  # fmt: skip
-    more = {"comply": ["--standard", "en17037"], "picture": ["--at", "06-21 12:00"]}
+    more = {
+        "comply": ["--standard", "en17037"],
+        "picture": ["--at", "06-21 12:00", "--size", "16", "--samples", "1"],
+    }
     assert cli.run([str(word) for word in [*words, *more.get(command, [])]]) == 1
     said = capfd.readouterr().err.strip().splitlines()
     assert "broken.city.json" in said[-1]
@@ -63,11 +66,8 @@ def test_ratings_of_a_year_are_not_found_again_for_other_surroundings(tmp_path, 
     options = YearOptions(
         TUTORIALS / "two_rooms.hbjson", WEATHER, space="Office", surroundings=(wall,)
     )
-    digests = [read_year(one).digest for one in (
-        options, options, replace(options, surroundings_offset=(0.0, -1.0, 0.0)),
-        replace(options, surroundings=()),
-    )]  # fmt: skip
+    moved = replace(options, surroundings_offset=(0.0, -1.0, 0.0))
+    digests = [read_year(one).digest for one in (options, moved)]
     wall.write_text(wall.read_text().replace("6", "7"))
     digests.append(read_year(options).digest)
-    assert digests[0] == digests[1]
-    assert len(set(digests)) == 4
+    assert len(set(digests)) == 3
