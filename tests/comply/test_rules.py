@@ -166,6 +166,9 @@ def test_breeam_counts_hours_of_the_year(calendar):
     lux = np.zeros((8760, 4))
     lux[:2000] = [390.0, 390.0, 330.0, 90.0]
     assert reached("breeam-hea01", Findings(calendar, light(lux)))["offices"] == "2 credits"
+    lux[1999, 3] = 89.0  # the worst point alone
+    lux[1999, :3] = 400.0
+    assert reached("breeam-hea01", Findings(calendar, light(lux)))["offices"] == NOT_MET
     lux[1999] = 0.0
     found = reached("breeam-hea01", Findings(calendar, light(lux)))
     assert found["offices"] == NOT_MET and found["dwellings"] == NOT_FOR_IT
