@@ -151,6 +151,14 @@ def test_clear_hours_of_the_equinoxes(calendar):
     assert {t.month for t in times} <= {3, 4, 9, 10}
 
 
+def test_the_clear_day_has_most_direct_sun(calendar):
+    """Of 31 days about 21 March and 21 September: the 80th and the 264th day of the year."""
+    days = np.reshape(read_epw(WEATHER).direct_normal, (365, 24)).sum(axis=1)
+    for found, equinox in zip(calendar.clear_days, (80, 264), strict=True):
+        first = equinox - 15
+        assert found.day_of_year == first + int(np.argmax(days[first - 1 : equinox + 15]))
+
+
 def test_option_2_counts_points_that_keep_both_hours(calendar):
     lux = np.full((8760, 10), 1000.0)
     lux[calendar.clear_hours(9), :2] = 200.0
