@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from scenes.comply.assess import (
 from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
 from scenes.comply.sunlight import SunExposure
+from scenes.comply.tables import missed
 from scenes.comply.uses import RoomUse
 from scenes.comply.view_out import ViewOut
 from scenes.demo import WEATHER
@@ -149,6 +151,15 @@ def test_clear_hours_of_the_equinoxes(calendar):
     times = calendar.times[hours]
     assert len(hours) == 4 and set(times.hour) == {8, 9} and set(times.minute) == {30}
     assert {t.month for t in times} <= {3, 4, 9, 10}
+
+
+def test_a_sentence_names_what_is_missed_alone():
+    """Half of the plane has its 310 lx; 95 % of it have 50 lx."""
+    criterion = read_rule("en17037").criterion[0]
+    verdict = RoomVerdict("en17037", criterion, True, ((310.0, 50.0),) * 3)
+    (text,) = missed(SimpleNamespace(verdicts=(verdict,)))
+    assert "95 % of the reference plane" in text and "50 lx, ≥ 100 lx for minimum" in text
+    assert "310 lx" not in text
 
 
 def test_the_clear_day_has_most_direct_sun(calendar):
