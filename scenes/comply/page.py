@@ -25,7 +25,9 @@ from scenes.report.tables import Column, Table
 
 FILES = page_files("scenes.comply")
 # what does not come apart at the end of a line: a sign and its number, a number and what it counts
-TOGETHER = re.compile(r"(?<=[≥≤]) (?=\d)|(?<=\d) (?=%|°|lx|h\b|m\b|K h|kWh|points?\b|credits?\b)")
+TOGETHER = re.compile(
+    r"(?<=[≥≤]) (?=\d)|(?<=\d) (?=%|°|lx|h\b|m\b|s\b|K h|kWh|points?\b|credits?\b)"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +63,7 @@ def dossier_html(result: Compliance, *, quick: bool = False) -> str:
         rooms=rooms,
         problems=problems_table(result),
         version=metadata.version("mitsuba-cfs"),
-        seconds=", ".join(f"{name} {value:g} s" for name, value in result.seconds.items()),
+        seconds=tied(", ".join(f"{name} {value:g} s" for name, value in result.seconds.items())),
         style=Markup("\n".join(style)),
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ what to do.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -128,5 +129,8 @@ def windows_named(names: list[str]) -> str:
 
 
 def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"{', '.join(names[:NAMED])}{more}"
+    """The first few names, each once with how many have it, and how many windows there are more."""
+    counts = list(Counter(names).items())
+    shown = [name if count == 1 else f"{name} ({count})" for name, count in counts[:NAMED]]
+    left = sum(count for _, count in counts[NAMED:])
+    return ", ".join(shown) + (f" and {left} more" if left else "")

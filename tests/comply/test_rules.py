@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from scenes.comply.assess import (
 from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
 from scenes.comply.sunlight import SunExposure
+from scenes.comply.tables import missed
 from scenes.comply.uses import RoomUse
 from scenes.comply.view_out import ViewOut
 from scenes.demo import WEATHER
@@ -151,6 +153,23 @@ def test_clear_hours_of_the_equinoxes(calendar):
     assert {t.month for t in times} <= {3, 4, 9, 10}
 
 
+def test_a_sentence_names_what_is_missed_alone():
+    """Half of the plane has its 310 lx; 95 % of it have 50 lx."""
+    criterion = read_rule("en17037").criterion[0]
+    verdict = RoomVerdict("en17037", criterion, True, ((310.0, 50.0),) * 3)
+    (text,) = missed(SimpleNamespace(verdicts=(verdict,)))
+    assert "95 % of the reference plane" in text and "50 lx, ≥ 100 lx for minimum" in text
+    assert "310 lx" not in text
+
+
+def test_the_clear_day_has_most_direct_sun(calendar):
+    """Of 31 days about 21 March and 21 September: the 80th and the 264th day of the year."""
+    days = np.reshape(read_epw(WEATHER).direct_normal, (365, 24)).sum(axis=1)
+    for found, equinox in zip(calendar.clear_days, (80, 264), strict=True):
+        first = equinox - 15
+        assert found.day_of_year == first + int(np.argmax(days[first - 1 : equinox + 15]))
+
+
 def test_option_2_counts_points_that_keep_both_hours(calendar):
     lux = np.full((8760, 10), 1000.0)
     lux[calendar.clear_hours(9), :2] = 200.0
@@ -166,6 +185,9 @@ def test_breeam_counts_hours_of_the_year(calendar):
     lux = np.zeros((8760, 4))
     lux[:2000] = [390.0, 390.0, 330.0, 90.0]
     assert reached("breeam-hea01", Findings(calendar, light(lux)))["offices"] == "2 credits"
+    lux[1999, 3] = 89.0  # the worst point alone
+    lux[1999, :3] = 400.0
+    assert reached("breeam-hea01", Findings(calendar, light(lux)))["offices"] == NOT_MET
     lux[1999] = 0.0
     found = reached("breeam-hea01", Findings(calendar, light(lux)))
     assert found["offices"] == NOT_MET and found["dwellings"] == NOT_FOR_IT

@@ -18,7 +18,7 @@ from mitsuba_cfs.files import write_text
 from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.fenestration.resolver import fill_windows
+from scenes.fenestration.resolver import fill_windows, windows_named
 from scenes.fenestration.systems import FenestrationSystem, Given, read_system
 from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
@@ -363,3 +363,14 @@ def test_exports_say_what_is_not_known(tmp_path, capsys) -> None:
     assert run(["ifc", "export", str(path), "--epjson", str(out)]) == 0
     (values,) = json.loads(out.read_text())["WindowMaterial:SimpleGlazingSystem"].values()
     assert values["u_factor"] == 0.9
+
+
+def test_windows_of_one_name_are_counted():
+    """Five times "Fenster-002" in a row says nothing; what is left counts windows, not names."""
+    assert windows_named(["a"]) == "Window a"
+    assert windows_named(["a", "b", "a", "a"]) == "Windows a (3), b"
+    names = ["n", "n", *"abcdefghij", "i", "j"]
+    assert windows_named(names).startswith("Windows n (2), a, b")
+    listed = windows_named(names).partition(" and ")
+    shown = len(listed[0].split(", ")) + 1  # "n" stands for two
+    assert listed[2] == f"{len(names) - shown} more"
