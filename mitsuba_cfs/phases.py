@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,14 +12,26 @@ from scipy import sparse
 DARK = 0.05  # share of a sky matrix's entries that are lit, below which only these are multiplied
 
 
-def times_sky(matrix: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
-    """A matrix [..., P] times a sky [P, H]; of the sun alone few patches are lit in an hour."""
-    matrix, sky = np.asarray(matrix), np.asarray(sky)
+Sky: TypeAlias = ArrayLike | sparse.csr_array  # [P, H], or of few lit patches `lit_rows` of it
+
+
+def lit_rows(sky: ArrayLike) -> NDArray[Any] | sparse.csr_array:
+    """A sky [P, H] as products take it: its lit patches in each hour [H, P] where these are few."""
+    sky = np.asarray(sky)
     if not sky.size or np.count_nonzero(sky) > DARK * sky.size:
-        return np.matmul(matrix, sky)
-    rows = np.ascontiguousarray(matrix.reshape(-1, len(sky)).T)
-    found = sparse.csr_array(sky.T) @ rows
-    return np.ascontiguousarray(found.T).reshape(*matrix.shape[:-1], sky.shape[1])
+        return sky
+    return sparse.csr_array(sky.T)
+
+
+def times_sky(matrix: ArrayLike, sky: Sky) -> NDArray[np.float64]:
+    """A matrix [..., P] times a sky [P, H]; of the sun alone few patches are lit in an hour."""
+    matrix = np.asarray(matrix)
+    lit = sky if isinstance(sky, sparse.csr_array) else lit_rows(sky)
+    if isinstance(lit, np.ndarray):
+        return np.matmul(matrix, lit)
+    hours, patches = lit.shape
+    rows = np.ascontiguousarray(matrix.reshape(-1, patches).T)
+    return np.ascontiguousarray((lit @ rows).T).reshape(*matrix.shape[:-1], hours)
 
 
 def window_radiance(daylight: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
@@ -32,7 +45,7 @@ def window_radiance(daylight: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
 
 
 def room_side_radiance(
-    transmission: Sequence[ArrayLike], daylight: ArrayLike, sky: ArrayLike
+    transmission: Sequence[ArrayLike], daylight: ArrayLike, sky: Sky
 ) -> NDArray[np.float64]:
     """Radiance that each window patch sends into the room, T D s [G, K, H].
 
@@ -71,7 +84,7 @@ def sun_beams(
     beams: Sequence[ArrayLike],
     through_sun: ArrayLike,
     direct_daylight: ArrayLike,
-    sun: ArrayLike,
+    sun: Sky,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The sun's straight beam on window patches, two ways [G, K, H].
 

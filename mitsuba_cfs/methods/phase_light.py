@@ -152,7 +152,7 @@ class PhaseLight:
             beams: Sequence = [(None, None)] * len(states)
             if self._traced.five_phase:
                 D = [self._traced.direct_daylight[q].astype(np.float32)] * len(states)
-                sun = phases.room_side_radiance(T, D, sky.sun.astype(np.float32))
+                sun = phases.room_side_radiance(T, D, sky.lit_sun.astype(np.float32))
                 beams = [sun_beam(self._traced, q, optics, self.sky) for optics in states]
             lights = zip(whole, sun, beams, strict=True)
             found.append([WindowLight(w, s, *both) for w, s, both in lights])

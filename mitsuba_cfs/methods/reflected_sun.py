@@ -195,7 +195,7 @@ class ReflectedSunLight:
         """What V T D s has of the sun that the outdoors reflect, in the sensors [S, L]."""
         if not self._found.outdoors_reflects:
             return 0.0
-        traced, straight, sun = self._found.traced, self._found.straight, self._sky.sun
+        traced, straight, sun = self._found.traced, self._found.straight, self._sky.lit_sun
         daylight = self._reflected_daylight()
         parts = traced.parts.of(g)
         light = sum(straight.rest(g, j, q) @ times_sky(daylight[q], sun) for q in parts)

@@ -128,7 +128,7 @@ class StraightViews:
         found = whole.values @ sky.whole - self._in_patches(g, j, traced.daylight.values, sky.whole)
         if traced.five_phase:
             direct = self.matrix(g, j, direct=True)
-            found -= phases.times_sky(direct.values, sky.sun)
+            found -= phases.times_sky(direct.values, sky.lit_sun)
             found += self._in_patches(g, j, traced.direct_daylight, sky.sun)
         return found
 
@@ -148,7 +148,7 @@ def sun_beam(
     traced: PhaseScene, q: int, optics: SystemOptics, sky: AnnualSky
 ) -> tuple[NDArray[np.float32] | None, ...]:
     """The sun's beam of a part [K, L] by its patches and at its own angle; None without a beam."""
-    ways, sun = [optics.scattering], np.asarray(sky.sun)
+    ways, sun = [optics.scattering], sky.lit_sun
     patches = patch_beams(ways, KLEMS_FULL)
     if not patches.any():
         return None, None

@@ -147,10 +147,11 @@ def _said(rooms: Sequence[RoomZone]) -> str:
         f"The heat of the {len(rooms)} rooms is balanced together: it flows between them through "
         f"{through:.1f} m2 of walls, floors and doors."
     )
-    if among or other:
-        text += (
-            f" Behind {among:.1f} m2 of their sides towards each other, of which no other face was "
-            f"found, and {other:.1f} m2 towards rooms that are not computed, a room of the same "
-            "temperature is taken to lie."
-        )
+    apart = {
+        "of their sides towards each other, of which no other face was found": among,
+        "towards rooms that are not computed": other,
+    }
+    behind = " and ".join(f"{area:.1f} m2 {what}" for what, area in apart.items() if area >= 0.05)
+    if behind:
+        text += f" Behind {behind} a room of the same temperature is taken to lie."
     return text

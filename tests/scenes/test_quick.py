@@ -171,8 +171,8 @@ def test_each_room_is_told_when_it_is_computed_in_their_order(three_rooms, monke
         lambda building, space, *_, **__: said.append(f"computed {space.guid}") or space,
     )  # fmt: skip
     told = lambda room: said.append(f"told {room.guid}")  # noqa: E731
-    options = replace(JobOptions(OFFICE, WEATHER), cache=False)
-    results, _, _ = job._rooms(three_rooms, None, options, lambda *_: None, told)
+    options = replace(JobOptions(OFFICE, WEATHER), cache=False, coupled_heat=False)
+    results, _, _ = job._rooms(three_rooms, None, options, lambda *_: None, on_room=told)
     assert said == [f"{what} {room}" for room in "abc" for what in ("computed", "told")]
     assert [room.guid for room in results] == ["a", "b", "c"]
 
@@ -183,19 +183,23 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
         job, "compute_room",
         lambda building, space, *_, progress, **__: progress("light", 0.5) or space,
     )  # fmt: skip
-    options = replace(JobOptions(OFFICE, WEATHER), cache=False)
+    options = replace(JobOptions(OFFICE, WEATHER), cache=False, coupled_heat=False)
     progress = lambda stage, _: seen.append((stage.number, stage.total, stage))  # noqa: E731
-    job._rooms(three_rooms, None, options, progress, lambda room: None)
+    job._rooms(three_rooms, None, options, progress, on_room=lambda room: None)
     assert seen == [(1, 3, "A: light"), (2, 3, "B: light"), (3, 3, "C: light")]
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, files, *, on_room, on_building):
-        on_room("the first room")
+    def half(options, progress, files, *, on_room, on_light, on_building):
+        on_light(first)
+        on_room(first)
+        on_room(SimpleNamespace(space=SimpleNamespace(guid="b", label="B")))
         raise DataError("the second failed")
 
     monkeypatch.setattr("scenes.run.run.run_job", half)
-    monkeypatch.setattr(run_command, "summary_line", lambda room: f"{room}: DGP 0.30")
+    first = SimpleNamespace(space=SimpleNamespace(guid="a", label="A"))
+    monkeypatch.setattr(run_command, "_light_figures", lambda room: "DGP 0.30")
+    monkeypatch.setattr(run_command, "_heat_figures", lambda room: "20 C")
     assert run([*RUN[:-1], str(tmp_path / "o"), "--quick"]) == 1
     said = capsys.readouterr()
-    assert said.out.splitlines() == [quick.NOTE, "the first room: DGP 0.30"]
+    assert said.out.splitlines() == [quick.NOTE, "A: DGP 0.30", "A: 20 C", "B: DGP 0.30, 20 C"]

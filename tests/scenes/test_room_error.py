@@ -23,7 +23,9 @@ from scenes.run import run as job
 from scenes.run.options import JobOptions
 from scenes.study import schedule
 
-OPTIONS = JobOptions(OFFICE, WEATHER, cache=False, room=RoomOptions.of(sky_subdivision=1))
+OPTIONS = JobOptions(
+    OFFICE, WEATHER, cache=False, room=RoomOptions.of(sky_subdivision=1), coupled_heat=False
+)
 
 
 def box(name: str, height: float) -> Space:

@@ -240,3 +240,10 @@ def test_product_with_the_sun_alone_is_that_with_any_sky(lit):
     found = phases.times_sky(matrix, sky)
     assert found.dtype == np.float32 and found.flags.c_contiguous
     np.testing.assert_allclose(found, np.matmul(matrix, sky), rtol=1e-5, atol=1e-6)
+    whole = AnnualSky(sky, np.zeros((50, 3)), np.zeros(50), np.arange(50), 50, sun=sky)
+    assert isinstance(whole.lit_sun, np.ndarray) == (lit == 1.0)
+    assert whole.lit_sun is whole.lit_sun
+    np.testing.assert_array_equal(phases.times_sky(matrix, whole.lit_sun), found)
+    dark = whole.part(np.arange(10))  # has its own, not that of all hours
+    few = phases.times_sky(matrix, dark.lit_sun)
+    np.testing.assert_allclose(few, found[..., :10], rtol=1e-5)
