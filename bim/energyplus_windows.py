@@ -21,8 +21,7 @@ from thermal.blackbox import Fenestration, LayerAbsorptances
 PANE = 0.001  # [m] thickness of a virtual layer
 PANE_CONDUCTIVITY = 100.0  # [W/(m K)]: a hundred-thousandth of a window's resistance
 NO_EMISSION = 1e-4  # EnergyPlus takes no 0: of the faces to the gap, whose resistance is given
-STILL = 0.009  # [m] thickest gap whose air does not flow at the differences of a window
-MOST_GAPS = 4  # of a construction in EnergyPlus
+GAPS = 3  # in every state: EnergyPlus switches between equals only
 TYPICAL = 10.0, 15.0  # mean of the layers [degC] and difference [K] where R is read: EN 673
 AIR = 2.873e-3 + 7.76e-5 * (TYPICAL[0] + 273.15)  # conductivity [W/(m K)], ISO 15099 annex B
 
@@ -116,7 +115,7 @@ def shading_control(
         "lines": [{"program_line": line} for line in (*lines, "ENDIF")]
     }
     model.setdefault("EnergyManagementSystem:ProgramCallingManager", {})[f"call_{number}"] = {
-        "energyplus_model_calling_point": "BeginTimestepBeforePredictor",
+        "energyplus_model_calling_point": "BeginZoneTimestepBeforeInitHeatBalance",
         "programs": [{"program_name": program}],
     }
 
@@ -169,10 +168,9 @@ def _pane(model: Model, front: float, back: float) -> str:
 def _gaps(model: Model, resistance: float) -> list[str]:
     """Gaps of still air that have a resistance [m2 K/W] together; it falls by 0.3 % per kelvin."""
     thickness = resistance * AIR
-    count = min(int(np.ceil(thickness / STILL)), MOST_GAPS)
-    gas, gap = "still air", f"Gap {1e3 * thickness / count:.4g} mm"
-    model.setdefault("WindowMaterial:Gas", {})[gas] = {"gas_type": "Air", "thickness": STILL}
+    gas, gap = "still air", f"Gap {1e3 * thickness / GAPS:.4g} mm"
+    model.setdefault("WindowMaterial:Gas", {})[gas] = {"gas_type": "Air", "thickness": 0.01}
     model.setdefault("WindowMaterial:Gap", {})[gap] = {
-        "thickness": thickness / count, "gas_or_gas_mixture_": gas, "pressure": 101325.0,
+        "thickness": thickness / GAPS, "gas_or_gas_mixture_": gas, "pressure": 101325.0,
     }  # fmt: skip
-    return [gap] * count
+    return [gap] * GAPS
