@@ -6,7 +6,6 @@ import numpy as np
 import shapely
 import shapely.ops
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from bim.model import Space
@@ -50,6 +49,8 @@ def _closed(edges: NDArray[np.float64]) -> NDArray[np.float64]:
     balance -= np.bincount(ends[:, 0], minlength=len(points))
     last, first = (np.repeat(np.arange(len(points)), np.maximum(s * balance, 0)) for s in (1, -1))
     apart = np.linalg.norm(points[last][:, None] - points[first], axis=-1)
+    from scipy.optimize import linear_sum_assignment  # half a second
+
     chosen, to = linear_sum_assignment(apart)
     gaps = np.column_stack([last[chosen], first[to]])
     return points[np.concatenate([ends, gaps])]

@@ -24,6 +24,7 @@ ROUGHNESS = {  # DOE-2 roughness multiplier R_f; EnergyPlus Engineering Referenc
     "smooth": 1.11,
     "very smooth": 1.0,
 }
+OUTSIDE_ABSORPTANCE = 0.6  # solar, of what faces outdoors where nothing is known
 OUTSIDE = ("outdoor", "ground", "known", "adiabatic", "twin")
 
 
@@ -67,7 +68,7 @@ class OpaqueSurface:
     emissivity_in: float = 0.9
     emissivity_out: float = 0.9
     absorptance_in: float = 0.5  # solar, used where transmitted sunlight is distributed
-    absorptance_out: float = 0.6  # solar
+    absorptance_out: float = OUTSIDE_ABSORPTANCE  # solar
     roughness: str = "medium rough"
     height: float = 1.5  # [m] of the centroid above the ground outside, for the wind profile
     beyond_c: NDArray[np.float64] | float | None = None  # [H] or [T] of the outer face, "known"
@@ -103,7 +104,7 @@ class WindowElement:
     glazing_height: float = 1.5  # [m] for the inside film (ISO 15099)
     frame_area: float = 0.0  # [m2]
     frame_u: float = 2.0  # [W/(m2 K)] with the films 0.04 and 0.13 m2 K/W
-    frame_absorptance: float = 0.6  # solar, outside
+    frame_absorptance: float = OUTSIDE_ABSORPTANCE  # solar, outside
     height: float = 1.75  # [m] of the centroid above the ground outside
 
     def __post_init__(self) -> None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, polarised_values
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
@@ -75,6 +74,8 @@ class AngularTable:
         angles = self.theta
         if angles[-1] < np.pi / 2 - 1e-9:
             angles, values = np.append(angles, np.pi / 2), np.append(values, end)
+        from scipy.interpolate import PchipInterpolator  # a second, for tables only
+
         return np.clip(PchipInterpolator(angles, values)(np.minimum(theta, angles[-1])), 0, 1)
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from mitsuba_cfs.bsdf.glazing import uncoated_values
 from mitsuba_cfs.bsdf.klems import KlemsBasis
@@ -86,6 +85,8 @@ def specular_exponent(peak: ThroughPeak, basis: KlemsBasis) -> float | None:
 
     if excess(0.0) <= 0 or excess(STEEPEST) >= 0:
         return None
+    from scipy.optimize import brentq  # half a second, for specular systems only
+
     return float(brentq(excess, 0.0, STEEPEST, xtol=1e-6))
 
 

@@ -6,7 +6,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.surfaces import Surfaces
@@ -93,6 +92,8 @@ class _Plan:
     def numbers(self, part: int) -> FloatArray:
         """Numbers [n, 4] in [0, 1) of one part."""
         generator = np.random.default_rng([self._seed, part])
+        from scipy.stats import qmc  # a second, where factors are traced and not found
+
         return qmc.Sobol(4, seed=generator).random_base2(self._power)
 
 

@@ -11,6 +11,11 @@ import click
 from scenes.commands.parameters import FILE
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from bim.energyplus_twin import EnergyPlusTwin
+    from scenes.heat.study import BalancedRooms, ThermalYear
+    from scenes.heat.study_file import StudyFile
     from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
 from scenes.commands.quick_option import quick_option
@@ -21,8 +26,12 @@ from scenes.commands.room_options import out_folder_option
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
 @click.option("--figures", is_flag=True, help="A figure of each room's year as SVG.")
+@click.option(
+    "--energyplus", is_flag=True,
+    help="The same rooms as an input of EnergyPlus too (model.epJSON, schedules.csv).",
+)  # fmt: skip
 @quick_option
-def command(study: Path, out: Path, figures: bool, quick: bool) -> None:
+def command(study: Path, out: Path, figures: bool, energyplus: bool, quick: bool) -> None:
     """Gains, temperatures, loads and comfort of rooms, hour by hour.
 
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
@@ -47,11 +56,14 @@ def command(study: Path, out: Path, figures: bool, quick: bool) -> None:
 
     if quick:
         click.echo(quick_run.NOTE)
+    twins: list[EnergyPlusTwin] = []
+    balanced = _twin_taken(parsed, twins) if energyplus else None
     with ProgressBar() as progress, compiled_beside():
-        rooms, notes = run_study(parsed, progress, files)
-    notes = (*[quick_run.NOTE] * quick, *notes)
+        rooms, notes = run_study(parsed, progress, files, balanced=balanced)
+    in_twin = (f"model.epJSON: {note}." for twin in twins for note in twin.notes)
+    notes = (*[quick_run.NOTE] * quick, *notes, *in_twin)
     record = {"quick": quick, "study": parsed.model_dump(mode="json"), "notes": list(notes)}
-    _write(rooms, record, folder, figures=figures)
+    _write(rooms, record, folder, figures=figures, twins=twins)
     for room in rooms:
         summary = room.summary
         click.echo(
@@ -65,7 +77,22 @@ def command(study: Path, out: Path, figures: bool, quick: bool) -> None:
     click.echo(f"results: {out}")
 
 
-def _write(rooms, record: dict, results: ResultFolder, *, figures: bool) -> None:
+def _twin_taken(study: StudyFile, twins: list[EnergyPlusTwin]) -> Callable[[BalancedRooms], None]:
+    """What puts the EnergyPlus model of balanced rooms into a list; checks the study now."""
+    from scenes.heat.energyplus import check_twin, energyplus_twin
+
+    check_twin(study)
+    return lambda found: twins.append(energyplus_twin(study, found))
+
+
+def _write(
+    rooms: Sequence[ThermalYear],
+    record: dict,
+    results: ResultFolder,
+    *,
+    figures: bool,
+    twins: Sequence[EnergyPlusTwin],
+) -> None:
     """All files of a study."""
     import pandas as pd
 
@@ -91,4 +118,6 @@ def _write(rooms, record: dict, results: ResultFolder, *, figures: bool) -> None
         write_table(months, folder / "discomfort_by_month.csv")
         energy = pd.concat({r.name: r.energy for r in rooms}, names=["room"])
         write_table(energy.round(4), folder / "energy_by_month.csv")
+        for twin in twins:
+            twin.write(folder)
         write_text(folder / "run.json", json.dumps(record, indent=2) + "\n")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from bim.building_file import ReadOptions, read_building_file
 from bim.model import Building, Space
@@ -53,22 +54,33 @@ class ThermalYear:
 
 
 @dataclass(frozen=True, slots=True)
-class _Balanced:
-    """Rooms as they were balanced."""
+class BalancedRooms:
+    """The rooms of a study as they were balanced."""
 
+    building: Building
     rooms: Sequence[RoomZone]
+    weather: Weather
+    in_windows: Mapping[str, States]  # by window GUID
     results: list[ZoneResult]
     humidity: list[Humidity]
     notes: tuple[str, ...]  # what had to be assumed
     design: pd.DataFrame | None
+    air_links: NDArray[np.float64] | None = None  # [Z, Z] between the rooms, each way [m3/s]
+    transfers: Sequence[AirTransfer] = ()
 
 
 def run_study(
-    study: StudyFile, progress: Progress, files: HeatFiles | None = None
+    study: StudyFile,
+    progress: Progress,
+    files: HeatFiles | None = None,
+    *,
+    balanced: Callable[[BalancedRooms], object] | None = None,
 ) -> tuple[list[ThermalYear], tuple[str, ...]]:
     """The rooms of a study, and what had to be assumed.
 
-    Args: files: what `read_files` has read of the study; read now without.
+    Args:
+        files: what `read_files` has read of the study; read now without.
+        balanced: called with the rooms as they were balanced.
     """
     files = files or read_files(study)
     weather = files.weather
@@ -104,7 +116,9 @@ def run_study(
         rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
         radiants.append(radiant)
         steps("heat", 1.0)
-    found = _balanced(study, building, rooms, weather, progress)
+    found = _balanced(study, building, rooms, weather, progress, in_windows=in_windows)
+    if balanced is not None:
+        balanced(found)
     notes |= dict.fromkeys(found.notes)
     years = []
     for room, result, humidity, radiant in zip(
@@ -137,7 +151,9 @@ def _balanced(
     rooms: Sequence[RoomZone],
     weather: Weather,
     progress: Progress,
-) -> _Balanced:
+    *,
+    in_windows: Mapping[str, States],
+) -> BalancedRooms:
     """The rooms' years: together where the study couples them, else one by one."""
     step_s, notes = study.options.heat_step_s, ()
     progress("heat balance", 0.0)
@@ -159,7 +175,10 @@ def _balanced(
             )
         progress("heat balance", (number + 1) / len(groups))
     table = pd.concat(design, ignore_index=True) if design else None
-    return _Balanced(rooms, results, moist, notes, table)
+    return BalancedRooms(
+        building, rooms, weather, in_windows, results, moist, notes, table,
+        **(groups[0][1] if study.couple else {}),
+    )  # fmt: skip
 
 
 def _transfers(

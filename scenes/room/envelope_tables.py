@@ -10,7 +10,7 @@ from scenes import plausible
 from scenes.room.schedules import OrSchedule
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.ground import SHIELDS, SOILS
-from thermal.zone import ROUGHNESS
+from thermal.zone import OUTSIDE_ABSORPTANCE, ROUGHNESS
 
 KINDS = ("slab", "suspended", "basement", "unheated basement")
 
@@ -92,7 +92,7 @@ class EnvelopeTable(TomlTable):
     neighbour: tuple[NeighbourTable, ...] = ()
     bridge: tuple[BridgeTable, ...] = ()
     # of all that faces outdoors, frames apart
-    outside_absorptance: Share = 0.6  # solar
+    outside_absorptance: Share = OUTSIDE_ABSORPTANCE  # solar
     outside_roughness: Literal[tuple(ROUGHNESS)] = "medium rough"  # DOE-2, for the outside film
     frame_u: Annotated[Positive, plausible.FRAME_U] | None = None  # with films 0.13 and 0.04
     frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.progress import Progress
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.evidence.benchmarks.harness import Comparison, PeerMissing, Run
-from scenes.evidence.validation import energyplus_model, reference_room
+from scenes.evidence.validation import energyplus_model, energyplus_run, reference_room
 from scenes.evidence.validation.ashrae140_sun import ANGLES, PANE, glass
 from scenes.evidence.validation.energyplus_cases import STEPS, Site, simulate_case
 from scenes.evidence.validation.facade_sun import facade_sun, sun_steps
@@ -75,7 +75,7 @@ def energyplus_year(orientation: str) -> tuple[Clock, pd.DataFrame]:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         hours = energyplus_model.run_energyplus(energyplus_room(orientation), EPW, place)
-        elapsed, processor = (place / energyplus_model.TIME_FILE).read_text().split()
+        elapsed, processor = (place / energyplus_run.TIME_FILE).read_text().split()
     return Clock(float(elapsed), float(processor)), hours
 
 

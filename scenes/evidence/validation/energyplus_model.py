@@ -6,14 +6,13 @@ Only the peer program runs here (pyenergyplus); parameters are those of `referen
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from scenes.evidence.validation.energyplus_run import run_model
 from scenes.evidence.validation.reference_room import ORIENTATIONS
 
 Model = dict[str, dict[str, dict[str, Any]]]
@@ -32,7 +31,6 @@ OUTPUTS = {
     "WINDOW:Surface Outside Face Incident Solar Radiation Rate per Area": "I_inc",
     "WINDOW:Surface Window Transmitted Solar Radiation Rate": "Q_trans",
 }
-TIME_FILE = "seconds.txt"  # elapsed and processor seconds of EnergyPlus, beside its results
 _BOX = {  # vertices counter-clockwise from outside, upper left first
     "FACADE": ("Wall", [(0, 0, 3), (0, 0, 0), (4, 0, 0), (4, 0, 3)]),
     "X0": ("Wall", [(0, 5, 3), (0, 5, 0), (0, 0, 0), (0, 0, 3)]),
@@ -367,24 +365,9 @@ def run_energyplus(
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary) if folder is None else folder
         place.mkdir(parents=True, exist_ok=True)
-        (place / "in.epJSON").write_text(json.dumps(model))
-        code = (
-            "import pathlib, sys, time\nfrom pyenergyplus.api import EnergyPlusAPI\n"
-            "api = EnergyPlusAPI()\nstate = api.state_manager.new_state()\n"
-            "api.runtime.set_console_output_status(state, False)\n"
-            "start, wall = time.process_time(), time.perf_counter()\n"
-            "code = api.runtime.run_energyplus(state, sys.argv[1:])\n"
-            "took = f'{time.perf_counter() - wall} {time.process_time() - start}'\n"
-            f"pathlib.Path(sys.argv[4], {TIME_FILE!r}).write_text(took)\nsys.exit(code)\n"
-        )
-        arguments = ["-w", str(epw), "-d", str(place), str(place / "in.epJSON")]
-        command = [sys.executable, "-c", code, *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        report = place / "eplusout.err"
-        if done.returncode != 0:
-            text = report.read_text() if report.exists() else done.stderr
-            raise RuntimeError(f"EnergyPlus stopped: {text[-1500:]}")
-        return _read(place / "eplusout.csv", OUTPUTS if outputs is None else outputs)
+        written = place / "in.epJSON"
+        written.write_text(json.dumps(model))
+        return _read(run_model(written, epw), OUTPUTS if outputs is None else outputs)
 
 
 def _read(path: Path, outputs: dict[str, str]) -> pd.DataFrame:

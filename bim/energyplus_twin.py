@@ -1,0 +1,368 @@
+"""The rooms of a study as EnergyPlus computes them: the whole model, zone by zone.
+
+Coupled zones, what lies behind every face, both faces' absorptances, gains, air and set points of
+every hour, the ground's temperatures, windows by their BSDF and what stands before them.  The sun
+and what becomes of it indoors are EnergyPlus' own.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.energyplus_operation import (
+    FILE,
+    HOURS,
+    Schedules,
+    ideal_plant,
+    internal_heat,
+    outdoor_air,
+)
+from bim.energyplus_parts import (
+    NEAR,
+    FaceFinish,
+    Model,
+    Ring,
+    flat_outlines,
+    model_frame,
+    object_name,
+    opaque_construction,
+    opaque_surface,
+    outlines,
+    rectangle,
+    vertices,
+    window_rectangles,
+    window_surface,
+)
+from bim.energyplus_windows import WindowOptics, complex_state, shading_control
+from bim.model import Building, Element, Face, Space
+from bim.planes import Facet, planar_facets, triangulated
+from bim.rays import hemisphere, ray_mesh
+from bim.to_thermal import OFF_THE_WALL, ThermalRoom
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_text
+from thermal.climate import Climate
+from thermal.ventilation import AirTransfer
+from thermal.zone import OpaqueSurface, Zone
+
+LEAST_SHADE = 0.05  # [m2] smaller plane parts of what stands outdoors shade nothing
+LEAST_SURFACE = 1e-3  # [m2]
+RAYS = 400  # from each point, to what may shade it
+TERRAINS = {"suburbs": "Suburbs", "country": "Country", "city": "City"}
+OUTPUTS = (
+    "Zone Mean Air Temperature",
+    "Zone Ideal Loads Zone Sensible Heating Rate",
+    "Zone Ideal Loads Zone Sensible Cooling Rate",
+    "Surface Window Transmitted Solar Radiation Rate",
+    "Surface Outside Face Incident Solar Radiation Rate per Area",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TwinRoom:
+    """A room as it was balanced, with what its windows are."""
+
+    space: Space
+    room: ThermalRoom
+    optics: Mapping[str, Sequence[WindowOptics]]  # by window GUID, in each shading state
+    state: NDArray[np.int64]  # [H] shading state
+
+    @property
+    def zone(self) -> Zone:
+        """The zone of the room."""
+        return self.room.zone
+
+
+@dataclass(frozen=True, slots=True)
+class TwinAir:
+    """Air that passes between rooms."""
+
+    links: NDArray[np.float64] | None = None  # [Z, Z] each way [m3/s]
+    transfers: Sequence[AirTransfer] = ()  # one way
+
+
+class EnergyPlusTwin:
+    """A model of rooms, and what it leaves out of ours."""
+
+    def __init__(
+        self,
+        building: Building,
+        rooms: Sequence[TwinRoom],
+        climate: Climate,
+        *,
+        air: TwinAir | None = None,
+        terrain: str = "suburbs",
+        steps: int = 6,
+    ) -> None:
+        """See the module; steps: of an hour.
+
+        Raises: `DataError` for a part of a year.
+        """
+        if climate.hours != HOURS:
+            raise DataError(f"EnergyPlus takes a year of hours, got {climate.hours} rows")
+        self.model = _whole_year(building.name, terrain, steps)
+        self.schedules = Schedules(self.model)
+        self.climate, self.rooms = climate, rooms
+        self.notes: dict[str, None] = {}
+        self._states: dict[int, str] = {}
+        self.zones = [f"Z{k} {object_name(r.zone.name)}" for k, r in enumerate(rooms)]
+        for zone, room in zip(self.zones, rooms, strict=True):
+            self._zone(zone, room)
+        self._air_between(air or TwinAir())
+        own = {window.guid for room in rooms for window in room.space.windows}
+        others = [element for element in building.elements if element.guid not in own]
+        shades(self.model, others, *_lookouts(rooms))
+        if others:
+            self.notes["what stands outdoors shades, but reflects nothing"] = None
+
+    def write(self, folder: Path) -> tuple[Path, ...]:
+        """Write the model and its schedules into a folder; the files."""
+        model = folder / "model.epJSON"
+        write_text(model, json.dumps(self.model, indent=1))
+        table = self.schedules.csv()
+        if not table:
+            return (model,)
+        write_text(folder / FILE, table)
+        return model, folder / FILE
+
+    def _zone(self, zone: str, room: TwinRoom) -> None:
+        one, model = room.zone, self.model
+        model["Zone"][zone] = {
+            "volume": one.volume, "floor_area": max(room.space.floor_area, 0.01),
+        }  # fmt: skip
+        if one.air_capacity_factor != 1.0:
+            self.notes[f"{one.name}: the air's capacity factor is left out"] = None
+        for index, surface in enumerate(one.surfaces):
+            at = room.room.surface_of_face == index
+            faces = [face for face, here in zip(room.space.faces, at, strict=True) if here]
+            if faces[0].kind != "window frame":
+                self._surface(zone, f"{zone} S{index}", surface, faces)
+        for index in range(len(one.windows)):
+            self._window(zone, room, index)
+        internal_heat(model, zone, one.gains, self.schedules)
+        notes = outdoor_air(model, zone, one, self.schedules)
+        notes += ideal_plant(model, zone, one.loads, self.schedules)
+        self.notes |= dict.fromkeys(notes)
+
+    def _surface(self, zone: str, name: str, surface: OpaqueSurface, faces: Sequence[Face]) -> None:
+        """A surface of the balance: its faces, or a rectangle of its area where rooms share it."""
+        kind = _kind(surface)
+        construction, outside, extra = self._construction(name, surface)
+        biggest = max(faces, key=lambda face: face.area)
+        if surface.partner or biggest.kind == "reveal":
+            rings = [rectangle(biggest.triangles, surface.normal, surface.area)]
+        else:
+            rings = [ring for face in faces for ring in outlines(face, gap=NEAR, convex=True)]
+        if outside == "Outdoors":
+            rings = [
+                ring + surface.normal * (biggest.construction.thickness + OFF_THE_WALL)
+                for ring in rings
+            ]
+        written = self.model["BuildingSurface:Detailed"]
+        rings = [ring for ring in rings if _area(ring) > LEAST_SURFACE]
+        for part, ring in enumerate(rings):
+            label = name if len(rings) == 1 else f"{name}.{part}"
+            written[label] = opaque_surface(kind, construction, zone, outside, ring) | extra
+
+    def _construction(self, name: str, surface: OpaqueSurface) -> tuple[str, str, dict[str, str]]:
+        """Construction and boundary condition of a surface, and what belongs to it."""
+        layers, outside, extra = list(surface.layers), "Adiabatic", {}
+        outer = FaceFinish(
+            surface.absorptance_out, surface.emissivity_out,
+            surface.roughness.title().replace(" ", ""),
+        )  # fmt: skip
+        inner = FaceFinish(surface.absorptance_in, surface.emissivity_in)
+        if surface.outside == "outdoor":
+            outside = "Outdoors"
+        elif surface.outside in ("ground", "known"):
+            outside = "OtherSideCoefficients"
+            ground = surface.outside == "ground"
+            beyond = self.climate.ground_c if ground else surface.beyond_c
+            label = "ground C" if ground else f"{name} beyond C"
+            extra = {"outside_boundary_condition_object": self._known_face(label, beyond)}
+        elif surface.partner:
+            outside = "Surface"
+            number = next(k for k, r in enumerate(self.rooms) if r.zone.name == surface.outside)
+            beside = self.rooms[number].zone
+            index = beside.index_of(surface.partner)
+            other = beside.surfaces[index]
+            extra = {"outside_boundary_condition_object": f"{self.zones[number]} S{index}"}
+            outer = FaceFinish(other.absorptance_in, other.emissivity_in)
+            if extra["outside_boundary_condition_object"] in self._surfaces_so_far():
+                layers = list(other.layers[::-1])  # those of the earlier room, as in the balance
+        elif surface.outside == "adiabatic":
+            layers = [*layers[::-1], *layers]  # alike on both sides: no heat passes the middle
+            outer = inner
+        else:
+            outer = inner
+        found = opaque_construction(self.model, layers, outer, inner, surface.name)
+        return found, outside, extra
+
+    def _surfaces_so_far(self) -> Mapping[str, object]:
+        return self.model["BuildingSurface:Detailed"]
+
+    def _known_face(self, label: str, beyond) -> str:
+        """Name of the condition that an outer face has a known temperature."""
+        schedule = self.schedules.name(label, beyond)
+        self.model.setdefault("SurfaceProperty:OtherSideCoefficients", {})[schedule] = {
+            "combined_convective_radiative_film_coefficient": 0.0,
+            "constant_temperature_coefficient": 1.0,
+            "constant_temperature_schedule_name": schedule,
+        }
+        return schedule
+
+    def _window(self, zone: str, room: TwinRoom, index: int) -> None:
+        """A window in its frame, with its constructions."""
+        window, name = room.space.windows[index], f"{zone} W{index}"
+        glass, opening = window_rectangles(window)
+        frame = _frame_surface(room, window.normal)
+        construction, _, _ = self._construction(f"{name} frame", frame)
+        parent = f"{name} frame"
+        self.model["BuildingSurface:Detailed"][parent] = opaque_surface(
+            "Roof" if window.normal[2] > 0.5 else "Wall", construction, zone, "Outdoors", opening
+        )
+        states = [self._state(optics) for optics in room.optics[window.guid]]
+        self.model["FenestrationSurface:Detailed"][name] = window_surface(states[0], parent, glass)
+        held = np.minimum(room.state, len(states) - 1)
+        if np.any(held):
+            schedule = self.schedules.name(f"{name} state", held)
+            number = len(self.model.get("EnergyManagementSystem:Sensor", {}))
+            shading_control(self.model, name, schedule, states, number)
+
+    def _state(self, optics: WindowOptics) -> str:
+        """Name of the construction of a system in a state, written once."""
+        if id(optics) not in self._states:
+            name = f"System {len(self._states)}"
+            complex_state(self.model, name, optics)
+            self._states[id(optics)] = name
+            self.notes |= dict.fromkeys(optics.simplified)
+        return self._states[id(optics)]
+
+    def _air_between(self, air: TwinAir) -> None:
+        """The air that passes between the zones."""
+        links = np.zeros((len(self.zones),) * 2) if air.links is None else air.links
+        flows = [(a, b, links[a, b]) for a, b in np.argwhere(links > 0)]
+        names = [room.zone.name for room in self.rooms]
+        flows += [(names.index(t.source), names.index(t.target), t.flow) for t in air.transfers]
+        for number, (source, target, flow) in enumerate(flows):
+            self.model.setdefault("ZoneMixing", {})[f"air {number}"] = {
+                "zone_or_space_name": self.zones[target],
+                "source_zone_or_space_name": self.zones[source],
+                "schedule_name": self.schedules.name(f"air {number} m3/s", flow),
+                "design_flow_rate_calculation_method": "Flow/Zone",
+                "design_flow_rate": 1.0,
+            }
+
+
+def shades(model: Model, elements: Sequence[Element], points: Ring, normals: Ring) -> None:
+    """What is seen of the elements outdoors, in plane parts that reflect nothing.
+
+    Args: points, normals: [N, 3] before the windows and the outer walls.
+    """
+    facets = [
+        (number, facet)
+        for number, element in enumerate(elements)
+        for facet in planar_facets(element.triangles)
+        if facet.polygon.area > LEAST_SHADE
+    ]
+    shading = model.setdefault("Shading:Building:Detailed", {})
+    for index in _seen([facet for _, facet in facets], points, normals):
+        number, facet = facets[index]
+        rings = flat_outlines(facet.polygon, NEAR, convex=True)
+        for part, ring in enumerate(rings):
+            corners = vertices(facet.plane.to_world(ring))
+            shading[f"E{number}.{index}.{part}"] = {"vertices": corners}
+
+
+def _seen(facets: Sequence[Facet], points: Ring, normals: Ring) -> list[int]:
+    """The facets that rays from points into the half space of their normals meet first."""
+    pieces = [f.plane.to_world(triangulated(f.polygon).reshape(-1, 2)) for f in facets]
+    if not pieces or not len(points):
+        return []
+    mesh = ray_mesh(np.concatenate(pieces).reshape(-1, 3, 3))
+    owner = np.repeat(np.arange(len(pieces)), [len(piece) // 3 for piece in pieces])
+    found: set[int] = set()
+    for point, normal in zip(points, normals, strict=True):
+        rays = hemisphere(normal, RAYS)
+        _, hit = mesh.first_hits(np.tile(point, (len(rays), 1)), rays)
+        found |= set(owner[hit[hit >= 0]].tolist())
+    return sorted(found)
+
+
+def _lookouts(rooms: Sequence[TwinRoom]) -> tuple[Ring, Ring]:
+    """Points [N, 3] before the corners and middles of windows and before the outer walls."""
+    points, normals = [], []
+    for room in rooms:
+        for window in room.space.windows:
+            glass, _ = window_rectangles(window)
+            spread = [window.centre + 0.9 * (corner - window.centre) for corner in glass]
+            points += [p + 0.01 * window.normal for p in (window.centre, *spread)]
+            normals += [window.normal] * (1 + len(glass))
+        points += list(room.room.outdoor_points)
+        normals += list(room.room.outdoor_normals)
+    return np.array(points).reshape(-1, 3), np.array(normals).reshape(-1, 3)
+
+
+def _whole_year(name: str, terrain: str, steps: int) -> Model:
+    """The frame of a model that is to be compared hour by hour."""
+    model = model_frame(name)
+    building = next(iter(model["Building"].values()))
+    building |= {
+        "terrain": TERRAINS[terrain],
+        "loads_convergence_tolerance_value": 0.01,
+        "temperature_convergence_tolerance_value": 0.01,
+        "maximum_number_of_warmup_days": 200,
+        "minimum_number_of_warmup_days": 6,
+    }
+    year = model["RunPeriod"]["year"]
+    year |= {
+        f"use_weather_file_{what}": "No"
+        for what in ("daylight_saving_period", "holidays_and_special_days",
+                     "rain_indicators", "snow_indicators")
+    }  # fmt: skip
+    return model | {
+        "Timestep": {"steps": {"number_of_timesteps_per_hour": steps}},
+        "SurfaceConvectionAlgorithm:Inside": {"one": {"algorithm": "TARP"}},
+        "SurfaceConvectionAlgorithm:Outside": {"one": {"algorithm": "DOE-2"}},
+        "OutputControl:Files": {"one": {"output_csv": "Yes"}},
+        "Output:Variable": {
+            f"out {k}": {"key_value": "*", "variable_name": what, "reporting_frequency": "Hourly"}
+            for k, what in enumerate(OUTPUTS)
+        },
+    }
+
+
+def _kind(surface: OpaqueSurface) -> str:
+    """EnergyPlus' type of a surface, by its normal."""
+    up = surface.normal[2]
+    if up < -0.7:
+        return "Floor"
+    if up > 0.5:
+        return "Roof" if surface.outside == "outdoor" else "Ceiling"
+    return "Wall"
+
+
+def _frame_surface(room: TwinRoom, normal: NDArray[np.float64]) -> OpaqueSurface:
+    """The surface of the balance that the frame of a window belongs to.
+
+    Raises: `DataError` where nothing of the room faces outdoors that way.
+    """
+    kinds = [room.space.faces[int(np.argmax(room.room.surface_of_face == i))].kind
+             for i in range(len(room.zone.surfaces))]  # fmt: skip
+    fits = [
+        (kind != "window frame", -float(one.normal @ normal), i)
+        for i, (kind, one) in enumerate(zip(kinds, room.zone.surfaces, strict=True))
+        if one.outside == "outdoor"
+    ]
+    if not fits:
+        raise DataError("has a window and nothing else outdoors", element=room.space.label)
+    return room.zone.surfaces[min(fits)[2]]
+
+
+def _area(ring: NDArray[np.float64]) -> float:
+    return 0.5 * float(np.linalg.norm(np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)))

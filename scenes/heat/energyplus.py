@@ -1,0 +1,50 @@
+"""A study's rooms as EnergyPlus computes them, beside the study's own results."""
+
+from __future__ import annotations
+
+from bim.energyplus_twin import EnergyPlusTwin, TwinAir, TwinRoom
+from bim.energyplus_windows import WindowOptics
+from mitsuba_cfs.errors import DataError
+from scenes.fenestration.systems import FenestrationSystem
+from scenes.fenestration.thermal_system import thermal_system
+from scenes.heat.study import BalancedRooms
+from scenes.heat.study_file import StudyFile
+from scenes.room.zone import climate
+
+
+def check_twin(study: StudyFile) -> None:
+    """Raise `DataError` for a study that EnergyPlus cannot be given."""
+    if study.measured is not None:
+        raise DataError("EnergyPlus needs an EPW file", file=study.weather, field="measured")
+
+
+def energyplus_twin(study: StudyFile, found: BalancedRooms) -> EnergyPlusTwin:
+    """The model of a study's rooms as they were balanced.
+
+    Raises: `DataError` for what EnergyPlus cannot take.
+    """
+    optics: dict[int, WindowOptics] = {}
+    rooms = []
+    for room in found.rooms:
+        windows = {w.guid: found.in_windows[w.guid] for w in room.space.windows}
+        for system in (one for states in windows.values() for one in states):
+            optics.setdefault(id(system), _optics(system))
+        of_window = {
+            guid: [optics[id(system)] for system in states] for guid, states in windows.items()
+        }
+        rooms.append(TwinRoom(room.space, room.room, of_window, room.state))
+    return EnergyPlusTwin(
+        found.building,
+        rooms,
+        climate(found.weather),
+        air=TwinAir(found.air_links, found.transfers),
+        terrain=study.terrain,
+        steps=60 // study.step_minutes,
+    )
+
+
+def _optics(system: FenestrationSystem) -> WindowOptics:
+    heat = thermal_system(system)
+    return WindowOptics(
+        system.solar, system.visible, heat.fenestration, heat.absorptances, heat.back_absorptance
+    )
