@@ -36,7 +36,6 @@ CELL_SHARE = 0.06  # paths of the cells that a group's parts follow from, of tho
 EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room, in each batch
 OUTDOOR_SHARE = 4  # ... that looks outdoors: few meet a mirrored sun, and they are short
 PART_BATCHES = 2  # of D where groups are cut
-PART_SHARE = 2  # paths of all parts of a group for D, for each of a whole group
 INNER_PART = 0.75  # of glass between rooms, about: in the room beyond D changes along it [m]
 INNER_SHARE = 8  # paths of a patch for D, for each of a part of glass between rooms
 
@@ -263,8 +262,8 @@ class PhaseScene:
         chosen, groups = self.sampling, self.scene.outdoor_groups
         parts = self.parts.groups[: self.parts.outdoors(self.scene)]
         samples, batches = chosen.patch_samples, BATCHES
-        if len(parts) > len(groups):
-            samples = PART_SHARE * samples * len(groups) // len(parts)
+        if len(parts) > len(groups):  # at about the cost of the whole groups
+            samples = samples * len(groups) // len(parts)
             batches = PART_BATCHES
         return daylight_matrix(
             self.scene.exterior if exterior is None else exterior,

@@ -54,7 +54,11 @@ class SunShares:
 
     @classmethod
     def of(cls, met: Sequence[_Met], rows: int, seed: int) -> SunShares:
-        """From what paths met: one of each run of near places, drawn by weight, stands for all."""
+        """From what paths met: one of each run of near places, drawn by weight, stands for all.
+
+        The weights are shares of each row's: a sensor in the depth has as many places as one that
+        sees more.
+        """
         places = Places.joined([m.places for m in met])
         row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
         weight = np.concatenate([np.empty(0), *(m.weight for m in met)])
@@ -63,7 +67,8 @@ class SunShares:
             rough = _few(RoughFaces.joined([part for m in met for part in m.rough]))
         if not len(weight):
             return cls(places, sparse.csr_array((rows, 0)), rough)
-        run, chosen = _runs(places, weight, np.random.default_rng(seed))
+        of_row = weight / np.bincount(row, weight, rows)[row]
+        run, chosen = _runs(places, of_row, np.random.default_rng(seed))
         few = places.some(chosen)
         share = sparse.csr_array(sparse.coo_array((weight, (row, run)), shape=(rows, len(chosen))))
         return cls(few, share, rough)

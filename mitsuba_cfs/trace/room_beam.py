@@ -32,7 +32,7 @@ from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 CELLS = 4096  # into which the surfaces' area is divided, about, on either side
 WIDER = 2  # edge of the cells that light is reflected between, in edges of those
 AREA_POINTS = 2**18  # by which the cells' areas are counted
-CELL_RAYS = 64  # from each cell, in each batch
+CELL_RAYS = 128  # from each cell, in each batch
 LAST = 1e-4  # share of a sensor's light by the last reflection that is counted
 BOUNCES = 256  # at most; light falls to `LAST` before in all but white rooms
 WINDOW_POINTS = 256  # on each group in each batch, that the sun is followed from

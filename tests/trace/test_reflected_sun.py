@@ -102,6 +102,21 @@ def test_each_place_stands_for_those_of_its_own_face():
     assert dark.max() < 1e-3 * sunlit.mean()  # the wall's own thousandth of it
 
 
+def test_a_row_with_little_light_has_as_many_places_as_one_with_much():
+    """A sensor in the depth had a twentieth of the places of one by the window, and their noise."""
+    from mitsuba_cfs.trace.reflected_sun import PLACES, SunShares, _Met
+    from mitsuba_cfs.trace.sun_paths import Places
+
+    count = 8192
+    points = np.random.default_rng(0).random((2 * count, 3)) * [1, 1, 0]
+    points[count:, 0] += 5.0
+    up = np.tile(np.float32([0, 0, 1]), (2 * count, 1))
+    row, weight = np.repeat([0, 1], count), np.repeat([1.0, 0.02], count)
+    found = SunShares.of([_Met(row, weight, Places(points.astype(np.float32), up), [])], 2, 0)
+    assert found.share.sum(axis=1) == pytest.approx([count, 0.02 * count])
+    assert np.diff(found.share.indptr) == pytest.approx([PLACES / 2, PLACES / 2], rel=0.05)
+
+
 def test_what_stands_before_the_sun_leaves_a_floor_dark():
     from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
     from mitsuba_cfs.trace.scene import TracedScene
