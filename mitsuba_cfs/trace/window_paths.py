@@ -25,6 +25,11 @@ class WindowPaths:
     outward: mi.Vector3f  # world direction in the patch, outdoors
     generator: mi.PCG32
 
+    def inward(self, tracer: TracedScene) -> mi.Vector3f:
+        """World direction in the room: a back's patch lies before it as the front's, mirrored."""
+        normal = tracer.exterior_normal(self.group)
+        return mi.Vector3f(self.outward - normal * (2 * dr.dot(normal, self.outward)))
+
 
 def window_batches(
     tracer: TracedScene,
