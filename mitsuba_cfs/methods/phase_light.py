@@ -233,22 +233,25 @@ class PhaseLight:
                 added = self._by_outdoors(optics, through, hours)
                 luminance = luminance + added.reshape(luminance.shape)
             if mirrored.reflects(optics):
-                luminance = luminance + mirrored.windows(optics, luminance)
+                in_sun = self._in_sun(rows, hours) if traced.five_phase else None
+                luminance = luminance + mirrored.windows(optics, luminance, in_sun)
         if not traced.five_phase:
             return matrices.three_phase(luminance)
         sun, seen = self.filled.seen_sun(tuple(int(j) for j in state))
         found = FivePhasePictures(
-            matrices,
-            sun,
-            luminance,
-            self._window_luminance("sun", rows, hours),
-            sky.direction[hours],
-            sky.illuminance[hours],
+            matrices, sun, luminance, self._window_luminance("sun", rows, hours),
+            sky.direction[hours], sky.illuminance[hours],
             beam=self._window_luminance("beam", rows, hours),
-        )
+        )  # fmt: skip
         outdoors = daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
         found.show_outdoors(seen, *outdoors, light=self.filled.beam_light(tuple(map(int, state))))
         return found
+
+    def _in_sun(self, rows: NDArray[np.int64], hours: NDArray[np.int64]) -> list[NDArray]:
+        """The windows' beams [Q, K, h], and what meets them of these from the room [Q * K, h]."""
+        sun, suns = self.filled.seen_sun(tuple(map(int, rows[:, 0])))[0], self.sky.direction[hours]
+        met = sun.on_elements(self._traced.sun_exchange, suns, self.sky.illuminance[hours])
+        return [self._window_luminance("beam", rows, hours), met]
 
     @cached_property
     def _reflected_sun(self) -> ReflectedSunLight | None:

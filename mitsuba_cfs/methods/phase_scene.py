@@ -26,6 +26,8 @@ from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, joined
+from mitsuba_cfs.trace.room_sun import SunElements, window_elements
+from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.trace.view_matrix import view_matrix
 from mitsuba_cfs.trace.window_exchange import outdoor_exchange, window_exchange
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
@@ -159,6 +161,17 @@ class PhaseScene:
             stopping=Stopping(batches=2),
             seed=self.sampling.seed,
             cache=self.cache,
+        )
+
+    @cached_property
+    def sun_exchange(self) -> SunElements:
+        """What the windows [Q * K] see of the sun's beam on surfaces of the room."""
+        interior, parts = self.scene.interior, self.parts.groups
+        return window_elements(
+            kept_scene(interior, parts),
+            float(interior.areas.sum()),
+            samples=self._exchange_samples(parts, EXCHANGE_SHARE),
+            seed=self.sampling.seed,
         )
 
     @cached_property

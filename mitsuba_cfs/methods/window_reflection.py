@@ -38,18 +38,27 @@ class WindowReflection:
         return any(o.reflection is not None and o.reflection.any() for o in optics)
 
     def windows(
-        self, optics: Sequence[SystemOptics], luminance: NDArray[np.floating]
+        self,
+        optics: Sequence[SystemOptics],
+        luminance: NDArray[np.floating],
+        in_sun: Sequence[NDArray[np.floating]] | None = None,
     ) -> NDArray[np.float64]:
-        """Luminance [Q, K, H] that is added to that of the parts' windows [Q, K, H]."""
+        """Luminance [Q, K, H] that is added to that of the parts' windows [Q, K, H].
+
+        Args: in_sun: the part of them that is the sun's beam [Q, K, H], and what meets them of it
+            from the room [Q * K, H], by shadow rays: of their paths few would meet the sun's patch.
+        """
         exchange, added = self._traced.exchange.values, np.zeros(luminance.shape)
-        source = luminance
+        source, met = luminance, np.zeros(luminance.shape)
+        if in_sun is not None:  # below 0 by rounding alone
+            source, met = np.maximum(luminance - in_sun[0], 0), in_sun[1].reshape(luminance.shape)
         for _ in range(ORDERS):
             flat = source.reshape(-1, luminance.shape[-1])
-            back = np.zeros_like(added)
+            before, back = exchange @ flat + met, np.zeros_like(added)
             for q, one in enumerate(optics):
                 if one.reflection is not None:
-                    back[q] = one.reflection @ (exchange[q] @ flat)
-            added, source = added + back, back
+                    back[q] = one.reflection @ before[q]
+            added, source, met = added + back, back, np.zeros(1)
         return added
 
     def sensors(self, optics: Sequence[SystemOptics]) -> NDArray[np.float64]:

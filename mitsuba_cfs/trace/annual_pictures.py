@@ -102,8 +102,10 @@ def view_matrices(
     shape = (2 * m, len(groups) * options.get("basis", KLEMS_FULL).size)
     sums = [_storage(shape, 8 * math.prod(shape) > memory, folder) for _ in range(2)]
     options["window_reflectance"] = window_reflectance
+    times = shared.times(smoothed=True)
+    options["pixels"] = np.repeat(pixels, times)
     blocks = picture_part_blocks(surfaces, groups, view, progress=progress, **options)
-    seen = _summed(blocks, half, sums)
+    seen = _summed(blocks, half, times, sums)
     share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0)
     if window_reflectance is not None:  # where a window reflects, all of a pixel does
         reflecting = np.append(np.asarray(window_reflectance) > 0, False)  # OPAQUE is the last
@@ -112,7 +114,7 @@ def view_matrices(
     elements, close = None, None
     if options.get("max_depth", 2) > 1:
         area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
-        elements, close = sun_elements(tracer, area, view, pixels, half, tile, seed=seed)
+        elements, close = sun_elements(tracer, area, view, shared, times, seed=seed)
     mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     found = (None, None)
     if elements is not None:
@@ -125,18 +127,25 @@ def view_matrices(
 def _summed(
     blocks: Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]],
     half: NDArray[np.int64],
+    times: NDArray[np.int64],
     sums: Sequence[NDArray[np.float32]],
 ) -> sparse.csr_array:
-    """Add what comes after more reflections, and after one, to the rows' sums; what is seen."""
-    seen, start = [], 0
+    """Add what comes after more reflections, and after one, to the rows' sums; what is seen.
+
+    Args: half, times: [n] the half of a row that each pixel is of, and how often it comes.
+    """
+    seen, start, number = [], 0, np.repeat(np.arange(len(half)), times)
+    weight = (1 / times).astype(np.float32)[number]
     for block, parts in blocks:
-        shown, one, more = parts.reshape(len(parts), len(block), -1)
-        part = half[start : start + len(block)]
-        for rows, values in zip(sums, (more, one), strict=True):
-            _add_rows(rows, part, values)
-        seen.append(sparse.csr_array(shown))
+        part = slice(start, start + len(block))
+        parts = parts.reshape(len(parts), len(block), -1) * weight[part, None]
+        for rows, values in zip(sums, (parts[2], parts[1]), strict=True):
+            _add_rows(rows, half[number[part]], values)
+        seen.append(sparse.csr_array(parts[0]))
         start += len(block)
-    return sparse.csr_array(sparse.vstack(seen))
+    ones = np.ones(len(number), dtype=np.float32)
+    of_pixel = sparse.csr_array((ones, (number, np.arange(len(number)))))
+    return sparse.csr_array(of_pixel @ sparse.vstack(seen))
 
 
 def _smooth(

@@ -16,6 +16,7 @@ from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.picture_sharing import numbered
 from mitsuba_cfs.trace.sampling import (
     batch_key,
     column,
@@ -84,6 +85,7 @@ def picture_part_blocks(
     max_depth: int = 32,
     window_reflectance: ArrayLike | None = None,
     seed: int = 0,
+    pixels: NDArray[np.int64] | None = None,
     progress: Progress = silent,
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
     """Blocks of the view matrix of a picture in three parts [3, n, G, K], of the same paths.
@@ -95,19 +97,21 @@ def picture_part_blocks(
     Args:
         samples: paths for each pixel, at as many places within it.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
+        pixels: [n] those to trace; one that comes again has other paths, stratified with its first.
     """
     tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
     bins = DirectionBins(basis)
     shape = (len(groups), bins.size)
     size = max(256, BLOCK_BYTES // (8 * PARTS * int(np.prod(shape))))
     size = min(size, max(1, 2**31 // samples))
-    _, counts = pixel_directions(view)
-    shown = np.flatnonzero(counts.reshape(-1))
+    shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
+    time = numbered(shown)
+    options = {"samples": samples, "max_depth": max_depth, "seed": seed}
     for start in range(0, len(shown), size):
-        pixels = shown[start : start + size]
-        matrix = _block(tracer, bins, view, pixels, samples=samples, max_depth=max_depth, seed=seed)
-        yield pixels, matrix.reshape(PARTS, len(pixels), *shape)
-        progress("picture", (start + len(pixels)) / len(shown))
+        part = slice(start, start + size)
+        matrix = _block(tracer, bins, view, shown[part], time[part], **options)
+        yield shown[part], matrix.reshape(PARTS, len(shown[part]), *shape)
+        progress("picture", (start + len(shown[part])) / len(shown))
 
 
 def _block(
@@ -115,17 +119,21 @@ def _block(
     bins: DirectionBins,
     view: View,
     pixels: NDArray[np.int64],
+    time: NDArray[np.int64],
     *,
     samples: int,
     max_depth: int,
     seed: int,
 ) -> NDArray[np.float32]:
-    """Rows [PARTS * n, G * K] of some pixels."""
+    """Rows [PARTS * n, G * K] of some pixels [n], each for the first time (0) or again [n]."""
     shape = PARTS * len(pixels), bins.size * len(tracer.groups)
     matrix = empty_sums(math.prod(shape))
     eye = tracer.place(view.position)
-    number = column(pixels, mi.UInt32)
-    for j, (dx, dy) in enumerate(pixel_places(samples)):
+    number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
+    path = column(pixels + time * view.width * view.height & 0xFFFFFFFF, mi.UInt32)
+    places = pixel_places((int(time.max(initial=0)) + 1) * samples)
+    for j in range(samples):
+        dx, dy = places[time * samples + j].T
         directions, exists = pixel_rays(view, pixels, dx, dy)
         add_picture_paths(
             tracer,
@@ -137,8 +145,8 @@ def _block(
             row=dr.arange(mi.UInt32, dr.width(number)),
             apart=dr.opaque(mi.UInt32, len(pixels)),
             stream=number,
-            sample=dr.opaque(mi.UInt32, j),
-            generator=path_generator(number, batch_key(seed, j)),
+            sample=first + dr.opaque(mi.UInt32, j),
+            generator=path_generator(path, batch_key(seed, j)),
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
         dr.eval(matrix)

@@ -2,7 +2,8 @@
 
     L[pixel] = sum over the faces it shows, tau rho / pi (E_sun at the face + E of its tile)
 
-E_sun is the sun's own light on the place that the pixel shows; what other surfaces outdoors reflect
+E_sun is the sun's own light on the place that the pixel shows, on all of its places where the edge
+of a shadow crosses it; what other surfaces outdoors reflect
 to it varies slowly and is the mean over a tile of pixels, by shadow rays from where paths of the
 tile meet those surfaces.  No path has to find the sun by itself.
 """
@@ -15,9 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from mitsuba_cfs.images.view import View, pixel_directions
+from mitsuba_cfs.trace.picture_edges import edge_pixels
 from mitsuba_cfs.trace.picture_sun import LANES
 from mitsuba_cfs.trace.scene import TracedScene
-from mitsuba_cfs.trace.sun_paths import Places, reflecting_places, sunlight
+from mitsuba_cfs.trace.sun_paths import Places, reflecting_places, sunlight, sunlight_of_each
 
 GATHERED = 16  # places at most in each tile that what other surfaces reflect is taken from
 
@@ -40,15 +43,23 @@ class OutdoorSun:
         outside: TracedScene,
         shown: ShownFaces,
         smooth: sparse.csr_array,
+        view: View,
         seed: int,
     ) -> None:
         """Find what is lit; `smooth`: [C, C] of means over tiles."""
-        self._outside, count = outside, smooth.shape[0]
+        self._outside, self._view, count = outside, view, smooth.shape[0]
         pair = shown.pixel * max(count, 1) + shown.tile
         _, first, place = np.unique(pair, return_index=True, return_inverse=True)
         values = np.bincount(place, shown.value, minlength=len(first)).astype(np.float32)
         self._places, column = shown.places.some(first), np.arange(len(first))
         self._shown, row = np.unique(shown.pixel[first], return_inverse=True)
+        every = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
+        self._number, self._first = (
+            every[self._shown],
+            np.searchsorted(row, np.arange(row.max(initial=-1) + 2)),
+        )
+        self._all = shown.places.some(np.argsort(place, kind="stable"))
+        self._ends = np.concatenate([[0], np.cumsum(np.bincount(place, minlength=len(first)))])
         shape = len(self._shown), len(first)
         self._pixels = sparse.csr_array((values, (row, column)), shape=shape)
         # what a pixel shows of unit irradiance on the faces in tiles, tau rho / pi
@@ -77,15 +88,36 @@ class OutdoorSun:
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
             strength = illuminance[hours].astype(np.float32)
-            found[:, hours] = self._pixels @ (
-                sunlight(self._outside, self._places, suns[hours]) * strength
-            )
+            light = sunlight(self._outside, self._places, suns[hours])
+            self._look_again(light, suns[hours])
+            found[:, hours] = self._pixels @ (light * strength)
             if self._reflecting.size:
                 light = sunlight(self._outside, self._reflecting, suns[hours]) * strength
                 irradiance[:, hours] += self._gather @ light
         found += self._tiles @ irradiance
         for hour, luminance in zip(values, found.T, strict=True):
             hour[self._shown] += luminance
+
+    def _look_again(self, light: NDArray[np.float32], suns: NDArray[np.float64]) -> None:
+        """Put the mean over all places of a pixel where the edge of a shadow crosses it [.., h]."""
+        hour, pixel = edge_pixels((self._pixels @ light).T > 0, self._number, self._view)
+        one, pair = _each(self._first[pixel], self._first[pixel + 1])
+        part, place = _each(self._ends[pair], self._ends[pair + 1])
+        hour, mean = hour[one], np.zeros(len(pair))
+        for start in range(0, len(part), LANES):
+            some = slice(start, start + LANES)
+            places, own = self._all.some(place[some]), suns[hour[part[some]]]
+            mean += np.bincount(part[some], sunlight_of_each(self._outside, places, own), len(pair))
+        light[pair, hour] = mean / np.maximum(np.bincount(part, minlength=len(pair)), 1)
+
+
+def _each(
+    first: NDArray[np.int64], end: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """All numbers of some ranges [n], and before them the range that each is of."""
+    count = end - first
+    of = np.repeat(np.arange(len(count)), count)
+    return of, np.arange(len(of)) - (np.cumsum(count) - count - first)[of]
 
 
 def _reflecting(

@@ -106,7 +106,7 @@ def outdoors(
     found, keys = _joined(shown)
     count = np.bincount(found.tile, minlength=len(keys))
     smooth = smoothing(Tiles(tile, view.width), keys, count)
-    sun = OutdoorSun(outside, found, smooth, seed)
+    sun = OutdoorSun(outside, found, smooth, view, seed)
     reflected = smooth @ _reflected(outside, sky, found, len(keys), seed)
     return OutdoorCoefficients(
         sparse.csr_array(sparse.vstack(free)),

@@ -19,6 +19,9 @@ from mitsuba_cfs.trace.picture_sharing import Tiles, face_numbers, numbered, smo
 from mitsuba_cfs.trace.sampling import column, spread_rays, tables, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
+SMOOTHED_TILES = 16  # whole ones behind a row that is smoothed, below which its pixels have more
+MOST_TIMES = 32  # as many paths
+
 
 @dataclass(frozen=True, slots=True)
 class PictureRows:
@@ -67,6 +70,23 @@ class PictureRows:
     def number(self) -> NDArray[np.int64]:
         """The number of each pixel among those of its half of a row [n]."""
         return numbered(self.half)
+
+    def times(self, *, smoothed: bool) -> NDArray[np.int64]:
+        """How often each pixel [n] is to be traced, so that no row has far fewer paths than others.
+
+        A row at the rim, or of a sliver of a face, has few pixels or one, and few to smooth it.
+
+        Args: smoothed: whether its light is; then as many pixels are behind it as stand there.
+        """
+        count = np.bincount(self.row, minlength=len(self.keys)).astype(float)
+        wanted = float(self.tiles.size**2)
+        if smoothed and self.tiles.size > 1:
+            weights = self.smoothing(np.ones(len(self.row), dtype=np.float32), 1.0)
+            count = 1 / np.maximum(weights.power(2) @ (1 / np.maximum(count, 1)), 1e-12)
+            wanted *= SMOOTHED_TILES
+        if self.tiles.size == 1:
+            return np.ones(len(self.row), dtype=np.int64)
+        return np.clip(np.ceil(wanted / count), 1, MOST_TIMES).astype(np.int64)[self.row]
 
     def of_halves(
         self, share: NDArray[np.float32], least: float

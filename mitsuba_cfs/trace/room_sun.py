@@ -15,7 +15,7 @@ of `NEAR_TILES`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import drjit as dr
@@ -24,16 +24,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import View, pixel_solid_angles
-from mitsuba_cfs.trace.picture_rows import shown_hits
+from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.picture_rows import PictureRows, shown_hits
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS, numbered
 from mitsuba_cfs.trace.sampling import column, lattice_2d
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
+from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 ELEMENTS = 1024  # into which the surfaces' area is divided, about
 POINTS = 4  # on each, that the sun is taken at; one on those near a tile
 PATHS = 2**19  # of a view at most, but one of each pixel
+MOST_PATHS = 32  # of a pixel
 RAYS = 2**18  # at once
 NEAR_TILES = 12  # [tiles' widths] that a surface is near within, twice what smoothing spans
 NEAR_RAYS = 1024  # of each tile to what is near: narrow strips of sun beside a corner are small
@@ -72,7 +76,7 @@ class _Hits:
     halvings: NDArray[np.int64]  # [q] of the edge of the place's element
 
     @staticmethod
-    def joined(parts: list[_Hits]) -> _Hits:
+    def joined(parts: Sequence[_Hits]) -> _Hits:
         """All of several."""
         none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
         return _Hits(
@@ -102,6 +106,30 @@ class _Shown:
         return np.linalg.norm(met.point - self.places.point[path], axis=1)
 
 
+@dataclass(frozen=True, slots=True)
+class _Pixels:
+    """Pixels to trace, some of them again and again; axis p."""
+
+    pixel: NDArray[np.int64]  # [p] row * width + column
+    row: NDArray[np.int64]  # [p] half of a row: 2 * row or 1 more
+    number: NDArray[np.int64]  # [p] among those of its half
+    weight: NDArray[np.float64]  # [p] 1 over how often it comes
+
+    @classmethod
+    def of(cls, rows: PictureRows, chosen: NDArray[np.int64], times: NDArray[np.int64]) -> _Pixels:
+        """Some pixels [n] of a picture, each so many times [n]."""
+        some = np.repeat(chosen, times)
+        half = rows.half[some]
+        return cls(rows.pixels[some], half, numbered(half), np.repeat(1 / times, times))
+
+    def blocks(self, samples: int) -> Iterator[_Pixels]:
+        """Some at a time, so that their rays fit."""
+        size = max(1, RAYS // samples)
+        for start in range(0, len(self.pixel), size):
+            part = slice(start, start + size)
+            yield _Pixels(self.pixel[part], self.row[part], self.number[part], self.weight[part])
+
+
 class _Look:
     """Traces a view's pixels to what reflects sun to what they show."""
 
@@ -110,11 +138,9 @@ class _Look:
         width = float(np.sqrt(pixel_solid_angles(view).max()))
         self._near = NEAR_TILES * tile * width if tile > 1 else 0.0  # over the distance to the eye
 
-    def far(
-        self, pixels: NDArray[np.int64], row: NDArray[np.int64], samples: int, key: int
-    ) -> tuple[_Hits, NDArray[np.int64]]:
+    def far(self, part: _Pixels, samples: int, key: int) -> tuple[_Hits, NDArray[np.int64]]:
         """What paths meet but for what is near, and the rows [..] that something is near to."""
-        shown = self._shown(pixels, samples)
+        shown, row = self._shown(part, samples), part.row
         found = reflecting_places(self._tracer, shown.places, self._seed * 1_000_003 + key)
         weight = found.weight * shown.value[found.path]
         path, met = found.path[: found.first], found.places.some(np.arange(found.first))
@@ -126,16 +152,10 @@ class _Look:
         hits = _Hits(rows[some], weight[some], found.places.some(some), none)
         return hits, np.unique(rows[: found.first][far < 1])
 
-    def near(
-        self,
-        pixels: NDArray[np.int64],
-        row: NDArray[np.int64],
-        number: NDArray[np.int64],
-        samples: int,
-    ) -> _Hits:
+    def near(self, part: _Pixels, samples: int) -> _Hits:
         """What rays of pixels find near, stratified over the pixels of a row by their number."""
-        shown = self._shown(pixels, samples)
-        of_row, sample = row[shown.ray], number[shown.ray] * samples + shown.sample
+        shown = self._shown(part, samples)
+        of_row, sample = part.row[shown.ray], part.number[shown.ray] * samples + shown.sample
         stream = column(of_row + self._seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
         u = lattice_2d(column(sample, mi.UInt32), stream, 0)
         point, normal = shown.places.points(), shown.places.normals()
@@ -152,14 +172,14 @@ class _Look:
         halvings = np.clip(np.ceil(finer), 0, HALVINGS).astype(np.int64)
         return _Hits(of_row[some], weight[some], met.some(some), halvings)
 
-    def _shown(self, pixels: NDArray[np.int64], samples: int) -> _Shown:
+    def _shown(self, part: _Pixels, samples: int) -> _Shown:
         tracer = self._tracer
-        eye, way, hit, found = shown_hits(tracer, self._view, pixels, samples)
+        eye, way, hit, found = shown_hits(tracer, self._view, part.pixel, samples)
         rho = dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
         places, found, rho, far = face_places(tracer, eye, way, hit, found, found, rho, hit.t)
         kept = np.flatnonzero(found & (rho > 0))
         reach = np.maximum(self._near * far[kept], 1e-6)
-        value = rho[kept] / (np.pi * samples)
+        value = rho[kept] * part.weight[kept // samples] / (np.pi * samples)
         return _Shown(kept // samples, kept % samples, value, places.some(kept), reach)
 
 
@@ -167,54 +187,84 @@ def sun_elements(
     tracer: TracedScene,
     area: float,
     view: View,
-    pixels: NDArray[np.int64],
-    half: NDArray[np.int64],
-    tile: int,
+    rows: PictureRows,
+    times: NDArray[np.int64],
     *,
-    samples: int = 8,
     seed: int = 0,
 ) -> tuple[SunElements, NDArray[np.bool_]]:
     """Elements by the places that paths of a view's pixels meet after what the pixel shows.
 
-    Their rows are the halves [2 m].  And the rows [m] that show what another surface is near to.
+    Their rows are the halves [2 m], the luminance of one the sum of its pixels'.  And the rows [m]
+    that show what another surface is near to.
 
     Args:
         area: of the room's surfaces [m2].
-        pixels, half: [n] pixels, and the half of a row that each is of: 2 * row or 1 more; the
-            luminance of a half is the sum of its pixels'.
-        tile: pixels across of the squares whose light is shared.
-        samples: paths of each pixel, fewer in large pictures.
+        rows: of the picture's pixels; times: [n] how often a pixel has paths to what is far.
     """
-    samples = int(np.clip(PATHS // max(len(pixels), 1), 1, samples))
+    every, tile = np.arange(len(rows.pixels)), rows.tiles.size
+    samples = int(np.clip(PATHS // max(int(times.sum()), 1), 1, MOST_PATHS))
     edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
     look = _Look(tracer, view, tile, edge, seed)
-    m = int(half.max(initial=-1)) // 2 + 1
-    far, close = [], np.zeros(m, dtype=bool)
-    for part in _blocks(np.arange(len(pixels)), samples):
-        hits, beside = look.far(pixels[part], half[part], samples, int(part[0]))
+    far, close = [], np.zeros(len(rows.keys), dtype=bool)
+    for number, part in enumerate(_Pixels.of(rows, every, times).blocks(samples)):
+        hits, beside = look.far(part, samples, number * RAYS // samples)
         far.append(hits)
         close[beside // 2] = True
     rays_each = -(-NEAR_RAYS // tile**2)
-    chosen = np.flatnonzero(close[half // 2])
-    number = np.zeros(len(pixels), dtype=np.int64)
-    number[chosen] = numbered(half[chosen])
-    blocks = _blocks(chosen, rays_each)
-    near = [look.near(pixels[p], half[p], number[p], rays_each) for p in blocks]
+    chosen, again = np.flatnonzero(close[rows.row]), rows.times(smoothed=False)
+    blocks = _Pixels.of(rows, chosen, again[chosen]).blocks(rays_each)
+    near = [look.near(part, rays_each) for part in blocks]
+    hits = ((_Hits.joined(far), POINTS), (_Hits.joined(near), 1))
+    return _summed(hits, 2 * len(rows.keys), edge, seed), close
+
+
+def window_elements(
+    tracer: TracedScene, area: float, *, samples: int, seed: int = 0
+) -> SunElements:
+    """Elements by the places that windows see in the room; rows [G * K]: radiance that meets them.
+
+    The mean over a group and over its back's incident patch; arguments as of `sun_elements`.
+
+    Args: samples: paths of each patch.
+    """
+    bins, found = DirectionBins(KLEMS_FULL), []
+
+    def follow(_: mi.Float64, paths: WindowPaths) -> None:
+        inward = paths.inward(tracer)
+        start = mi.Point3f(paths.position - tracer.exterior_normal(paths.group) * tracer.epsilon)
+        hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(start, inward), coherent=False)
+        met = hit.is_valid()
+        rho, of = tracer.whole(hit.prim_index, inward, met), paths.patch + paths.group * bins.size
+        places, met, rho, of = face_places(tracer, start, inward, hit, met, met, rho, of)
+        kept = np.flatnonzero(met & (rho > 0))
+        value, row, first = rho[kept] / (np.pi * samples), of[kept].astype(int), places.some(kept)
+        later = reflecting_places(tracer, first, seed * 1_000_003 + paths.group)
+        none = np.zeros(len(kept) + len(later.path), dtype=np.int64)
+        found.append(
+            _Hits(
+                np.concatenate([row, row[later.path]]),
+                np.concatenate([value, value[later.path] * later.weight]),
+                Places.joined([first, later.places]),
+                none,
+            )
+        )
+
+    window_batches(tracer, bins, 1, samples, seed, follow)(0)
+    edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
+    rows = len(tracer.groups) * bins.size
+    return _summed(((_Hits.joined(found), POINTS), (_Hits.joined([]), 1)), rows, edge, seed)
+
+
+def _summed(hits: Sequence[tuple[_Hits, int]], rows: int, edge: float, seed: int) -> SunElements:
+    """Elements of an edge [m] by hits far and near, and how many points to take on each."""
     shares, places = [], []
-    for hits, points in ((_Hits.joined(far), POINTS), (_Hits.joined(near), 1)):
-        element, count = _elements(hits, edge)
-        entries = hits.weight.astype(np.float32), (hits.row, element)
-        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(2 * m, count))))
-        places.append(hits.places.some(_chosen(element, count, points, seed)))
-    alone = sparse.csr_array(sparse.eye_array(2 * m, dtype=np.float32))
-    return SunElements(Places.joined(places), *shares, alone), close
-
-
-def _blocks(numbers: NDArray[np.int64], samples: int) -> Iterator[NDArray[np.int64]]:
-    """Some at a time, so that their rays fit."""
-    size = max(1, RAYS // samples)
-    for start in range(0, len(numbers), size):
-        yield numbers[start : start + size]
+    for some, points in hits:
+        element, count = _elements(some, edge)
+        entries = some.weight.astype(np.float32), (some.row, element)
+        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(rows, count))))
+        places.append(some.places.some(_chosen(element, count, points, seed)))
+    alone = sparse.csr_array(sparse.eye_array(rows, dtype=np.float32))
+    return SunElements(Places.joined(places), *shares, alone)
 
 
 def _elements(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], int]:

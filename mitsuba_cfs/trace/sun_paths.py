@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.trace.sampling import column, lattice_2d, path_generator, tables, vectors
 from mitsuba_cfs.trace.scene import TracedScene
-from mitsuba_cfs.trace.sun_ways import sun_ways
+from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
 BOUNCES = 5  # surfaces that a path meets at most
 ROULETTE = 0.5  # share of light below which paths are thinned out
@@ -172,10 +172,33 @@ def sunlight(
     for way in sun_ways(outside):
         turned = way.turned(suns)
         point, normal, to_sun = place_and_hour(places, turned)
-        # the disc's own mean where all of it is above the place's horizon: one direction has noise
         middle = column((places.normal @ turned.T).ravel())
-        slant = dr.dot(normal, to_sun)
-        cosine = dr.select(middle > SUN_RADIUS, middle, slant)
-        share = way.reaching(mi.Ray3f(point, to_sun), slant > 0)
-        light += dr.select(cosine > 0, cosine * share, 0.0)
+        light += _shone(way, point, normal, to_sun, middle)
     return light.numpy().reshape(places.size, len(suns))
+
+
+def sunlight_of_each(
+    outside: TracedScene, places: Places, suns: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """The same of each place by a sun of its own [m, 3]: [m]."""
+    light, number = mi.Float(0), dr.arange(mi.UInt32, places.size)
+    for way in sun_ways(outside):
+        turned = way.turned(suns)
+        to_sun = on_disc_of(vectors(turned), number)
+        middle = column((places.normal * turned).sum(axis=1))
+        light += _shone(way, places.points(), places.normals(), to_sun, middle)
+    return light.numpy()
+
+
+def _shone(
+    way: SunWay, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f, middle: mi.Float
+) -> mi.Float:
+    """Cosine of the sun at places where a direction on its disc reaches them; 0 elsewhere.
+
+    Args: middle: the cosine of the disc's middle, its own mean where all of it is above the
+        place's horizon: one direction has noise.
+    """
+    slant = dr.dot(normal, to_sun)
+    cosine = dr.select(middle > SUN_RADIUS, middle, slant)
+    share = way.reaching(mi.Ray3f(point, to_sun), slant > 0)
+    return dr.select(cosine > 0, cosine * share, 0.0)

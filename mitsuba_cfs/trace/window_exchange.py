@@ -46,15 +46,13 @@ def window_exchange(
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         normal = tracer.exterior_normal(paths.group)
-        # a back's incident patch lies before the window as the front's does, mirrored
-        inward = paths.outward - normal * (2 * dr.dot(normal, paths.outward))
         path = dr.arange(mi.UInt32, dr.width(paths.patch))
         add_picture_paths(
             tracer,
             bins,
             matrix,
             mi.Point3f(paths.position - normal * tracer.epsilon),
-            mi.Vector3f(inward),
+            paths.inward(tracer),
             mi.Bool(True),
             row=paths.patch,
             apart=dr.opaque(mi.UInt32, 0),

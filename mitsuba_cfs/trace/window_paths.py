@@ -26,6 +26,11 @@ class WindowPaths:
     stream: mi.UInt32  # of stratified samples: of the patch in this batch
     generator: mi.PCG32
 
+    def inward(self, tracer: TracedScene) -> mi.Vector3f:
+        """World direction in the room: a back's patch lies before it as the front's, mirrored."""
+        normal = tracer.exterior_normal(self.group)
+        return mi.Vector3f(self.outward - normal * (2 * dr.dot(normal, self.outward)))
+
 
 def window_batches(
     tracer: TracedScene,

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.trace.picture_edges import edge_pixels
+from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels
+from mitsuba_cfs.trace.sampling import pixel_places
 
 VIEW = View(width=9, height=6)
 
@@ -36,3 +37,11 @@ def test_edges_are_where_neighbours_are_lit_unlike(share: float) -> None:
 def test_no_hour_has_no_edges() -> None:
     hour, number = edge_pixels(np.zeros((0, 5), dtype=bool), np.arange(5), VIEW)
     assert len(hour) == len(number) == 0
+
+
+@pytest.mark.parametrize("turn", np.radians([0, 20, 45, 70, 90, 120, 150]))
+def test_a_strip_of_sun_across_a_pixel_is_as_wide_as_it_is(turn: float) -> None:
+    """A twentieth of the pixel, wherever it lies; by 8 places up to a quarter."""
+    across = pixel_places(EDGE_PLACES) @ [np.cos(turn), np.sin(turn)]
+    for middle in np.linspace(across.min(), across.max(), 40):
+        assert (np.abs(across - middle) < 0.025).mean() < 0.16

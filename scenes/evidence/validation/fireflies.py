@@ -41,7 +41,8 @@ from scenes.run.inputs import chosen_spaces
 
 LIMIT = 1.5  # times the brightest of the neighbourhood
 FINER = 2  # times as many pixels across in the pictures by paths
-LOOKS = ((1.15, 256), (1.3, 2048))  # ratio above which pixels have paths of their own; how many
+# ratio above which pixels have paths of their own; how many
+LOOKS = ((1.15, 256), (1.3, 2048), (1.4, 16384))
 LEAST_BEAM = 5000.0  # [lx] normal to the sun, of the hours that are drawn
 BRIGHT = 2000.0  # [cd/m2] evalglare's threshold
 DARK = 0.1  # [cd/m2] below it nothing shines

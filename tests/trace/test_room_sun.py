@@ -1,0 +1,96 @@
+"""What the room reflects of the sun to a view and to its windows, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_cfs as cfs
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.images.view import pixel_directions
+from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
+from mitsuba_cfs.trace.image import picture_matrix_blocks
+from mitsuba_cfs.trace.picture_rows import MOST_TIMES, PictureRows
+from mitsuba_cfs.trace.picture_sharing import tile_size
+from mitsuba_cfs.trace.room_sun import sun_elements, window_elements
+from mitsuba_cfs.trace.scene import kept_scene
+from scenes.cost import room as box
+
+from . import rooms
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+STRIP = 0.1  # [m] of sun at the foot of a wall, how high
+EYE = np.array([0.4, 3.0, 0.6])
+
+
+def test_a_strip_of_sun_at_a_walls_foot_lights_the_floor_beside_it_evenly() -> None:
+    """Tile by tile as a strip of infinite length does: (1 - cos of its height as an angle) / 2."""
+    view = cfs.fisheye(tuple(EYE), (0.0, 0.05, -1.0), 100)
+    interior = box.room()
+    tracer = kept_scene(interior, box.window_groups())
+    rows = PictureRows.of_view(tracer, view, tile_size(view))
+    times = np.ones(len(rows.pixels), dtype=np.int64)
+    elements, _ = sun_elements(tracer, float(interior.areas.sum()), view, rows, times)
+    point = elements.places.point + tracer.centre
+    lit = (point[:, 0] < 0.01) & (point[:, 2] < STRIP) & (elements.places.normal[:, 0] > 0.9)
+    mean, _ = rows.of_halves(np.ones(len(rows.pixels), dtype=np.float32), 0.01)
+    found = mean @ elements.rows(lit.astype(np.float32)[:, None])[:, 0]
+    way = pixel_directions(view)[0].reshape(-1, 3)[rows.pixels]
+    place = EYE - EYE[2] / np.minimum(way[:, 2:], -0.1) * way
+    near = (place[:, 0] > 0.05) & (place[:, 0] < 0.15) & (np.abs(place[:, 1] - EYE[1]) < 0.5)
+    exact = box.WALLS * box.FLOOR / np.pi * (1 - np.cos(np.arctan2(STRIP, place[:, 0]))) / 2
+    chosen = np.unique(rows.row[near])
+    count = np.bincount(rows.row, minlength=len(rows.keys))
+    whole = chosen[count[chosen] == rows.tiles.size**2]
+    expected = np.bincount(rows.row, exact, len(rows.keys)) / np.maximum(count, 1)
+    off = found[whole] / expected[whole] - 1
+    assert len(whole) > 50
+    assert abs(off.mean()) < 0.1
+    # 0.086; 0.17 with 64 rays to what is near in place of 1,024
+    assert np.sqrt(np.mean(off**2)) < 0.13
+
+
+def test_a_window_low_above_a_wide_floor_sees_the_sun_on_it_in_half_of_its_view() -> None:
+    floor = rooms.quad((-500, 0, 0), (500, 0, 0), (500, 500, 0), (-500, 500, 0))
+    interior = rooms.surfaces([(floor, 0.4)])
+    pane = rooms.quad((-0.1, 0, 0.1), (0.1, 0, 0.1), (0.1, 0, 0.3), (-0.1, 0, 0.3))
+    groups = [WindowGroup("low", (WindowSurface("low", pane),))]
+    found = window_elements(kept_scene(interior, groups), 1.0, samples=64)
+    irradiance = np.ones((found.places.size, 1), dtype=np.float32)
+    luminance = found.rows(irradiance)[:, 0]
+    # E = rho / pi * pi * the floor's half of the view
+    lux = KLEMS_FULL.projected_solid_angles() @ luminance
+    assert lux == pytest.approx(0.4 / 2, rel=0.02)
+    # a back's incident patch lies before the window as the front's does, mirrored in its plane
+    up = KLEMS_FULL.incident_directions()[:, 1]
+    assert luminance[up > 0.3].max() < 1e-6
+    assert luminance[up < -0.3].min() > 0.99 * 0.4 / np.pi
+
+
+def test_rows_of_few_pixels_have_more_paths() -> None:
+    view = cfs.fisheye((1.8, 1.0, 1.5), (0.0, -1.0, 0.0), 120)
+    tracer = kept_scene(box.room(), box.window_groups())
+    rows = PictureRows.of_view(tracer, view, tile_size(view))
+    count = np.bincount(rows.row)[rows.row]
+    alone, smoothed = rows.times(smoothed=False), rows.times(smoothed=True)
+    assert (alone * count >= rows.tiles.size**2).all()
+    assert (alone[count == rows.tiles.size**2] == 1).all()
+    weights = rows.smoothing(np.ones(len(count), dtype=np.float32), 1.0)
+    traced = np.bincount(rows.row, smoothed)
+    before, after = (1 / (weights.power(2) @ (1 / n)) for n in (np.bincount(rows.row), traced))
+    assert before.min() < 16 < 0.5 * np.median(before)
+    assert after.min() > 30
+    assert smoothed.max() <= MOST_TIMES
+    assert np.median(smoothed) == 1
+
+
+def test_a_pixel_that_comes_again_has_the_paths_that_more_samples_would_have() -> None:
+    """Their first reflection is stratified together."""
+    view = cfs.fisheye((1.8, 1.0, 1.5), (0.0, -1.0, 0.0), 20)
+    around, pixel = (box.room(), box.window_groups(), view), np.array([5 * 20 + 2, 15 * 20 + 9])
+    options = {"max_depth": 1, "seed": 3}
+    ((_, twice),) = picture_matrix_blocks(*around, samples=4, pixels=np.repeat(pixel, 2), **options)
+    ((_, once),) = picture_matrix_blocks(*around, samples=8, pixels=pixel, **options)
+    assert not np.allclose(twice[0], twice[1])
+    np.testing.assert_allclose(twice.reshape(2, 2, -1).mean(axis=1), once.reshape(2, -1), atol=1e-6)
