@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from mitsuba_cfs import phases
 from mitsuba_cfs.glare.annual import Pictures
+from mitsuba_cfs.methods.exact_sun import exact_sun, shining_hours
 from mitsuba_cfs.methods.group_light import SensorLight, WindowLight
 from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.phase_error import exchange_variance, matrix_variance
@@ -22,15 +23,11 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.annual_pictures import FivePhasePictures
-from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.estimate import Estimate
 from mitsuba_cfs.trace.picture_beam import BeamLight, beam_light
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients, outdoors
 from mitsuba_cfs.trace.picture_sun import PictureSun
-from mitsuba_cfs.trace.scene import kept_scene
-from mitsuba_cfs.trace.sun_ways import shining
 
-SUN_BATCHES = 4  # of C_ds
 State = NDArray[np.int64]  # [G, L] state of each window group in each hour, or [L] of all groups
 
 
@@ -161,7 +158,7 @@ class PhaseLight:
     @cached_property
     def sensors(self) -> list[list[SensorLight]]:
         """What each window group gives to the sensors in each of its states."""
-        exact = self._exact_sun()
+        exact = exact_sun(self._traced, self.filled.systems, self.sky, self.progress)
         return [
             [self._sensor_light(g, j, exact) for j in range(len(states))]
             for g, states in enumerate(self.filled.systems)
@@ -271,7 +268,7 @@ class PhaseLight:
             beams = (self.windows[q][j].beam is not None for q in self._traced.parts.of(g))
             more = self._reflected_sun.sensors(g, j, beam=any(beams))
             diffuse, error = diffuse + more.values, more.sum_error
-        sun, shining = np.zeros_like(diffuse), self._shining()
+        sun, shining = np.zeros_like(diffuse), shining_hours(self._traced, self.sky)
         if exact[j] is None:
             return SensorLight(diffuse, sun, error)
         luminance = self.sky.illuminance[shining] / SUN_SOLID_ANGLE
@@ -292,37 +289,6 @@ class PhaseLight:
         if beam is not None:
             three_phase += reflected @ (window.beam_at_sun - beam if more is None else -beam)
         return three_phase
-
-    def _exact_sun(self) -> list[Estimate | None]:
-        """C_ds [G, S, Q] of the hours in which the sun shines on a window, in each state [J]."""
-        traced, shining = self._traced, self._shining()
-        count = self.filled.states
-        if not traced.five_phase or not len(shining):
-            return [None] * count
-        scene, chosen = traced.scene, traced.sampling
-        found: list[Estimate | None] = []
-        for j in range(count):
-            ways = [o.scattering for o in in_state(self.filled.systems, [j] * len(scene.groups))]
-            found.append(
-                direct_sun_matrix(
-                    scene.interior, scene.exterior, scene.groups, ways, *scene.sensors(),
-                    suns=self.sky.direction[shining],
-                    window_points=max(chosen.sun_points // SUN_BATCHES, 1),
-                    stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
-                    progress=lambda _, done, j=j: self.progress("daylight", (j + done) / count),
-                    cache=traced.cache,
-                )
-            )  # fmt: skip
-        return found
-
-    def _shining(self) -> NDArray[np.int64]:
-        """The hours L in which the sun stands before a window."""
-        scene, lit = self._traced.scene, self.sky.illuminance > 0
-        facing = np.stack([g.frame[2] for g in scene.groups])
-        if scene.exterior.glossy:
-            outside = kept_scene(scene.exterior, scene.groups)
-            return np.flatnonzero(shining(outside, facing, self.sky.direction) & lit)
-        return np.flatnonzero(np.any(self.sky.direction @ facing.T > 0, axis=1) & lit)
 
     def _of_all(self, state: State | None) -> NDArray[np.float64]:
         """Illuminance of sensors and eye [S + 1, L] by all groups; that of the last state is kept.
