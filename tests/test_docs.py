@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -89,6 +90,23 @@ def test_study_files_in_the_docs_are_read(folder):
         path.write_text(code)
         read_study(path)
     assert found
+
+
+def test_the_page_of_the_quick_start_is_read(folder):
+    from scenes.page_options import DossierSection, RunSection, StudySection, read_page
+
+    text = (REPOSITORY / "docs" / "quickstart.md").read_text("utf-8")
+    (code,) = [c for c in examples(REPOSITORY / "docs" / "quickstart.md", "toml") if "logo" in c]
+    (folder / "page.toml").write_text(code)
+    (folder / "logo.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
+    assert read_page(folder / "page.toml", RunSection).left_out == ("glossary", "model")
+    for command, sections in (
+        ("run", RunSection),
+        ("study", StudySection),
+        ("comply", DossierSection),
+    ):
+        row = text.partition(f"| `cfs {command}` | ")[2].partition(" |")[0]
+        assert set(row.replace("; of each room", ",").split(", ")) == set(get_args(sections))
 
 
 def test_tables_of_the_heat_page_have_no_unknown_keys(folder):

@@ -69,6 +69,7 @@ def command(
     day: str,
     write_ifc: Path | None,
     quick: bool,
+    page: Path | None,
     settings: tuple[str, ...],
     no_cache: bool,
     **chosen,
@@ -85,13 +86,13 @@ def command(
     )  # fmt: skip
     from mitsuba_cfs.files import check_file
     from scenes.comply.files import read_files
+    from scenes.page_options import DossierSection, read_page
     from scenes.result_folder import ResultFolder
 
-    folder = ResultFolder(
-        out,
-        "comply",
-        inputs=(building, weather, system, own["closed"], own["uses"], *surroundings),
-    )
+    page_options = read_page(page, DossierSection)
+    inputs = (building, weather, system, own["closed"], own["uses"])
+    inputs += (*surroundings, *page_options.inputs)
+    folder = ResultFolder(out, "comply", inputs=inputs)
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=(building,))
     files = read_files(options)  # before anything heavy is loaded
@@ -104,7 +105,7 @@ def command(
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress, compiled_beside():
         result = check_building(options, progress, files)
-        write_compliance(result, folder, quick=quick)
+        write_compliance(result, folder, quick=quick, page=page_options)
     for verdict in result.verdicts:
         if verdict.rooms:
             name = f"{verdict.rule}, {verdict.criterion.title}"

@@ -95,6 +95,10 @@ sky_ground_option = click.option(
 annual_glare_option = click.option(
     "--annual-glare", is_flag=True, help="Rate every hour with daylight."
 )
+page_option = click.option(
+    "--page", type=FILE, metavar="FILE.toml",
+    help="Title, author, logo and sections of the page that is written; see docs/quickstart.md.",
+)  # fmt: skip
 set_option = click.option(
     "--set", "settings", multiple=True, metavar="NAME=VALUE",
     help="A choice by its name in `[options]` of study files, such as sensor_samples=4096.",
@@ -149,6 +153,7 @@ def building_options(spaces: str) -> Option:
         set_option,
         no_cache_option,
         quick_option,
+        page_option,
     )
 
     def decorated(command: Callable) -> Callable:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import click
@@ -82,6 +83,7 @@ def command(
     no_coupled_heat: bool,
     explore: bool,
     quick: bool,
+    page: Path | None,
     settings: tuple[str, ...],
     **chosen,
 ) -> None:
@@ -105,18 +107,20 @@ def command(
         u_value=u_value, g_value=g_value, surroundings=surroundings,
         surroundings_offset=surroundings_offset,
     )  # fmt: skip
-    run_to_folder(options, out)
+    run_to_folder(options, out, page)
 
 
-def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
+def run_to_folder(options: JobOptions, out: Path, page: Path | None = None) -> None:
     """Run the job with a progress bar, say what comes out room by room, and write its files."""
     from mitsuba_cfs.matrices.cache import default_folder
+    from scenes.page_options import RunSection, read_page
     from scenes.result_folder import ResultFolder
     from scenes.run.files import read_files
 
+    page_options = read_page(page, RunSection)
     inputs = (options.building, options.weather, options.system, options.operation)
-    inputs += options.surroundings
-    folder = ResultFolder(out, command, inputs=inputs)
+    inputs += (*options.surroundings, *page_options.inputs)
+    folder = ResultFolder(out, "run", inputs=inputs)
     if options.cache:
         default_folder()  # or one line that it cannot be one
     files = read_files(options)  # before anything heavy is loaded
@@ -137,7 +141,8 @@ def run_to_folder(options: JobOptions, out: Path, command: str = "run") -> None:
             on_room=lines.year, on_light=lines.light, on_building=_print_account,
         )  # fmt: skip
         progress("results", 0.0)
-        write_results(result, folder, write_report, write_explorer if options.explore else None)
+        report = partial(write_report, page=page_options)
+        write_results(result, folder, report, write_explorer if options.explore else None)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:

@@ -10,7 +10,13 @@ import click
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import quick_option
-from scenes.commands.room_options import method_option, out_folder_option, write_ifc_option
+from scenes.commands.room_options import (
+    method_option,
+    out_folder_option,
+    page_option,
+    write_ifc_option,
+)
+from scenes.page_options import OWN_PAGE, PageOptions, StudySection, read_page
 
 if TYPE_CHECKING:
     from scenes.study.plan import StudyPlan
@@ -32,6 +38,7 @@ if TYPE_CHECKING:
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
 @write_ifc_option("one for each case of a study of one file")
 @quick_option
+@page_option
 def command(
     study: Path,
     *,
@@ -43,6 +50,7 @@ def command(
     dgp_error: str | None,
     write_ifc: Path | None,
     quick: bool,
+    page: Path | None,
 ) -> None:
     """Every room of a study with every system, orientation, climate and method.
 
@@ -55,7 +63,9 @@ def command(
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
-    study_to_folder(study, parsed, out, processes, scheduler, write_ifc)
+    study_to_folder(
+        study, parsed, out, processes, scheduler, write_ifc, page=read_page(page, StudySection)
+    )
 
 
 def study_to_folder(
@@ -65,9 +75,12 @@ def study_to_folder(
     processes: int = 1,
     scheduler: str | None = None,
     write_ifc: Path | None = None,
+    *,
+    page: PageOptions = OWN_PAGE,
 ) -> None:
     """Compute a study with a progress bar, say what comes out case by case, write its files."""
-    store = _checked(file, parsed, out, scheduler, write_ifc)
+    files = (file, *parsed.files, *page.inputs)
+    store = _checked(files, parsed, out, scheduler, write_ifc)
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
     from scenes.study.automatic import settled
@@ -86,7 +99,7 @@ def study_to_folder(
             progress=progress, on_case=_print_case,
         )  # fmt: skip
     nothing = result.failed == len(result.results)
-    report = None if nothing else lambda path: write_study_report(result, path)
+    report = None if nothing else lambda path: write_study_report(result, path, page)
     write_study(parsed, result, store, report)
     _print_outcome(result, out)
     failed, total = result.failed, len(result.results)
@@ -105,7 +118,11 @@ def study_to_folder(
 
 
 def _checked(
-    file: Path, parsed: Study, out: Path, scheduler: str | None, write_ifc: Path | None
+    files: tuple[Path, ...],
+    parsed: Study,
+    out: Path,
+    scheduler: str | None,
+    write_ifc: Path | None,
 ) -> Store:
     """The folder of results; `DataError` for what cannot be, before anything heavy is loaded."""
     from mitsuba_cfs.files import check_file
@@ -114,7 +131,7 @@ def _checked(
     from scenes.study.schedule import check_dask
     from scenes.study.store import Store
 
-    store = Store(out, inputs=(file, *parsed.files))
+    store = Store(out, inputs=files)
     default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=parsed.files)

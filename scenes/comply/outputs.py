@@ -13,13 +13,20 @@ from scenes.comply.bcf import write_bcf
 from scenes.comply.page import dossier_html
 from scenes.comply.results import Compliance
 from scenes.comply.tables import values_frame
+from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.result_folder import ResultFolder
 
 SET_NAME = "CFS compliance"
 MODEL_CHECK = Path(str(files(__package__) / "model.ids"))  # what a check needs of a model
 
 
-def write_compliance(result: Compliance, folder: ResultFolder, *, quick: bool = False) -> None:
+def write_compliance(
+    result: Compliance,
+    folder: ResultFolder,
+    *,
+    quick: bool = False,
+    page: PageOptions = OWN_PAGE,
+) -> None:
     """Write all files; earlier results are replaced at the end."""
     with folder.replaced() as place:
         write_table(values_frame(result), place / "values.csv", index=False, float_format="%.6g")
@@ -28,7 +35,7 @@ def write_compliance(result: Compliance, folder: ResultFolder, *, quick: bool = 
         write_table(problems, place / "problems.csv", index=False)
         write_text(place / MODEL_CHECK.name, MODEL_CHECK.read_text("utf-8"))
         write_bcf(result, place / "issues.bcf")
-        write_text(place / "dossier.html", dossier_html(result, quick=quick))
+        write_text(place / "dossier.html", dossier_html(result, quick=quick, page=page))
 
 
 def write_into_ifc(result: Compliance, out: Path) -> tuple[Problem, ...]:

@@ -15,6 +15,7 @@ from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import RuleTable
 from scenes.figures.chart import Chart
+from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report.numbers import rounded
 from scenes.report.page import FILES as SHARED
@@ -50,13 +51,14 @@ class DossierRoom(RoomSection):
     openings: Table | None
 
 
-def dossier_html(result: Compliance, *, quick: bool = False) -> str:
+def dossier_html(result: Compliance, *, quick: bool = False, page: PageOptions = OWN_PAGE) -> str:
     """The dossier as text: no script, font or picture is fetched from anywhere."""
     rooms = [dossier_room(result, room, i) for i, room in enumerate(result.rooms, 1)]
     style = (SHARED["style.css"], FILES["dossier.css"])
     return environment(FILES).get_template("dossier.html.j2").render(
-        title=result.building.name or "Building",
-        facts=summary(result),
+        page=page,
+        title=page.title or result.building.name or "Building",
+        facts=summary(result) + page.facts,
         notes=([NOTE] if quick else []) + list(result.notes),
         assumptions=result.assumptions,
         rules=[dossier_rule(result, name) for name in result.rules],

@@ -11,6 +11,7 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
+from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
@@ -28,12 +29,12 @@ UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
 
 
-def write_report(result: RunResult, path: Path) -> None:
+def write_report(result: RunResult, path: Path, page: PageOptions = OWN_PAGE) -> None:
     """Write the report of a run as one self-contained HTML file."""
-    write_text(path, report_html(result))
+    write_text(path, report_html(result, page))
 
 
-def report_html(result: RunResult) -> str:
+def report_html(result: RunResult, page: PageOptions = OWN_PAGE) -> str:
     """The report as text: no script, font or picture is fetched from anywhere."""
     if not result.spaces:
         raise ValueError("a report needs at least one room")
@@ -43,6 +44,8 @@ def report_html(result: RunResult) -> str:
     several = len(rooms) > 1
     metrics = room_metrics(result) if several else ()
     return environment().get_template("report.html.j2").render(
+        page=page,
+        title=page.title or result.building.name or "Building",
         result=result,
         rooms=rooms,
         verdict=verdict(result, [room.cards for room in rooms]),
@@ -51,7 +54,7 @@ def report_html(result: RunResult) -> str:
         metrics=metrics,
         storeys=storey_plans(result) if several else (),
         storey_data=storey_data(metrics, len(rooms)),
-        summary=summary(result),
+        summary=summary(result) + page.facts,
         problems=tables.problems_table(result),
         inputs=inputs_table(manifest.get("inputs", {})),
         options=options_table(manifest),

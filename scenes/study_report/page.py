@@ -8,6 +8,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
+from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import page as run_page
 from scenes.report import tables
@@ -32,12 +33,12 @@ MOST_BESIDE = 3  # cases that are shown at a time
 MOST_CASES = 60  # that have a section of their own: some 200 kB each
 
 
-def write_study_report(study: StudyResult, path: Path) -> None:
+def write_study_report(study: StudyResult, path: Path, page: PageOptions = OWN_PAGE) -> None:
     """Write the report of a study as one self-contained HTML file."""
-    write_text(path, study_report_html(study))
+    write_text(path, study_report_html(study, page))
 
 
-def study_report_html(study: StudyResult) -> str:
+def study_report_html(study: StudyResult, page: PageOptions = OWN_PAGE) -> str:
     """The report as text: no script, font or picture is fetched from anywhere."""
     done = finished(study)
     if not done:
@@ -51,8 +52,9 @@ def study_report_html(study: StudyResult) -> str:
     scripts = [*(run_page.FILES[name] for name in run_page.SCRIPTS), FILES["study.js"]]
     return run_page.environment(FILES).get_template("study.html.j2").render(
         study=study,
-        title=study.title or "Study of fenestration systems",
-        facts=facts(study),
+        page=page,
+        title=page.title or study.title or "Study of fenestration systems",
+        facts=facts(study) + page.facts,
         verdict=study_verdict(study),
         beside=len(done) if len(done) <= MOST_BESIDE else 1,
         most_beside=min(len(pages), MOST_BESIDE),

@@ -27,6 +27,7 @@ from scenes.comply.rules import read_rule
 from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, WEATHER
 from scenes.fenestration.systems import Given
+from scenes.page_options import PageOptions
 from scenes.result_folder import ResultFolder
 from scenes.run.building import read_building
 from scenes.run.inputs import read_weather
@@ -119,6 +120,16 @@ def test_the_dossier_says_all(result):
                    "≥\xa075\xa0%", "Meeting room", "Sunlight at the openings", "mine"):  # fmt: skip
         assert wanted in html
     assert "<script" not in html and "http:" not in html.replace("http://www.w3.org", "")
+
+
+def test_a_dossier_with_a_title_and_without_its_rooms(result):
+    options = PageOptions(title="Ours", author="A", left_out=("rooms", "sources"))
+    html = dossier_html(result, page=options)
+    assert "<h1>Ours</h1>" in html and "<dt>Author</dt><dd>A</dd>" in html
+    assert "Left out of this page by choice: rooms, sources." in html
+    assert "13° above the horizon" in html  # what was assumed always stands
+    for gone in ('id="room-', 'href="#room-', 'id="sources"', 'href="#sources"'):
+        assert gone in dossier_html(result) and gone not in html
 
 
 def test_a_room_says_what_it_misses(result):

@@ -149,7 +149,7 @@ def _case(case):
     return CaseResult(case.key, {"angle": case.orientation_deg} | dict.fromkeys(SAID, 0.0))
 
 
-def _study_report(_result, path):
+def _study_report(_result, path, _page):
     path.write_text("<html></html>")
 
 

@@ -284,7 +284,9 @@ def test_failed_cases_end_with_exit_1_and_their_number(tmp_path, capsys, monkeyp
     from scenes.study import study as module
 
     monkeypatch.chdir(tmp_path)  # where `noted` leaves its log, under the room's name
-    monkeypatch.setattr("scenes.study_report.write_study_report", lambda _, path: path.touch())
+    monkeypatch.setattr(
+        "scenes.study_report.write_study_report", lambda _, path, _page: path.touch()
+    )
     options = dict(module.run_study.__kwdefaults__) | {"compute": _failing}
     monkeypatch.setattr(module.run_study, "__kwdefaults__", options)
     path = study_file(tmp_path, "orientations_deg = [0, 13, 20]\n")

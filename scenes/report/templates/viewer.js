@@ -2,6 +2,7 @@
 (() => {
   "use strict";
   const canvas = document.getElementById("viewer");
+  if (!canvas) return;  // the page does without it
   const data = JSON.parse(document.getElementById("viewer-data").textContent);
   const byId = (id) => document.getElementById("viewer-" + id);
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));

@@ -1,0 +1,118 @@
+"""What a user's file says of a page: title, author, logo, and which sections it has."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Generic, Literal, TypeVar
+from xml.etree import ElementTree
+
+from PIL import Image
+from pydantic import Field
+
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
+from scenes.figures.picture import bytes_uri
+from scenes.toml_file import TomlTable, read_table, validated
+
+# Sections that a page can do without, by their names in a file; those of a room hold for each.
+# What was assumed, and the notes, always stand: figures without them mislead.
+RunSection = Literal[
+    "verdict", "rooms", "daylight", "glare", "operation", "temperatures", "glazing",
+    "model", "problems", "method", "inputs", "glossary",
+]  # fmt: skip
+StudySection = Literal[
+    "verdict", "comparison", "model", "problems", "method", "inputs", "glossary"
+]  # fmt: skip
+DossierSection = Literal["rooms", "problems", "sources"]
+
+Section = TypeVar("Section", bound=str)
+Line = Annotated[str, Field(min_length=1, max_length=200)]
+LOGO_BYTES = 500_000  # in every page that is sent on
+LOGO_PIXELS = 4000  # of its longer side
+SVG = "{http://www.w3.org/2000/svg}svg"
+
+
+class PageTable(TomlTable, Generic[Section]):
+    """A file of a page; the logo's path is relative to it."""
+
+    title: Line | None = None
+    author: Line | None = None
+    logo: Path | None = None
+    sections: dict[Section, bool] = Field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class PageOptions:
+    """What a page is given beside its results."""
+
+    title: str = ""  # empty: the page's own
+    author: str = ""
+    logo: str = ""  # data URI
+    left_out: tuple[str, ...] = ()  # names of sections
+    inputs: tuple[Path, ...] = ()  # files that this was read from
+
+    @property
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """What stands in the page's head beside its own facts."""
+        return (("Author", self.author),) if self.author else ()
+
+    def shows(self, section: str) -> bool:
+        """Whether the page has a section."""
+        return section not in self.left_out
+
+
+OWN_PAGE = PageOptions()
+
+
+def read_page(path: Path | None, sections: Any) -> PageOptions:
+    """The options of a page; the page's own where there is no file.
+
+    Args: sections: literal type of the sections that this page can do without.
+
+    Raises: `DataError` that names file and key.
+    """
+    if path is None:
+        return OWN_PAGE
+    table: PageTable = validated(PageTable[sections], read_table(path), path)
+    logo = None if table.logo is None else path.parent / table.logo
+    return PageOptions(
+        title=table.title or "",
+        author=table.author or "",
+        logo="" if logo is None else _logo_uri(logo, path),
+        left_out=tuple(name for name, shown in table.sections.items() if not shown),
+        inputs=(path,) if logo is None else (path, logo),
+    )
+
+
+def _logo_uri(logo: Path, path: Path) -> str:
+    """A picture file as a data URI; `DataError` of the file `path` that names it."""
+
+    def fault(what: str) -> DataError:
+        return DataError(f"{logo} {what}", file=path, field="logo")
+
+    try:
+        content = logo.read_bytes()
+    except OSError as error:
+        raise fault(f"cannot be read: {reason(error)}") from error
+    if len(content) > LOGO_BYTES:
+        raise fault(f"has {len(content) / 1000:.0f} kB; at most {LOGO_BYTES // 1000} kB")
+    if _is_svg(content):
+        return bytes_uri(content, "image/svg+xml")
+    try:
+        with Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as picture:
+            if max(picture.size) > LOGO_PIXELS:
+                width, height = picture.size
+                raise fault(f"has {width} x {height} pixels; at most {LOGO_PIXELS} a side")
+            picture.load()
+            return bytes_uri(content, f"image/{str(picture.format).lower()}")
+    except (OSError, SyntaxError) as error:  # SyntaxError: Pillow's, of a broken PNG
+        raise fault("is no PNG, JPEG or SVG picture") from error
+
+
+def _is_svg(content: bytes) -> bool:
+    try:
+        return ElementTree.fromstring(content).tag == SVG
+    except ElementTree.ParseError:
+        return False
