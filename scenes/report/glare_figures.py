@@ -19,6 +19,7 @@ from scenes.results import LuminancePicture, RoomYear, RunResult
 MOST_PICTURES = 4  # the worst ones; the table has them all
 MOST_OF_A_RUN = 24  # shared by its rooms, so that the file stays small
 LARGEST_SIDE = 620  # [px] of a picture in the page
+MANY_ROOMS, SIDE_OF_MANY = 10, 240  # beyond so many rooms [px]
 BRIDGE = 4  # slits up to twice as many pixels wide do not split an outline
 COMPASS = (
     "north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"
@@ -47,6 +48,7 @@ class GlareGallery:
     pictures: tuple[GlarePicture, ...]
     scale: ColourScale
     left_out: int
+    reduced_to: int = 0  # [px] at most, where the run has many rooms
 
 
 def gallery(result: RunResult, room: RoomYear) -> GlareGallery | None:
@@ -56,8 +58,11 @@ def gallery(result: RunResult, room: RoomYear) -> GlareGallery | None:
         return None
     chosen = pictures[: max(1, min(MOST_PICTURES, MOST_OF_A_RUN // len(result.spaces)))]
     scale = luminance_scale(chosen)
-    shown = tuple(glare_picture(result, room.glare.view, p, scale) for p in chosen)
-    return GlareGallery(shown, scale, len(pictures) - len(chosen))
+    many = len(result.spaces) > MANY_ROOMS
+    side = SIDE_OF_MANY if many else LARGEST_SIDE
+    shown = tuple(glare_picture(result, room.glare.view, p, scale, side) for p in chosen)
+    cut = many and max(chosen[0].luminance.shape) > side
+    return GlareGallery(shown, scale, len(pictures) - len(chosen), side if cut else 0)
 
 
 def luminance_scale(pictures: list[LuminancePicture]) -> ColourScale:
@@ -75,10 +80,10 @@ def _half_decade(value: float) -> float:
 
 
 def glare_picture(
-    result: RunResult, view: View, picture: LuminancePicture, scale: ColourScale
+    result: RunResult, view: View, picture: LuminancePicture, scale: ColourScale, side: int
 ) -> GlarePicture:
-    """One picture reduced to the page's size."""
-    factor = int(np.ceil(max(picture.luminance.shape) / LARGEST_SIDE))
+    """One picture reduced to `side` pixels at most."""
+    factor = int(np.ceil(max(picture.luminance.shape) / side))
     luminance = reduced(picture.luminance.astype(float), factor)
     glare = picture.glare
     seen = tone_mapped(luminance)

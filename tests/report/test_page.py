@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -9,10 +11,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from bim.account import Account, StoreyAccount
 from bim.model import Problem
 from scenes.report import write_report
+from scenes.report.glare_figures import gallery
 from scenes.report.page import report_html
 from scenes.results import GlareResults
 from tests.report.synthetic import run_result
@@ -112,6 +116,36 @@ def test_file_is_small_with_full_pictures(tmp_path) -> None:
     write_report(run_result(picture_size=600, pictures=10), path)
     assert path.stat().st_size < LARGEST
     assert path.read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+def of_rooms(result, number: int):
+    """The run with so many rooms, each one of its two."""
+    rooms = []
+    for i in range(number):
+        room = result.spaces[i % 2]
+        rooms.append(replace(room, space=replace(room.space, guid=f"room {i}")))
+    building = replace(result.building, spaces=tuple(room.space for room in rooms))
+    return replace(result, building=building, spaces=tuple(rooms))
+
+
+def test_many_rooms_have_smaller_pictures_and_the_page_says_so() -> None:
+    result = run_result(picture_size=400, pictures=1)
+    sides = {}
+    for number in (10, 11):
+        run = of_rooms(result, number)
+        found = gallery(run, run.spaces[0])
+        seen = base64.b64decode(found.pictures[0].seen.partition(",")[2])
+        sides[number] = (Image.open(io.BytesIO(seen)).width, found.reduced_to)
+    assert sides == {10: (400, 0), 11: (200, 240)}  # means of 2 x 2 pixels: 240 at most
+    small = of_rooms(run_result(picture_size=96, pictures=1), 11)
+    assert gallery(small, small.spaces[0]).reduced_to == 0
+
+
+@pytest.mark.slow
+def test_twenty_rooms_are_one_file_of_less_than_8_mb() -> None:
+    page = report_html(of_rooms(run_result(picture_size=600), 20))
+    assert len(page.encode()) < 8e6
+    assert page.count("its\n  pictures have at most 240 pixels a side") == 20
 
 
 def test_report_of_little(result) -> None:
