@@ -40,6 +40,7 @@ KINDS = {  # of a surface: kind of the face of its first room, and what lies bey
 }
 OUTDOORS = ("Shade", "FreestandingColumn")
 LEVEL = 0.7  # a surface whose normal is so near to the vertical is no wall, whatever its type says
+REVEAL = 1.0  # but for strips narrower than this [m]: sill and head of a window's recess
 GLAZED = ("FixedWindow", "OperableWindow", "FixedSkylight", "OperableSkylight", "SlidingDoor")
 
 
@@ -156,7 +157,7 @@ class _Reader:
         face_kind, alone = KINDS[kind]
         between = len(beside) == 2
         finish = self.constructions.finish(surface.get("constructionIdRef"))
-        if face_kind == "wall" and _is_level(ring):  # OpenStudio's type of what is adiabatic
+        if face_kind == "wall" and _is_slab(ring):  # OpenStudio's type of what is adiabatic
             face_kind = ""
             self.level[kind] += not number
         if number:
@@ -224,10 +225,12 @@ class _Reader:
         )  # fmt: skip
 
 
-def _is_level(ring: NDArray[np.float64]) -> bool:
-    """Whether a polygon [N, 3] is nearer to level than to upright, as `LEVEL` says."""
+def _is_slab(ring: NDArray[np.float64]) -> bool:
+    """Whether a polygon [N, 3] is nearer to level than to upright, and no strip."""
     normal = newell_normal(ring)
-    return bool(abs(normal[2]) > LEVEL * np.linalg.norm(normal))
+    area = float(np.linalg.norm(normal))
+    longest = np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1).max()
+    return bool(abs(normal[2]) > LEVEL * area) and area > REVEAL * longest
 
 
 def _name(element: ElementTree.Element) -> str:

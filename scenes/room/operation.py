@@ -11,6 +11,7 @@ from mitsuba_cfs.errors import DataError
 from scenes.fenestration.pane_system import system_of_panes
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.tables import StateTable
+from scenes.fenestration.thermal_system import checked_system
 from scenes.room.operation_tables import OperationTables
 from scenes.toml_file import read_table, validated
 
@@ -53,6 +54,16 @@ def read_operation(path: str | PathLike[str]) -> Operation:
             system = replace(system, name=name)
         systems.append(system)
     return Operation(path, tables, tuple(systems))
+
+
+def check_systems(operation: Operation) -> None:
+    """Raise `DataError` where a state's U, g and BSDF do not go together, naming its BSDF's file.
+
+    Of a state by its panes that file is the operation's own.
+    """
+    for table, system in zip(operation.tables.system, operation.systems, strict=True):
+        bsdf = table.placed(operation.file.parent).bsdf
+        checked_system(system, operation.file if bsdf is None else operation.file.parent / bsdf)
 
 
 def schedules_there(tables: Tables, path: Path) -> Tables:

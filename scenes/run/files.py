@@ -14,7 +14,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, Given, read_system
 from scenes.fenestration.thermal_system import checked_system
-from scenes.room.operation import Operation, check_states, read_operation
+from scenes.room.operation import Operation, check_states, check_systems, read_operation
 from scenes.room.operation_hours import check_schedules
 from scenes.room.picture_hours import check_hours, wanted_hours
 from scenes.run.inputs import read_weather
@@ -76,8 +76,7 @@ def _check_sun(hours: tuple[str, ...], weather: Weather) -> None:
 
 def _check_operation(operation: Operation, system: FenestrationSystem | None) -> None:
     """What does not need the windows: its systems' data, and its control's states."""
-    for one, path in zip(operation.systems, operation.files, strict=True):
-        checked_system(one, path)
+    check_systems(operation)
     if system is not None:
         check_states(operation, 1)
     elif operation.systems:

@@ -10,7 +10,7 @@ from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.box import box_building
-from scenes.room.operation import Operation, check_states, read_operation
+from scenes.room.operation import Operation, check_states, check_systems, read_operation
 from scenes.room.operation_hours import check_schedules
 from scenes.run.files import check_names
 from scenes.run.inputs import read_weather
@@ -46,8 +46,7 @@ def _checked_operation(study: Study, system: SystemTable | None) -> Operation | 
     if path is None:
         return None
     operation = read_operation(path)
-    for one, file in zip(operation.systems, operation.files, strict=False):
-        checked_system(one, file)
+    check_systems(operation)
     if system is not None:
         check_states(operation, len(operation.systems) or 1)
     return operation

@@ -33,7 +33,7 @@ def _run_job(_options, *_others, **_more):
     return replace(result, spaces=tuple(spaces))
 
 
-def _thermal(_study, *_others):
+def _thermal(_study, *_others, **_options):
     hours = pd.DataFrame({"air_c": np.linspace(15.0, 30.0, 8760)})
     summary = dict.fromkeys(
         ("operative_min_c", "operative_max_c", "heat_kwh", "cold_kwh",

@@ -14,11 +14,13 @@ from bim.shoebox import shoebox
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
-from scenes.demo import OFFICE, WEATHER
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.room.operation import read_operation
 from scenes.room.operation_hours import OperationHours, check_schedules
 from scenes.room.operation_tables import OperationTables
+from scenes.run.files import read_files
 from scenes.run.inputs import chosen_spaces
+from scenes.run.options import JobOptions
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +91,20 @@ def test_a_column_of_a_file_is_a_schedule(tmp_path, weather) -> None:
     (tmp_path / "use.csv").write_text("hour,shares\n1,2\n")
     with pytest.raises(DataError, match="expected 8760 rows as the weather has, got 1"):
         check_schedules(read_operation(path).tables, weather, path)
+
+
+def test_states_beside_a_file_of_hours_are_checked_each_with_its_own_data(tmp_path) -> None:
+    """A table of hours is among the files that an operation names, but is no state's."""
+    (tmp_path / "use.csv").write_text("share\n" + "0.5\n" * 8760)
+    path = tmp_path / "o.toml"
+    states = f'[[system]]\nbsdf = "{VENETIAN_BLIND}"\n' * 2
+    hours = '[gains]\noccupied = "used"\n[schedules.used]\ncsv = "use.csv"\ncolumn = "share"\n'
+    path.write_text(states + hours)
+    options = JobOptions(OFFICE, WEATHER, operation=path)
+    assert len(read_files(options).operation.systems) == 2
+    path.write_text(states + "g_value = 0.01\n" + hours)
+    with pytest.raises(DataError, match=r"venetian_blind\.xml: .*g: 0\.01 is below the solar"):
+        read_files(options)
 
 
 def test_constant_numbers_are_as_ever_to_the_last_bit(weather) -> None:

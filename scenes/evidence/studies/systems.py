@@ -15,7 +15,9 @@ from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial
 from mitsuba_cfs.bsdf.screens import woven_screen
 from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
 from scenes.demo.make_blind import (
+    BEFORE_BLIND,
     BLIND,
+    BLIND_TOTAL,
     GLAZING_U,
     INNER_FILM,
     OUTER_FILM,
@@ -72,5 +74,6 @@ def _before_glazing(path: Path, layer: PeriodicLayer, name: str) -> Path:
     }
     bands = {band: system.bsdf for band, system in systems.items()}
     write_bsdf_xml(BsdfFile(bands, name=f"{name}, double low-e glazing"), path)
-    path.with_suffix(".toml").write_text(thermal_values(systems["Solar"]), encoding="utf-8")
+    values = thermal_values(systems["Solar"], BEFORE_BLIND, BLIND_TOTAL)
+    path.with_suffix(".toml").write_text(values, encoding="utf-8")
     return path
