@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.sensors import view_point
 from bim.to_thermal import ThermalRoom
+from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache
 from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.estimate import cache_entry
 from mitsuba_cfs.trace.view_factors import person_view_factors, view_factors
 from thermal.balance import ZoneResult
 from thermal.comfort import mean_radiant_temperature, operative_temperature, room_centre_mrt
@@ -28,16 +31,47 @@ class RadiantRoom:
 
 
 def radiant_room(
-    space: Space, room: ThermalRoom, *, samples: int = 16384, seed: int = 0
+    space: Space,
+    room: ThermalRoom,
+    *,
+    samples: int = 16384,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
 ) -> RadiantRoom | None:
-    """Traced view factors of a room, or None where its surfaces do not close it."""
-    parts = enclosure(space, room)
-    among = view_factors(parts, samples=samples, seed=seed)
-    place, facing = view_point(space)
-    person = person_view_factors(parts, place, facing, samples=samples, seed=seed)
+    """Traced view factors of a room, or None where its surfaces do not close it.
+
+    Args: cache: where they are found and kept.
+    """
+    among, person = _view_factors(enclosure(space, room), *view_point(space), samples, seed, cache)
     if min(among.sum(axis=1).min(), person.sum()) < 1.0 - MOST_LOST:
         return None
     return RadiantRoom(among / among.sum(axis=1, keepdims=True), person / person.sum())
+
+
+def _view_factors(
+    parts: Surfaces,
+    place: FloatArray,
+    facing: FloatArray,
+    samples: int,
+    seed: int,
+    cache: MatrixCache | None,
+) -> tuple[FloatArray, FloatArray]:
+    """View factors [N, N] among the parts and [N] from a person, traced or kept as one matrix."""
+    inputs = (parts, place, facing, samples, seed)
+    label, by = "view factors", view_factors.__module__
+    entry = cache_entry(cache, label, *inputs, by=by, stopping=None)
+    kept = entry.load() if entry is not None else None
+    if kept is not None and kept.finished:
+        return kept.mean[:-1], kept.mean[-1]
+    start = time.monotonic()
+    among = view_factors(parts, samples=samples, seed=seed)
+    person = person_view_factors(parts, place, facing, samples=samples, seed=seed)
+    if entry is not None:
+        rows = np.vstack([among, person])
+        none = np.zeros_like(rows)
+        seconds = time.monotonic() - start
+        entry.save(BatchMean(1, rows, none, none[:, 0], seconds, finished=True))
+    return among, person
 
 
 def enclosure(space: Space, room: ThermalRoom) -> Surfaces:

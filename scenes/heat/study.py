@@ -112,7 +112,9 @@ def run_study(
             notes |= dict.fromkeys(f"{one.what}: {one.consequence}" for one in room.holes())
         zone, radiant = room.zone, None
         if trace.view_factors:
-            radiant = radiant_room(space, zone.room, samples=trace.patch_samples, seed=trace.seed)
+            radiant = radiant_room(
+                space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache
+            )
         rooms.append(zone if radiant is None else zone.with_view_factors(radiant.among))
         radiants.append(radiant)
         steps("heat", 1.0)

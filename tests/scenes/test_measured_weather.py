@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.cli import run as main
 from scenes.demo import VENETIAN_BLIND
+from scenes.heat.energyplus import check_twin
 from scenes.heat.files import read_files
 from scenes.heat.measured_weather import MeasuredTable, read_measured
 from scenes.heat.study_file import StudyFile
@@ -150,6 +152,15 @@ view_factors = false
     assert list(months.loc[months["heat [kWh]"] > 0, "month"]) == [4]
     assert summary["pmv_IV_h"] <= 20.0  # two days of ten hours
     assert hours["outdoor_c"].iloc[0] == pytest.approx(10.0 + 12 / 100.0)
+
+
+def test_energyplus_is_not_given_measured_weather(tmp_path) -> None:
+    measured = table_of()
+    study = SimpleNamespace(measured=measured, weather=tmp_path / "site.csv")
+    with pytest.raises(DataError, match="EnergyPlus needs an EPW file") as found:
+        check_twin(study)
+    assert found.value.file == study.weather and found.value.field == "measured"
+    check_twin(SimpleNamespace(measured=None, weather=tmp_path / "city.epw"))
 
 
 def test_a_few_days_say_nothing_of_the_ground(tmp_path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import wraps
 
 import numpy as np
 import pytest
@@ -49,6 +50,46 @@ def test_view_factors_of_a_room_with_a_window(variant, room):
     exchange = exchange_from_view_factors(area, np.full(count, 0.9), radiant.among)
     np.testing.assert_allclose(exchange, exchange.T, atol=1e-9)
     np.testing.assert_allclose(exchange.sum(axis=1), 0.9 * np.array(area), rtol=1e-6)
+
+
+def test_view_factors_are_found_again_while_the_room_is_as_it_was(
+    variant, room, tmp_path, monkeypatch
+):
+    from mitsuba_cfs.matrices.cache import MatrixCache
+    from scenes.heat import radiant as module
+
+    cache = MatrixCache(tmp_path)
+
+    def factors(space, zoned, seed=0):
+        return module.radiant_room(space, zoned, samples=256, seed=seed, cache=cache)
+
+    first = factors(*room)
+    traced = []
+    for name in ("view_factors", "person_view_factors"):
+        found = getattr(module, name)
+        monkeypatch.setattr(module, name, _counted(found, name, traced))
+    again = factors(*room)
+    assert not traced
+    np.testing.assert_array_equal(again.among, first.among)
+    np.testing.assert_array_equal(again.person, first.person)
+    other = factors(*room, seed=1)
+    assert traced == ["view_factors", "person_view_factors"]
+    assert np.any(other.among != first.among)
+    space, zoned = room  # other surfaces alone: what a person sees from where is the same
+    turned = factors(space, replace(zoned, surface_of_face=zoned.surface_of_face[::-1]))
+    assert len(traced) == 4
+    assert np.any(turned.among != first.among)
+
+
+def _counted(function, name, calls):
+    """The function, which writes its name into a list whenever it is called."""
+
+    @wraps(function)
+    def counted(*arguments, **options):
+        calls.append(name)
+        return function(*arguments, **options)
+
+    return counted
 
 
 def test_felt_temperatures_follow_their_rules_and_energy_closes(variant, room):
