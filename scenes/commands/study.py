@@ -16,7 +16,6 @@ from scenes.commands.room_options import (
     page_option,
     write_ifc_option,
 )
-from scenes.page_options import OWN_PAGE, PageOptions, StudySection, read_page
 
 if TYPE_CHECKING:
     from scenes.study.plan import StudyPlan
@@ -63,9 +62,7 @@ def command(
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
-    study_to_folder(
-        study, parsed, out, processes, scheduler, write_ifc, page=read_page(page, StudySection)
-    )
+    study_to_folder(study, parsed, out, processes, scheduler, write_ifc, page=page)
 
 
 def study_to_folder(
@@ -76,10 +73,13 @@ def study_to_folder(
     scheduler: str | None = None,
     write_ifc: Path | None = None,
     *,
-    page: PageOptions = OWN_PAGE,
+    page: Path | None = None,
 ) -> None:
     """Compute a study with a progress bar, say what comes out case by case, write its files."""
-    files = (file, *parsed.files, *page.inputs)
+    from scenes.page_options import StudySection, read_page
+
+    page_options = read_page(page, StudySection)
+    files = (file, *parsed.files, *page_options.inputs)
     store = _checked(files, parsed, out, scheduler, write_ifc)
     from scenes.commands.compiling import compiled_beside
     from scenes.commands.progress_bar import ProgressBar
@@ -99,7 +99,7 @@ def study_to_folder(
             progress=progress, on_case=_print_case,
         )  # fmt: skip
     nothing = result.failed == len(result.results)
-    report = None if nothing else lambda path: write_study_report(result, path, page)
+    report = None if nothing else lambda path: write_study_report(result, path, page_options)
     write_study(parsed, result, store, report)
     _print_outcome(result, out)
     failed, total = result.failed, len(result.results)
