@@ -16,7 +16,7 @@ from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, ViewNoise, view_matrices
-from mitsuba_cfs.trace.room_sun import SunElements
+from mitsuba_cfs.trace.room_sun import EdgePlaces, SunElements
 from mitsuba_cfs.trace.sun_paths import Places
 
 SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
@@ -53,9 +53,10 @@ def _read(path: Path, view: View) -> ViewMatrices:
         elements: list[SunElements | None] = [None, None]
         if "places_point" in data:
             places = Places(data["places_point"], data["places_normal"])
-            smooth = _sparse(data, "smooth")
+            more = Places(data["more_point"], data["more_normal"])
+            ends = _sparse(data, "smooth"), EdgePlaces(more, _sparse(data, "beside"))
             elements = [
-                SunElements(places, _sparse(data, f"far{i}"), _sparse(data, f"near{i}"), smooth)
+                SunElements(places, _sparse(data, f"far{i}"), _sparse(data, f"near{i}"), *ends)
                 for i in range(2)
             ]
         noise = ViewNoise(data["indirect_noise"], data["lit_noise"], elements[1])
@@ -92,7 +93,9 @@ def _of_elements(*elements: SunElements | None) -> dict[str, np.ndarray]:
         if found is not None:
             arrays |= _arrays(f"far{i}", found.share) | _arrays(f"near{i}", found.near)
             arrays |= _arrays("smooth", found.smooth)
-            arrays |= {"places_point": found.places.point, "places_normal": found.places.normal}
+            arrays |= _arrays("beside", found.edges.beside)
+            for name, places in (("places", found.places), ("more", found.edges.places)):
+                arrays |= {f"{name}_point": places.point, f"{name}_normal": places.normal}
     return arrays
 
 

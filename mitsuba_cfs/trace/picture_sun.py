@@ -23,7 +23,7 @@ from mitsuba_cfs.trace.picture_disc import (
     disc_reach,
 )
 from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
-from mitsuba_cfs.trace.room_sun import SunElements
+from mitsuba_cfs.trace.room_sun import EDGE_POINTS, SunElements
 from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.scene import OPAQUE, kept_scene
 from mitsuba_cfs.trace.sun_discs import Scattering
@@ -148,8 +148,25 @@ class PictureSun:
             cosine = dr.dot(normal, to_sun)
             tau = self._straight(point, to_sun, cosine > 0)
             light = dr.select(tau > 0, tau * cosine, 0.0).numpy().reshape(places.size, len(hours))
+            self._look_at_edges(elements, light, suns[hours])
             found[:, hours] += elements.rows(light * illuminance[hours].astype(np.float32))
         return found
+
+    def _look_at_edges(self, elements: SunElements, light: NDArray, suns: NDArray) -> None:
+        """Put the mean over its places on each element near rows that the edge of sun crosses."""
+        near = light[len(light) - elements.near.shape[1] :]
+        element, hour = elements.edges.crossed(near)
+        step = LANES // EDGE_POINTS
+        for start in range(0, len(hour), step):
+            part = slice(start, start + step)
+            number = (element[part, None] * EDGE_POINTS + np.arange(EDGE_POINTS)).ravel()
+            places = elements.edges.places.some(number)
+            towards = vectors(np.repeat(suns[hour[part]], EDGE_POINTS, axis=0))
+            to_sun = on_disc_of(towards, column(number, mi.UInt32))
+            cosine = dr.dot(places.normals(), to_sun)
+            tau = self._straight(places.points(), to_sun, cosine > 0)
+            value = dr.select(tau > 0, tau * cosine, 0.0).numpy()
+            near[element[part], hour[part]] = value.reshape(-1, EDGE_POINTS).mean(axis=1)
 
     def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:
         """Where the light of suns comes from, and its illuminance: 0 with the sun down."""

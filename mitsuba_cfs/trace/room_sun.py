@@ -10,7 +10,8 @@ What lies far from a place lights it much as the places beside it, and many tile
 is near (the wall that meets the floor in a corner) does not: it is taken by rays of each tile's
 own, to elements as small as they are near.  The weight of a place at distance d from a surface
 that is D from the eye goes over from one to the other between d = N D / 2 and N D, N the angle
-of `NEAR_TILES`.
+of `NEAR_TILES`.  The sun is asked for at one place of an element so near; where the edge of a
+spot of sun crosses it, at many (`EdgePlaces`).
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
 ELEMENTS = 1024  # into which the surfaces' area is divided, about
 POINTS = 4  # on each, that the sun is taken at; one on those near a tile
+EDGE_POINTS = 16  # on one near a tile that the edge of a spot of sun crosses
 PATHS = 2**19  # of a view at most, but one of each pixel
 MOST_PATHS = 32  # of a pixel
 RAYS = 2**18  # at once
@@ -46,6 +48,20 @@ HALVINGS = 4  # of the elements' edge at most
 
 
 @dataclass(frozen=True, slots=True)
+class EdgePlaces:
+    """More places on the elements near rows, for those that the edge of a spot of sun crosses."""
+
+    places: Places  # [f * EDGE_POINTS]
+    beside: sparse.csr_array  # [f, f] 1 for elements that share an edge, or one holds the other
+
+    def crossed(self, light: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Elements and hours [p] whose light [f, h] is there and not all beside, or the reverse."""
+        lit = (light > 0).astype(np.uint8)
+        bright, count = self.beside @ lit, np.diff(self.beside.indptr)[:, None]
+        return np.nonzero(np.where(lit, bright < count, bright > 0))
+
+
+@dataclass(frozen=True, slots=True)
 class SunElements:
     """Parts of the surfaces that reflect the sun, and what each row of a picture has of them."""
 
@@ -53,6 +69,7 @@ class SunElements:
     share: sparse.csr_array  # [m, e] luminance of a row per unit irradiance of an element
     near: sparse.csr_array  # [m, f] the same of the smaller elements near rows, not to be smoothed
     smooth: sparse.csr_array  # [m, m] of rows, after `share`: the product of both would be full
+    edges: EdgePlaces  # of the elements near rows
 
     def rows(self, irradiance: NDArray[np.float32]) -> NDArray[np.float32]:
         """Luminance [m, h] of rows under the irradiance [.., h] of the elements' places."""
@@ -63,7 +80,7 @@ class SunElements:
     def of_rows(self, rows: sparse.csr_array, smooth: sparse.csr_array) -> SunElements:
         """Of other rows [k] that these make up [k, m], with their smoothing."""
         share, near = (sparse.csr_array(rows @ part) for part in (self.share, self.near))
-        return SunElements(self.places, share, near, smooth)
+        return SunElements(self.places, share, near, smooth, self.edges)
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +231,7 @@ def sun_elements(
     chosen, again = np.flatnonzero(close[rows.row]), rows.times(smoothed=False)
     blocks = _Pixels.of(rows, chosen, again[chosen]).blocks(rays_each)
     near = [look.near(part, rays_each) for part in blocks]
-    hits = ((_Hits.joined(far), POINTS), (_Hits.joined(near), 1))
+    hits = _Hits.joined(far), _Hits.joined(near)
     return _summed(hits, 2 * len(rows.keys), edge, seed), close
 
 
@@ -252,33 +269,58 @@ def window_elements(
     window_batches(tracer, bins, 1, samples, seed, follow)(0)
     edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
     rows = len(tracer.groups) * bins.size
-    return _summed(((_Hits.joined(found), POINTS), (_Hits.joined([]), 1)), rows, edge, seed)
+    return _summed((_Hits.joined(found), _Hits.joined([])), rows, edge, seed)
 
 
-def _summed(hits: Sequence[tuple[_Hits, int]], rows: int, edge: float, seed: int) -> SunElements:
-    """Elements of an edge [m] by hits far and near, and how many points to take on each."""
+def _summed(hits: Sequence[_Hits], rows: int, edge: float, seed: int) -> SunElements:
+    """Elements of an edge [m] by hits far and near."""
     shares, places = [], []
-    for some, points in hits:
-        element, count = _elements(some, edge)
+    for some, points in zip(hits, (POINTS, EDGE_POINTS), strict=True):
+        element, cubes = _elements(some, edge)
         entries = some.weight.astype(np.float32), (some.row, element)
-        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(rows, count))))
-        places.append(some.places.some(_chosen(element, count, points, seed)))
+        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(rows, len(cubes)))))
+        places.append(some.places.some(_chosen(element, len(cubes), points, seed)))
+    far, near = places
+    first = Places.joined([far, near.some(np.arange(0, near.size, EDGE_POINTS))])
     alone = sparse.csr_array(sparse.eye_array(rows, dtype=np.float32))
-    return SunElements(Places.joined(places), *shares, alone)
+    return SunElements(first, *shares, alone, EdgePlaces(near, _beside(cubes)))
 
 
-def _elements(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], int]:
-    """The element of each place, cubes of an edge [m] by the side of the surface; how many."""
+def _elements(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The element of each place, cubes of an edge [m] by the side of the surface.
+
+    Returns: [q], and of each element the cube's numbers, the side and the halvings [e, 7], sorted.
+    """
     places = hits.places
-    if not places.size:
-        return np.empty(0, dtype=np.int64), 0
     cube = np.floor(places.point * (0.5**-hits.halvings / edge)[:, None]).astype(np.int64)
     side = np.round(places.normal * FACE_STEPS).astype(np.int64)
     table = np.concatenate([cube, side, hits.halvings[:, None]], axis=1)
-    table -= table.min(axis=0)
-    key = np.ravel_multi_index(tuple(table.T), tuple(table.max(axis=0) + 1))
-    found, element = np.unique(key, return_inverse=True)
-    return element, len(found)
+    _, first, element = np.unique(_keys(table, table), return_index=True, return_inverse=True)
+    return element, table[first]
+
+
+def _keys(some: NDArray[np.int64], table: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers of rows [n, 7] in their order, of one outside the table none of the table's."""
+    if not len(table):  # no element
+        return np.empty(0, dtype=np.int64)
+    low, high = table.min(axis=0) - 1, table.max(axis=0) + 1
+    return np.ravel_multi_index(tuple((np.clip(some, low, high) - low).T), tuple(high - low + 1))
+
+
+def _beside(cubes: NDArray[np.int64]) -> sparse.csr_array:
+    """1 for elements [f, f] of one size that share an edge, and for those that hold another."""
+    count, keys = len(cubes), _keys(cubes, cubes)
+    pairs = [np.empty((2, 0), dtype=np.int64)]
+    holders = np.column_stack([cubes[:, :3] // 2, cubes[:, 3:6], cubes[:, 6] - 1])
+    for others in (holders, *(cubes + step for step in np.eye(7, dtype=np.int64)[:3])):
+        wanted = _keys(others, cubes)
+        place = np.minimum(np.searchsorted(keys, wanted), count - 1)
+        found = np.flatnonzero(keys[place] == wanted)
+        pairs.append(np.stack([found, place[found]]))
+    one, other = np.concatenate(pairs, axis=1)
+    both = np.concatenate([one, other]), np.concatenate([other, one])
+    ones = np.ones(len(both[0]), dtype=np.uint8)
+    return sparse.csr_array((ones, both), shape=(count, count))
 
 
 def _chosen(element: NDArray[np.int64], count: int, points: int, seed: int) -> NDArray[np.int64]:
