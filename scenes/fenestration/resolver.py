@@ -126,7 +126,8 @@ def source_notes(sources: Iterable[dict]) -> tuple[str, ...]:
 def windows_named(names: list[str]) -> str:
     """Windows in words, the first few by name; the noun where their names have it not."""
     if all(name.casefold().startswith("window") for name in names):
-        return _listed(names)
+        listed = _listed(names)
+        return listed[:1].upper() + listed[1:]
     return f"{'Window' if len(names) == 1 else 'Windows'} {_listed(names)}"
 
 

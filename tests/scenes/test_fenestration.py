@@ -368,7 +368,7 @@ def test_exports_say_what_is_not_known(tmp_path, capsys) -> None:
 def test_windows_of_one_name_are_counted():
     """Five times "Fenster-002" in a row says nothing; what is left counts windows, not names."""
     assert windows_named(["a"]) == "Window a"
-    assert windows_named(["Window A", "window B"]) == "Window A, window B"
+    assert windows_named(["window A", "Window B"]) == "Window A, Window B"
     assert windows_named(["a", "b", "a", "a"]) == "Windows a (3), b"
     names = ["n", "n", *"abcdefghij", "i", "j"]
     assert windows_named(names).startswith("Windows n (2), a, b")
