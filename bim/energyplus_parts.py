@@ -182,7 +182,22 @@ def opaque_surface(
     }
 
 
-def window_surface(construction: str, parent: str, glass: NDArray[np.float64]) -> dict[str, Any]:
+def write_window(
+    model: Model, name: str, zone: str, window: Window, *, frame: str, glazing: str
+) -> None:
+    """Write a window: a rectangle of glass in one of the opening, which stands for the frame.
+
+    Args: frame, glazing: their constructions.
+    """
+    glass, opening = window_rectangles(window)
+    kind, parent = "Roof" if window.normal[2] > 0.5 else "Wall", f"{name} frame"
+    model["BuildingSurface:Detailed"][parent] = opaque_surface(
+        kind, frame, zone, "Outdoors", opening
+    )
+    model["FenestrationSurface:Detailed"][name] = _window_surface(glazing, parent, glass)
+
+
+def _window_surface(construction: str, parent: str, glass: NDArray[np.float64]) -> dict[str, Any]:
     """A window [4, 3] in its parent surface."""
     return {
         "surface_type": "Window",

@@ -37,7 +37,7 @@ from bim.energyplus_parts import (
     rectangle,
     vertices,
     window_rectangles,
-    window_surface,
+    write_window,
 )
 from bim.energyplus_windows import WindowOptics, complex_state, shading_control
 from bim.model import Building, Element, Face, Space
@@ -219,15 +219,9 @@ class EnergyPlusTwin:
     def _window(self, zone: str, room: TwinRoom, index: int) -> None:
         """A window in its frame, with its constructions."""
         window, name = room.space.windows[index], f"{zone} W{index}"
-        glass, opening = window_rectangles(window)
-        frame = _frame_surface(room, window.normal)
-        construction, _, _ = self._construction(f"{name} frame", frame)
-        parent = f"{name} frame"
-        self.model["BuildingSurface:Detailed"][parent] = opaque_surface(
-            "Roof" if window.normal[2] > 0.5 else "Wall", construction, zone, "Outdoors", opening
-        )
+        frame, _, _ = self._construction(f"{name} frame", _frame_surface(room, window.normal))
         states = [self._state(optics) for optics in room.optics[window.guid]]
-        self.model["FenestrationSurface:Detailed"][name] = window_surface(states[0], parent, glass)
+        write_window(self.model, name, zone, window, frame=frame, glazing=states[0])
         held = np.minimum(room.state, len(states) - 1)
         if np.any(held):
             schedule = self.schedules.name(f"{name} state", held)

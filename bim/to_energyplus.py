@@ -21,8 +21,7 @@ from bim.energyplus_parts import (
     opaque_construction,
     opaque_surface,
     outlines,
-    window_rectangles,
-    window_surface,
+    write_window,
 )
 from bim.model import Building, Construction, Face, Space, Window
 from mitsuba_cfs.files import write_text
@@ -96,20 +95,14 @@ def _zone(
 
 def _window(model: Model, name: str, zone: str, window: Window, u: float, g: float) -> None:
     """A rectangle of glass in a parent of the size of the opening."""
-    glass, opening = window_rectangles(window)
     frame = _construction(model, WINDOW_FRAME, None)
-    kind = "Roof" if window.normal[2] > 0.5 else "Wall"
-    parent = f"{name} frame"
-    model["BuildingSurface:Detailed"][parent] = opaque_surface(
-        kind, frame, zone, "Outdoors", opening
-    )
     system = f"Glazing U {u:.3f} g {g:.3f}"
     model["WindowMaterial:SimpleGlazingSystem"][system] = {
         "u_factor": u,
         "solar_heat_gain_coefficient": g,
     }
     model["Construction"][system] = {"outside_layer": system}
-    model["FenestrationSurface:Detailed"][name] = window_surface(system, parent, glass)
+    write_window(model, name, zone, window, frame=frame, glazing=system)
 
 
 def _construction(model: Model, construction: Construction, face: Face | None) -> str:

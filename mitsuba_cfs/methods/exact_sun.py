@@ -20,16 +20,21 @@ SUN_BATCHES = 4  # of C_ds
 
 
 def exact_sun(
-    traced: PhaseScene, systems: Sequence[States], sky: AnnualSky, progress: Progress = silent
+    traced: PhaseScene,
+    systems: Sequence[States],
+    suns: NDArray[np.float64],
+    progress: Progress = silent,
 ) -> list[Estimate | None]:
     """C_ds [G, S, Q] of the hours in which the sun shines on a window, in each state [J].
 
-    None in a state where it never does, or the method has no exact sun.
+    None where it never does, or the method has no exact sun.
 
-    Args: systems: states of each window group [G].
+    Args:
+        systems: states of each window group [G].
+        suns: directions [Q, 3] of the sun in these hours.
     """
-    hours, count = shining_hours(traced, sky), max(map(len, systems))
-    if not traced.five_phase or not len(hours):
+    count = max(map(len, systems))
+    if not traced.five_phase or not len(suns):
         return [None] * count
     scene, chosen = traced.scene, traced.sampling
     found: list[Estimate | None] = []
@@ -38,7 +43,7 @@ def exact_sun(
         found.append(
             direct_sun_matrix(
                 scene.interior, scene.exterior, scene.groups, ways, *scene.sensors(),
-                suns=sky.direction[hours],
+                suns=suns,
                 window_points=max(chosen.sun_points // SUN_BATCHES, 1),
                 stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
                 progress=part(progress, j / count, (j + 1) / count, "daylight"),

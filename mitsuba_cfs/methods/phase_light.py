@@ -158,7 +158,9 @@ class PhaseLight:
     @cached_property
     def sensors(self) -> list[list[SensorLight]]:
         """What each window group gives to the sensors in each of its states."""
-        exact = exact_sun(self._traced, self.filled.systems, self.sky, self.progress)
+        exact = exact_sun(
+            self._traced, self.filled.systems, self.sky.direction[self._shining], self.progress
+        )
         return [
             [self._sensor_light(g, j, exact) for j in range(len(states))]
             for g, states in enumerate(self.filled.systems)
@@ -257,6 +259,11 @@ class PhaseLight:
             return None
         return self.filled.reflected_sun.light(self.sky)
 
+    @cached_property
+    def _shining(self) -> NDArray[np.int64]:
+        """The hours L in which the sun stands before a window."""
+        return shining_hours(self._traced, self.sky)
+
     def _sensor_light(self, g: int, j: int, exact: list[Estimate | None]) -> SensorLight:
         diffuse = sum(self._diffuse_light(q, g, j) for q in self._traced.parts.of(g))
         diffuse = diffuse + self.filled.straight.light(g, j, self.sky)
@@ -268,7 +275,7 @@ class PhaseLight:
             beams = (self.windows[q][j].beam is not None for q in self._traced.parts.of(g))
             more = self._reflected_sun.sensors(g, j, beam=any(beams))
             diffuse, error = diffuse + more.values, more.sum_error
-        sun, shining = np.zeros_like(diffuse), shining_hours(self._traced, self.sky)
+        sun, shining = np.zeros_like(diffuse), self._shining
         if exact[j] is None:
             return SensorLight(diffuse, sun, error)
         luminance = self.sky.illuminance[shining] / SUN_SOLID_ANGLE

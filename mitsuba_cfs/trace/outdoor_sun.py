@@ -54,10 +54,8 @@ class OutdoorSun:
         self._places, column = shown.places.some(first), np.arange(len(first))
         self._shown, row = np.unique(shown.pixel[first], return_inverse=True)
         every = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
-        self._number, self._first = (
-            every[self._shown],
-            np.searchsorted(row, np.arange(row.max(initial=-1) + 2)),
-        )
+        self._number = every[self._shown]
+        self._first = np.searchsorted(row, np.arange(row.max(initial=-1) + 2))
         self._all = shown.places.some(np.argsort(place, kind="stable"))
         self._ends = np.concatenate([[0], np.cumsum(np.bincount(place, minlength=len(first)))])
         shape = len(self._shown), len(first)

@@ -78,14 +78,14 @@ class PictureRows:
 
         Args: smoothed: whether its light is; then as many pixels are behind it as stand there.
         """
+        if self.tiles.size == 1:
+            return np.ones(len(self.row), dtype=np.int64)
         count = np.bincount(self.row, minlength=len(self.keys)).astype(float)
         wanted = float(self.tiles.size**2)
-        if smoothed and self.tiles.size > 1:
+        if smoothed:
             weights = self.smoothing(np.ones(len(self.row), dtype=np.float32), 1.0)
             count = 1 / np.maximum(weights.power(2) @ (1 / np.maximum(count, 1)), 1e-12)
             wanted *= SMOOTHED_TILES
-        if self.tiles.size == 1:
-            return np.ones(len(self.row), dtype=np.int64)
         return np.clip(np.ceil(wanted / count), 1, MOST_TIMES).astype(np.int64)[self.row]
 
     def of_halves(

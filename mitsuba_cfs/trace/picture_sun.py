@@ -144,10 +144,8 @@ class PictureSun:
         step = max(1, LANES // places.size)
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
-            point, normal, to_sun = place_and_hour(places, suns[hours])
-            cosine = dr.dot(normal, to_sun)
-            tau = self._straight(point, to_sun, cosine > 0)
-            light = dr.select(tau > 0, tau * cosine, 0.0).numpy().reshape(places.size, len(hours))
+            light = self._beam_at(*place_and_hour(places, suns[hours]))
+            light = light.reshape(places.size, len(hours))
             self._look_at_edges(elements, light, suns[hours])
             found[:, hours] += elements.rows(light * illuminance[hours].astype(np.float32))
         return found
@@ -163,10 +161,16 @@ class PictureSun:
             places = elements.edges.places.some(number)
             towards = vectors(np.repeat(suns[hour[part]], EDGE_POINTS, axis=0))
             to_sun = on_disc_of(towards, column(number, mi.UInt32))
-            cosine = dr.dot(places.normals(), to_sun)
-            tau = self._straight(places.points(), to_sun, cosine > 0)
-            value = dr.select(tau > 0, tau * cosine, 0.0).numpy()
+            value = self._beam_at(places.points(), places.normals(), to_sun)
             near[element[part], hour[part]] = value.reshape(-1, EDGE_POINTS).mean(axis=1)
+
+    def _beam_at(
+        self, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f
+    ) -> NDArray[np.float32]:
+        """Irradiance of places through the windows, per unit normal to the sun [n]."""
+        cosine = dr.dot(normal, to_sun)
+        tau = self._straight(point, to_sun, cosine > 0)
+        return dr.select(tau > 0, tau * cosine, 0.0).numpy()
 
     def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:
         """Where the light of suns comes from, and its illuminance: 0 with the sun down."""

@@ -32,6 +32,10 @@ class GridLight:
     closed: NDArray[np.bool_] | None = None  # [H, G] when the blinds of each group are closed
     free: NDArray[np.bool_] | None = None  # [H, G] when one sees out through each group
 
+    def hours_at_points(self, lux: float, step_h: float) -> FloatArray:
+        """Hours [S] in which each point gets an illuminance with every window open."""
+        return step_h * np.count_nonzero(self.open >= lux, axis=0)
+
 
 @dataclass(frozen=True, slots=True)
 class Calendar:

@@ -285,7 +285,7 @@ class WorstHours(Need):
         """Hours."""
         if room.light is None:
             return None
-        return float(room.step_h * np.count_nonzero(room.light.open >= self.lux, axis=0).min())
+        return float(room.light.hours_at_points(self.lux, room.step_h).min())
 
 
 class PointHours(Need):
@@ -308,8 +308,7 @@ class PointHours(Need):
         """Share, 0 to 1, of the points, each by its own hours."""
         if room.light is None:
             return None
-        reached = room.step_h * np.count_nonzero(room.light.open >= self.lux, axis=0)
-        return area_share(reached >= self.hours)
+        return area_share(room.light.hours_at_points(self.lux, room.step_h) >= self.hours)
 
 
 class LightingEnergy(Need):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,6 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.thermal import operated_year, thermal_result
 from scenes.room.zone import RoomZone, balances, coupled
 
-# what the year has of the room under the same names
-KEPT = ("annual_glare", "dgp", "problems", "explored", "template", "borrowed")
 Heat = tuple[ThermalResult, OperationResult | None]
 
 
@@ -59,10 +57,10 @@ class DaylitRoom:
 
     def with_heat(self, heat: Heat) -> RoomYear:
         """The whole year."""
-        kept = {name: getattr(self, name) for name in KEPT}
         thermal, ran = heat
+        names = (field.name for field in fields(self) if field.name != "inputs")
         return RoomYear(
-            self.space, self.daylight, self.glare, thermal, self.seconds, operation=ran, **kept
+            heat=thermal, operation=ran, **{name: getattr(self, name) for name in names}
         )
 
 
