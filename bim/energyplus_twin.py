@@ -60,6 +60,7 @@ OUTPUTS = (
     "Zone Ideal Loads Zone Sensible Cooling Rate",
     "Surface Window Transmitted Solar Radiation Rate",
     "Surface Outside Face Incident Solar Radiation Rate per Area",
+    "Surface Inside Face Solar Radiation Heat Gain Rate",
 )
 
 

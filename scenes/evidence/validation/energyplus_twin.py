@@ -4,8 +4,8 @@
 
 Each study runs by `cfs thermal STUDY.toml --energyplus`; EnergyPlus then runs the model that this
 has written, with the study's own weather file.  With `--their-sun` our balance is solved again with
-EnergyPlus' sun in every hour: on the outer walls, absorbed by the window layers as what falls on
-the glass, indoors as what passes it.  What still differs then is not the sun's.
+EnergyPlus' sun in every hour: on the outer walls, in the window layers by what falls on the glass,
+and indoors what the room's surfaces absorb.  What still differs then is not the sun's.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ HEATING = "Zone Ideal Loads Zone Sensible Heating Rate"
 COOLING = "Zone Ideal Loads Zone Sensible Cooling Rate"
 INCIDENT = "Surface Outside Face Incident Solar Radiation Rate per Area"
 SUN = "Surface Window Transmitted Solar Radiation Rate"
+ABSORBED = "Surface Inside Face Solar Radiation Heat Gain Rate"
+# our sums of the sun, and what the table calls them
+SUMS = {"incident_w": "sun on", "transmitted_w": "sun in", "absorbed_room_w": "sun kept"}
 
 
 def compared(path: Path, folder: Path, *, their_sun: bool = False) -> list[pd.DataFrame]:
@@ -62,15 +65,16 @@ def compared(path: Path, folder: Path, *, their_sun: bool = False) -> list[pd.Da
     return tables
 
 
-def their_sums(zone: str, room: RoomZone, theirs: pd.DataFrame) -> tuple[Hours, Hours]:
-    """EnergyPlus' sun [H] [W] on the windows of a room, and through them."""
-    glass = [shouted(f"{zone} W{k}") for k in range(len(room.zone.windows))]
-    areas = [window.area for window in room.zone.windows]
-    on, through = np.zeros(len(theirs)), np.zeros(len(theirs))
-    for name, area in zip(glass, areas, strict=True):
-        on += area * theirs[f"{name}:{INCIDENT}"].to_numpy()
-        through += theirs[f"{name}:{SUN}"].to_numpy()
-    return on, through
+def their_sums(zone: str, room: RoomZone, theirs: pd.DataFrame) -> dict[str, Hours]:
+    """EnergyPlus' sun [H] [W] on the windows of a room, through them, and in its surfaces."""
+    found = {name: np.zeros(len(theirs)) for name in SUMS}
+    for k, window in enumerate(room.zone.windows):
+        name = shouted(f"{zone} W{k}")
+        found["incident_w"] += window.area * theirs[f"{name}:{INCIDENT}"].to_numpy()
+        found["transmitted_w"] += theirs[f"{name}:{SUN}"].to_numpy()
+    own = [c for c in theirs if c.startswith(shouted(f"{zone} ")) and c.endswith(f":{ABSORBED}")]
+    found["absorbed_room_w"] += theirs[own].to_numpy().sum(axis=1)
+    return found
 
 
 def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
@@ -79,7 +83,7 @@ def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
     An hour in which we have no sun is spread as our year's.
     """
     sun = room.solar
-    sums = dict(zip(("incident_w", "transmitted_w"), their_sums(zone, room, theirs), strict=True))
+    sums = their_sums(zone, room, theirs)
 
     def scaled(values: Hours | None, name: str) -> Hours | None:
         if values is None or name not in room.gains:
@@ -99,7 +103,7 @@ def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
         sun,
         absorbed_outer=scaled(sun.absorbed_outer, "incident_w"),
         absorbed_inner=scaled(sun.absorbed_inner, "incident_w"),
-        inside=scaled(sun.inside, "transmitted_w"),
+        inside=scaled(sun.inside, "absorbed_room_w"),
         window_inside=scaled(sun.window_inside, "transmitted_w"),
         facade=facade,
     )
@@ -111,7 +115,7 @@ def _rows(zones: Sequence[str], found: BalancedRooms, theirs: pd.DataFrame) -> p
     for zone, room, result in zip(zones, found.rooms, found.results, strict=True):
         air = theirs[f"{shouted(zone)}:{AIR}"].to_numpy()
         plant = shouted(f"{zone} plant")
-        on, through = (sums.sum() / 1e3 for sums in their_sums(zone, room, theirs))
+        sums = their_sums(zone, room, theirs)
         gap = (result.air_c - air)[SETTLED:]
         row = {"room": result.name, "air RMSE": np.sqrt(np.mean(gap**2)), "bias": gap.mean()}
         for name, ours, key in (
@@ -121,12 +125,9 @@ def _rows(zones: Sequence[str], found: BalancedRooms, theirs: pd.DataFrame) -> p
             row[name] = ours.sum() / 1e3
             other = theirs.get(f"{plant}:{key}")
             row[f"{name} E+"] = np.nan if other is None else other.sum() / 1e3
-        for name, key, other in (
-            ("sun on", "incident_w", on),
-            ("sun in", "transmitted_w", through),
-        ):
+        for key, name in SUMS.items():
             row[name] = room.gains.get(key, np.zeros(1)).sum() / 1e3
-            row[f"{name} E+"] = other
+            row[f"{name} E+"] = sums[key].sum() / 1e3
         rows.append(row)
     table = pd.DataFrame(rows).set_index("room")
     total = table.drop(columns=["air RMSE", "bias"]).sum()

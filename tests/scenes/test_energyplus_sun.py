@@ -1,0 +1,63 @@
+"""The studies that EnergyPlus computes too, and our rooms with EnergyPlus' sun."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenes.evidence.benchmarks.coupled_zones import row_of_zones
+from scenes.evidence.validation.energyplus_twin import ABSORBED, INCIDENT, SUN, with_their_sun
+from scenes.heat.study_file import read_study
+from scenes.room.zone import RoomZone
+from tests.conftest import REPOSITORY
+from thermal.climate import Solar
+
+STUDIES = sorted((REPOSITORY / "docs" / "tutorials" / "energyplus_twin").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
+def test_the_studies_read(path, real_data):
+    study = read_study(path)
+    assert study.loads.heating_c == 20 and len(study.system[0].layers) == 2
+
+
+def test_a_room_has_their_sums_spread_as_ours():
+    """Two hours and one in the dark: twice the sun on the glass, half of it indoors, own walls."""
+    (zone,) = row_of_zones(1)
+    walls, rng = len(zone.surfaces), np.random.default_rng(5)
+    inside = np.vstack([rng.random((2, walls)), np.zeros((1, walls))])
+    layers = np.array([[3.0], [5.0], [0.0]])
+    solar = Solar(layers, 0.5 * layers, inside, np.ones((3, walls)), window_inside=0.1 * layers)
+    own = np.array([30.0, 50.0, 0.0])
+    gains = {"incident_w": own, "transmitted_w": own, "absorbed_room_w": inside.sum(axis=1) * 9}
+    room = RoomZone(
+        None, SimpleNamespace(zone=zone), solar, gains, None, None, None, None, None
+    )  # fmt: skip
+    outdoor = [k for k, s in enumerate(zone.surfaces) if s.outside == "outdoor"]
+    area = zone.windows[0].area
+    theirs = pd.DataFrame({
+        f"Z0 W0:{INCIDENT}": np.array([60.0, 100.0, 8.0]) / area,
+        f"Z0 W0:{SUN}": [30.0, 50.0, 8.0],
+        f"Z0 S0:{ABSORBED}": gains["absorbed_room_w"] / 2 + [0.0, 0.0, 4.0],
+        f"Z0 S{outdoor[0]}.0:{INCIDENT}": [10.0, 20.0, 0.0],
+        f"Z0 S{outdoor[0]}.1:{INCIDENT}": [30.0, 40.0, 0.0],
+        f"Z01 S0:{ABSORBED}": [1e6, 1e6, 1e6],  # another room's
+    })  # fmt: skip
+    found = with_their_sun("Z0", room, theirs)
+    got = found.solar
+    np.testing.assert_allclose(got.absorbed_outer[:2], 2 * layers[:2])
+    np.testing.assert_allclose(got.absorbed_inner[:2], layers[:2])
+    np.testing.assert_allclose(got.window_inside[:2], 0.1 * layers[:2])
+    np.testing.assert_allclose(got.inside[:2], inside[:2] / 2)
+    # in our dark 8 of the year's 80 W, and 4 W as the year spreads what is absorbed
+    np.testing.assert_allclose(got.absorbed_outer[2], 8.0 / 80.0 * layers.sum(axis=0))
+    np.testing.assert_allclose(
+        got.inside[2], 4.0 * inside.sum(axis=0) / gains["absorbed_room_w"].sum()
+    )
+    np.testing.assert_allclose(got.facade[:, outdoor[0]], [20.0, 30.0, 0.0])
+    others = [k for k in range(walls) if k != outdoor[0]]
+    np.testing.assert_allclose(got.facade[:, others], 1.0)
+    assert found.gains["incident_w"] == pytest.approx([60.0, 100.0, 8.0])
