@@ -123,27 +123,27 @@ def picture_part_blocks(
     time = numbered(shown)
     options = {"samples": samples, "max_depth": max_depth, "seed": seed}
     for start in range(0, len(shown), size):
-        part = slice(start, start + size)
-        yield _block(
-            tracer, bins, view, shown[part], time[part], row[part], weight[part], **options
-        )
-        progress("picture", min(start + size, len(shown)) / len(shown))
+        end = start + size
+        part = shown[start:end], time[start:end], row[start:end], weight[start:end]
+        yield _block(tracer, bins, view, part, **options)
+        progress("picture", min(end, len(shown)) / len(shown))
 
 
 def _block(
     tracer: TracedScene,
     bins: DirectionBins,
     view: View,
-    pixels: NDArray[np.int64],
-    time: NDArray[np.int64],
-    row: NDArray[np.int64],
-    weight: NDArray[np.floating],
+    chosen: tuple[NDArray, NDArray, NDArray, NDArray],
     *,
     samples: int,
     max_depth: int,
     seed: int,
 ) -> PictureBlock:
-    """The rows of some pixels [n], each for the first time (0) or again [n]."""
+    """The rows of some pixels.
+
+    Args: chosen: pixels [n], each for the first time (0) or again [n], their rows and weights [n].
+    """
+    pixels, time, row, weight = chosen
     rows, place = np.unique(row, return_inverse=True)
     n, b = len(pixels), len(rows)
     shape = n + 2 * b, len(tracer.groups), bins.size
