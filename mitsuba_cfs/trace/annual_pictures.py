@@ -115,7 +115,8 @@ def view_matrices(
     elements, close = None, None
     if options.get("max_depth", 2) > 1:
         area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
-        elements, close = sun_elements(tracer, area, view, shared, times, seed=seed)
+        paths = {"samples": options.get("samples", 32), "seed": seed}
+        elements, close = sun_elements(tracer, area, view, shared, times, **paths)
     mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     found = (None, None)
     if elements is not None:
