@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
@@ -79,7 +77,7 @@ def carpet(
         "days": grid.shape[1],
         "divide": factor,
         "unit": scale.unit,
-        "values": base64.b64encode(np.round(coded).astype("<i2").tobytes()).decode("ascii"),
+        "values": np.round(coded).astype(int).ravel().tolist(),
     }
     return _carpet(times, scale.rgba(grid), pointer, title, explanation, scale=scale)
 
@@ -102,7 +100,7 @@ def class_carpet(
         "rows": grid.shape[0],
         "days": grid.shape[1],
         "names": [name for _, name in legend],
-        "values": base64.b64encode(number.astype("<i2").tobytes()).decode("ascii"),
+        "values": number.ravel().tolist(),
     }
     return _carpet(times, rgba, pointer, title, explanation, classes=legend)
 

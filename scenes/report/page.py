@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -97,6 +99,7 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
     )
     environment.filters["script_json"] = script_json
+    environment.filters["packed_json"] = packed_json
     environment.filters["tied"] = prose
     return environment
 
@@ -110,6 +113,13 @@ def prose(text: str) -> str:
 def script_json(value: object) -> Markup:
     """JSON that is safe inside a script element: no `<` can end it."""
     return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
+
+
+def packed_json(value: object) -> str:
+    """JSON for a script to unpack when it is asked for: deflated without a header, base64."""
+    text = json.dumps(value, separators=(",", ":")).encode()
+    packer = zlib.compressobj(9, wbits=-15)
+    return base64.b64encode(packer.compress(text) + packer.flush()).decode("ascii")
 
 
 def summary(result: RunResult) -> tuple[tuple[str, str], ...]:

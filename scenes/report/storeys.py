@@ -87,10 +87,15 @@ def storey_plans(result: RunResult) -> tuple[StoreyPlan, ...]:
     others = [space for space in result.building.spaces if space.guid not in numbers]
     storeys: dict[str, list[Space]] = {}
     for space in (*computed, *others):
-        storeys.setdefault(space.storey or f"Floor at {space.floor_level:.1f} m", []).append(space)
+        storeys.setdefault(storey_name(space), []).append(space)
     order = sorted(storeys, key=lambda name: min(space.floor_level for space in storeys[name]))
     shown = [name for name in order if any(space.guid in numbers for space in storeys[name])]
     return tuple(_storey(name, storeys[name], numbers) for name in shown)
+
+
+def storey_name(space: Space) -> str:
+    """The storey of a room; by its floor's height where the model has none."""
+    return space.storey or f"Floor at {space.floor_level:.1f} m"
 
 
 def _storey(name: str, spaces: Sequence[Space], numbers: dict[str, int]) -> StoreyPlan:

@@ -17,7 +17,7 @@
   const hide = () => { tip.hidden = true; };
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   function carpet(plot, data) {
-    const values = new Int16Array(bytes(data.values).buffer);
+    const values = data.values;
     const start = new Date(data.start + "T00:00:00Z");
     const two = (n) => String(n).padStart(2, "0");
     plot.addEventListener("pointermove", (event) => {
@@ -56,6 +56,19 @@
     });
     plot.addEventListener("pointerleave", () => { cursor.hidden = true; hide(); });
   }
-  for (const element of document.querySelectorAll(".carpet-data")) carpet(element.parentElement, JSON.parse(element.textContent));
-  for (const element of document.querySelectorAll(".readout-data")) readout(element.parentElement, JSON.parse(element.textContent));
+  // Unpacked when the pointer first comes: a building's page has hundreds of them
+  async function unpacked(element) {
+    const stream = new Blob([bytes(element.textContent)]).stream();
+    const text = stream.pipeThrough(new DecompressionStream("deflate-raw"));
+    return JSON.parse(await new Response(text).text());
+  }
+  for (const [name, show] of [["carpet", carpet], ["readout", readout]]) {
+    for (const element of document.querySelectorAll("." + name + "-data")) {
+      const plot = element.parentElement;
+      plot.addEventListener("pointerenter", async () => {
+        show(plot, await unpacked(element));
+        plot.dataset.read = "yes";
+      }, { once: true });
+    }
+  }
 })();
