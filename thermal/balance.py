@@ -205,7 +205,6 @@ def _work(net: Network, zones: int) -> records.Workspace:
         diagonal=np.zeros(n + zones),
         below=np.zeros(net.system.rows.size),
         right=np.zeros(n + zones),
-        column=np.zeros(n + zones),
         unknown=np.zeros(n + zones),
         air=np.zeros((zones, 2)),
         plant=np.zeros(zones, dtype=np.int64),

@@ -157,41 +157,6 @@ def layer_absorptances(
     return LayerAbsorptances(outer=alpha - kept, inner=kept, clipped=clipped)
 
 
-def secondary_heat_gain(
-    absorptance_outer: ArrayLike,
-    absorptance_inner: ArrayLike,
-    u_value: float,
-    *,
-    r_outer: float = R_OUTER,
-    r_inner: float = R_INNER,
-) -> NDArray[np.float64]:
-    """Secondary gain q_i = U [R_e alpha_o + (R_e + R) alpha_i] per unit irradiance."""
-    outer, inner = np.asarray(absorptance_outer), np.asarray(absorptance_inner)
-    return u_value * (r_outer * outer + (1.0 / u_value - r_inner) * inner)
-
-
-def steady_window(
-    outdoor_c: float,
-    indoor_c: float,
-    absorbed_outer: ArrayLike,
-    absorbed_inner: ArrayLike,
-    r: float,
-    *,
-    r_outer: float = R_OUTER,
-    r_inner: float = R_INNER,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Outer and inner layer temperature [degC] and heat to the room [W/m2], in the steady state.
-
-    absorbed_outer, absorbed_inner: [...] [W/m2].  The heat leaves out what is transmitted.
-    """
-    s_o, s_i = np.asarray(absorbed_outer, float), np.asarray(absorbed_inner, float)
-    total = r_outer + r + r_inner
-    to_room = ((outdoor_c - indoor_c) + r_outer * s_o + (r_outer + r) * s_i) / total
-    inner = indoor_c + r_inner * to_room
-    outer = inner + r * (to_room - s_i)
-    return outer, inner, to_room
-
-
 def linear_u(u_value: float, *, slope: float = SLOPE, reference_c: float = 10.0) -> LayerResistance:
     """R from a U-value that grows linearly with the mean layer temperature (Fener: 0.65 %/K)."""
     per_kelvin = u_value * slope

@@ -12,6 +12,10 @@ from thermal.records import INLINED
 
 MINIMUM = 0.1  # EnergyPlus' lower limit of an inside film
 
+# ISO 15099: Rayleigh number at which the air along vertical glass turns turbulent
+CRITICAL = float(2.5e5 * np.exp(0.72 * 90.0) ** 0.2)
+CRITICAL_CBRT, CRITICAL_ROOT = float(np.cbrt(CRITICAL)), CRITICAL**0.25  # both compiled in
+
 # DOE-2 / MoWiTT: (a, b) of h = a V^b, windward and leeward
 DOE2_WINDWARD, DOE2_LEEWARD = (3.26, 0.89), (3.55, 0.617)
 
@@ -64,11 +68,10 @@ def iso15099_inside(glass_c: float, air_c: float, height: float) -> float:
     capacity = 1002.737 + 0.012324 * film
     density = 101325.0 * 28.97 / (8314.51 * film)
     rayleigh = density**2 * height**3 * 9.81 * capacity * dt / (film * viscosity * conductivity)
-    critical = 2.5e5 * np.exp(0.72 * 90.0) ** 0.2
-    if rayleigh <= critical:
+    if rayleigh <= CRITICAL:
         nusselt = 0.56 * np.sqrt(np.sqrt(rayleigh))
     else:
-        nusselt = 0.13 * (np.cbrt(rayleigh) - np.cbrt(critical)) + 0.56 * critical**0.25
+        nusselt = 0.13 * (np.cbrt(rayleigh) - CRITICAL_CBRT) + 0.56 * CRITICAL_ROOT
     return nusselt * conductivity / height
 
 

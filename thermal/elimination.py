@@ -21,9 +21,9 @@ class Elimination(NamedTuple):
     place: NDArray[np.int64]  # [U] position of each unknown in the order
     start: NDArray[np.int64]  # [U + 1] first entry of each column
     rows: NDArray[np.int64]  # [E] positions of the rows, ascending in each column
-    left_start: NDArray[np.int64]  # [U + 1] first of each row's entries in columns before it
-    left_column: NDArray[np.int64]  # [E]
-    left_entry: NDArray[np.int64]  # [E]
+    # [M] entry that each product of two entries of a column is taken from, in the order of their
+    # making: column by column, the first of the two, the second after it
+    target: NDArray[np.int64]
 
     def entries(self, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
         """Entry of each pair of unknowns [P, 2]: [P]."""
@@ -58,16 +58,11 @@ def elimination(unknowns: int, pairs: Iterable[tuple[int, int]]) -> Elimination:
     columns = [np.sort(place[list(below[u])]) for u in order]
     start = np.concatenate([[0], np.cumsum([len(column) for column in columns])])
     rows = np.concatenate([np.empty(0, dtype=np.int64), *columns])
-    of_row = np.argsort(rows, kind="stable")
-    counts = np.bincount(rows, minlength=unknowns)
-    return Elimination(
-        place=place,
-        start=start,
-        rows=rows,
-        left_start=np.concatenate([[0], np.cumsum(counts)]),
-        left_column=np.repeat(np.arange(unknowns), np.diff(start))[of_row],
-        left_entry=of_row,
-    )
+    target = [np.empty(0, dtype=np.int64)]
+    for column in columns:
+        for number, row in enumerate(column):
+            target.append(start[row] + np.searchsorted(columns[row], column[number + 1 :]))
+    return Elimination(place=place, start=start, rows=rows, target=np.concatenate(target))
 
 
 @inlined
@@ -76,29 +71,26 @@ def eliminate(
     diagonal: NDArray[np.float64],
     below: NDArray[np.float64],
     right: NDArray[np.float64],
-    column: NDArray[np.float64],
 ) -> None:
     """Solve the system in place: L D L' column by column; `right` becomes the solution.
 
-    Symmetric and diagonally dominant: no pivoting.  Source: the left-looking sparse Cholesky, Davis
-    2006, doi:10.1137/1.9780898718881, 4.
+    Symmetric and diagonally dominant: no pivoting.  The diagonal becomes the inverse pivots.
+    Source: the right-looking sparse Cholesky, Davis 2006, doi:10.1137/1.9780898718881, 4, with
+    where each product goes looked up.
     """
-    d, e, b, c = diagonal, below, right, column
-    for j in range(d.size):
-        first, end = system.start[j], system.start[j + 1]
-        for m in range(first, end):
-            c[system.rows[m]] = e[m]
-        for q in range(system.left_start[j], system.left_start[j + 1]):
-            k, at = system.left_column[q], system.left_entry[q]
-            f = e[at] / d[k]
-            d[j] -= f * e[at]
-            b[j] -= f * b[k]
-            for m in range(at + 1, system.start[k + 1]):
-                c[system.rows[m]] -= f * e[m]
-        for m in range(first, end):
-            e[m] = c[system.rows[m]]
+    d, e, b, at = diagonal, below, right, 0
+    for k in range(d.size):
+        d[k] = 1.0 / d[k]
+        end = system.start[k + 1]
+        for m in range(system.start[k], end):
+            i, f = system.rows[m], e[m] * d[k]
+            d[i] -= f * e[m]
+            b[i] -= f * b[k]
+            for q in range(m + 1, end):
+                e[system.target[at]] -= f * e[q]
+                at += 1
     for j in range(d.size - 1, -1, -1):
         s = b[j]
         for m in range(system.start[j], system.start[j + 1]):
             s -= e[m] * b[system.rows[m]]
-        b[j] = s / d[j]
+        b[j] = s * d[j]

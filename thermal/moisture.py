@@ -103,15 +103,9 @@ def zone_humidity(
         humidity_ratio(np.array([getattr(z, key) for z in zones]), air, pressure[:, None])
         for key in ("humidify_to", "dehumidify_to")
     )
-    means, added = np.empty((hours, count)), np.empty((hours, count))
-    w = np.clip(np.full(count, outdoor_ratio[0]), low[0], high[0])
-    mean = w
-    for h in range(hours):
-        taken = density[h] * links[h]
-        total = flow[h] + taken.sum(axis=1)
-        inflow = flow[h] * outdoor_ratio[h] + taken @ mean + source[h]
-        w, mean, added[h] = _hour(w, total, inflow, mass[h] / row_s, low[h], high[h])
-        means[h] = mean
+    start = np.clip(np.full(count, outdoor_ratio[0]), low[0], high[0])
+    inflow = flow * outdoor_ratio[:, None] + source
+    means, added = _hours(start, flow, density, links, inflow, (mass / row_s, low, high))
     latent = added * (EVAPORATION + VAPOUR_HEAT * air)
     relative = relative_humidity(means, air, pressure[:, None])
     return tuple(
@@ -122,20 +116,34 @@ def zone_humidity(
     )
 
 
-def _hour(
-    w: FloatArray, total: FloatArray, inflow: FloatArray, mass: FloatArray, low: FloatArray,
-    high: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
-    """Ratio at the hour's end, its mean, and the vapour added (or taken: negative) [kg/s].
+def _hours(
+    start: FloatArray, flow: FloatArray, density: FloatArray, links: FloatArray,
+    inflow: FloatArray, air: tuple[FloatArray, FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Mean ratio of each hour [H, Z], and the vapour added (or taken: negative) [kg/s].
 
-    mass: of the air, per length of the hour [kg/s].
+    flow: outdoor air, inflow: vapour, both but for other zones [kg/s]; air: mass per length of the
+    hour [kg/s], least and greatest ratio.
     """
+    mass, low, high = air
+    beside = bool(np.any(links))
+    total = flow + density[:, None] * links.sum(axis=2) if beside else flow
     k = np.maximum(total / mass, 1e-9)
-    steady = inflow / np.maximum(total, 1e-9 * mass)
+    passing = np.maximum(total, 1e-9 * mass)
     gone = -np.expm1(-k)  # of the difference, at the hour's end
     kept = np.where(k < 1e-4, k / 2 - k**2 / 6, 1.0 - gone / k)  # gone of it in the hour's mean
-    end, mean = w + (steady - w) * gone, w + (steady - w) * kept
-    held = np.clip(end, low, high)
-    given = (held - end) * mass * k / gone  # evenly over the hour
-    mean = mean + (held - end) / gone * kept
-    return held, mean, given
+    steady = inflow / passing
+    before, ends = np.empty_like(flow), np.empty_like(flow)
+    w, mean = start, start
+    for h in range(len(flow)):
+        if beside:
+            steady[h] += density[h] * (links[h] @ mean) / passing[h]
+        before[h] = w
+        ends[h] = w + (steady[h] - w) * gone[h]
+        held = np.minimum(np.maximum(ends[h], low[h]), high[h])
+        if beside:
+            mean = w + (steady[h] - w) * kept[h] + (held - ends[h]) / gone[h] * kept[h]
+        w = held
+    given = np.minimum(np.maximum(ends, low), high) - ends  # evenly over the hour
+    means = before + (steady - before) * kept + given / gone * kept
+    return means, given * mass * k / gone

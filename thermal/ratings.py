@@ -33,6 +33,8 @@ CLASSES = {
     "tau": (0.20, 0.15, 0.10, 0.05),  # direct solar transmittance
 }
 
+EUROPEAN = "EN 673, EN 410"  # the method of panes without a shade
+
 
 @dataclass(frozen=True, slots=True)
 class ReferenceGlazing:
@@ -124,7 +126,7 @@ def _european(unit: GlazingUnit, tau: float, alpha: FloatArray) -> ThermalRating
     halves = 0.5 * (np.array(solid[:-1]) + np.array(solid[1:]))
     between = 1.0 / gap_conductances(gaps, position) + halves
     g_value = float(en410_g_value(tau, alpha, between))
-    return ThermalRating("EN 673, EN 410", u_value, tau, g_value)
+    return ThermalRating(EUROPEAN, u_value, tau, g_value)
 
 
 def shade_ratings(

@@ -79,10 +79,9 @@ class State(NamedTuple):
 class Workspace(NamedTuple):
     """Scratch of a step."""
 
-    diagonal: NDArray[np.float64]  # [U] in the order of elimination, as the next three
+    diagonal: NDArray[np.float64]  # [U] in the order of elimination, as the next two
     below: NDArray[np.float64]  # [E] entries of the columns
     right: NDArray[np.float64]  # [U]
-    column: NDArray[np.float64]  # [U] the column at hand
     unknown: NDArray[np.float64]  # [U] inside faces, then air
     air: NDArray[np.float64]  # [Z, 2] conductance to all around [W/K], what flows in from it [W]
     plant: NDArray[np.int64]  # [Z] what the plant does: FREE ... COOLS_FULLY

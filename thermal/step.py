@@ -318,7 +318,7 @@ def step(
     for _ in range(method.iterations):
         for _ in range(MOST_CHANGES):
             _assemble(net, state, work, weather, drive, t, method)
-            eliminate(net.system, work.diagonal, work.below, work.right, work.column)
+            eliminate(net.system, work.diagonal, work.below, work.right)
             for u in range(work.unknown.size):
                 work.unknown[u] = work.right[net.system.place[u]]
             if plants_agree(net, work, state, weather, drive, t):

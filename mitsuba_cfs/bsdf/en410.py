@@ -29,6 +29,9 @@ UV_NM = np.arange(297.5, 380, 5)
 UV_SHARE = 1e-5 * np.fromstring(
     "82 461 1373 2746 4120 5591 6572 7062 7258 7454 7601 7700 7896 8043 8337 8631 9073", sep=" "
 )
+# share of the weight that may lie outside the data (the UV table's first band: files of panes begin
+# at 300 nm); the nearest value stands there
+LEFT_OUT = 1e-3
 
 
 def solar_value(wavelength_nm: ArrayLike, value: ArrayLike) -> float:
@@ -56,7 +59,9 @@ def colour_rendering_index(wavelength_nm: ArrayLike, value: ArrayLike) -> float:
     R_i = 100 - 4.6 dE in U* V* W*, R_a their mean (EN 410, 5.6).
     """
     nm, light, cmfs, samples = _colour_tables()
-    spectrum = light * np.interp(nm, _rising(wavelength_nm), value)
+    given = _rising(wavelength_nm)
+    _check_reach(given, nm, cmfs.sum(axis=1) * light)
+    spectrum = light * np.interp(nm, given, value)
     reference, test = _tristimulus(light, cmfs), _tristimulus(spectrum, cmfs)
     if not test[1] > 0:
         raise ValueError("colour rendering of what passes no light is not defined")
@@ -74,13 +79,18 @@ def colour_rendering_index(wavelength_nm: ArrayLike, value: ArrayLike) -> float:
 def _weighted(wavelength_nm: ArrayLike, value: ArrayLike, nm: NDArray, weight: NDArray) -> float:
     """Mean of the data at `nm` by `weight`; the data must reach over where the weight is."""
     given = _rising(wavelength_nm)
-    used = nm[weight > 1e-3 * weight.max()]
-    if given[0] > used[0] + 1e-6 or given[-1] < used[-1] - 1e-6:
+    _check_reach(given, nm, weight)
+    return float(np.interp(nm, given, value) @ weight / weight.sum())
+
+
+def _check_reach(given: NDArray, nm: NDArray, weight: NDArray) -> None:
+    """Raise `ValueError` for data that leave out more than `LEFT_OUT` of the weight."""
+    beyond = (nm < given[0] - 1e-6) | (nm > given[-1] + 1e-6)
+    if weight[beyond].sum() > LEFT_OUT * weight.sum():
         raise ValueError(
             f"spectral data from {given[0]:g} to {given[-1]:g} nm: "
-            f"expected {used[0]:g} to {used[-1]:g} nm"
+            f"expected {nm[0]:g} to {nm[-1]:g} nm"
         )
-    return float(np.interp(nm, given, value) @ weight / weight.sum())
 
 
 def _rising(wavelength_nm: ArrayLike) -> NDArray[np.float64]:

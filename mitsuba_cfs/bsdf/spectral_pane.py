@@ -10,10 +10,15 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.bsdf.en410 import solar_value, visible_value
+from mitsuba_cfs.bsdf.en410 import (
+    colour_rendering_index,
+    solar_value,
+    ultraviolet_value,
+    visible_value,
+)
 from mitsuba_cfs.bsdf.glazing import CLEAR_ABOVE, coated_values, uncoated_values
 from mitsuba_cfs.bsdf.pane_file import read_pane_file
-from mitsuba_cfs.bsdf.pane_stack import PaneOptics, stack
+from mitsuba_cfs.bsdf.pane_stack import PaneOptics, StackOptics, stack
 from mitsuba_cfs.errors import DataError
 
 FloatArray = NDArray[np.float64]
@@ -89,9 +94,7 @@ def spectral_glazing(
     Source: EN 410:2011, 5.2 and 5.3; angles as `glazing.pane_values`.
     """
     angles = np.atleast_1d(np.asarray(theta, dtype=float))
-    nm = np.unique(np.concatenate([pane.wavelength_nm for pane in panes]))
-    nm = nm[(nm >= 280.0) & (nm <= 4100.0)]
-    whole = stack([_at_angles(pane, nm, angles) for pane in panes])
+    nm, whole = _whole(panes, angles)
     stacked = (whole.tau, whole.rho_front, whole.rho_back, whole.absorptance)
     found = {}
     for band in ("Solar", "Visible"):
@@ -99,6 +102,26 @@ def spectral_glazing(
         tau, front, back, absorbed = (_averaged(nm, values, average) for values in stacked)
         found[band] = BandValues(tau, front, back, absorbed)
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class SpectralRating:
+    """What EN 410 says of a glazing's transmitted light besides its solar and visible shares."""
+
+    ultraviolet: float  # transmittance, 300 to 380 nm
+    colour_rendering: float  # R_a of daylight D65 through it
+
+
+def spectral_rating(panes: Sequence[SpectralPane]) -> SpectralRating:
+    """UV transmittance and colour rendering of panes one behind the other, at normal incidence.
+
+    Raises: `ValueError` for spectra that do not reach from 300 to 780 nm, or that no light passes.
+
+    Source: EN 410:2011, 5.5 and 5.6.
+    """
+    nm, whole = _whole(panes, np.zeros(1))
+    tau = whole.tau[:, 0]
+    return SpectralRating(ultraviolet_value(nm, tau), colour_rendering_index(nm, tau))
 
 
 def visible_average(nm: FloatArray, value: FloatArray) -> float:
@@ -130,6 +153,13 @@ def _g173(kind: str) -> tuple[FloatArray, FloatArray]:
 
     table = get_reference_spectra(standard="ASTM G173-03").loc[300.0:2500.0]
     return table.index.to_numpy(dtype=float), table[kind].to_numpy(dtype=float)
+
+
+def _whole(panes: Sequence[SpectralPane], theta: FloatArray) -> tuple[FloatArray, StackOptics]:
+    """Wavelengths [nm] [N] and what the panes do together at angles, [N, A]."""
+    nm = np.unique(np.concatenate([pane.wavelength_nm for pane in panes]))
+    nm = nm[(nm >= 280.0) & (nm <= 4100.0)]
+    return nm, stack([_at_angles(pane, nm, theta) for pane in panes])
 
 
 def _averaged(nm: FloatArray, values: FloatArray, average: Average) -> FloatArray:

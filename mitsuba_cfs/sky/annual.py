@@ -18,7 +18,7 @@ from mitsuba_cfs.sky.matrix import (
     series_matrix,
     sky_series,
 )
-from mitsuba_cfs.sky.sun import is_up
+from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 
 NO_SUN = "the sky was made without the sun alone: annual_sky(sun=True)"
@@ -82,6 +82,7 @@ def annual_sky(
     rotation_deg: float = 0.0,
     sun_model: str = "spa",
     ground: str = "reflected",
+    towards: NDArray[np.float64] | None = None,
 ) -> AnnualSky:
     """Perez skies of a weather, single precision.
 
@@ -91,8 +92,11 @@ def annual_sky(
         sun: the sun alone too, which all methods but the three-phase need.
         solar: radiances too, for heat.
         rotation_deg, sun_model, ground: see `mitsuba_cfs.sky.matrix.sky_matrix`.
+        towards: `sun_directions` of the weather [H, 3], where they are known.
     """
-    place: dict[str, Any] = {"sun_model": sun_model, "rotation_deg": rotation_deg}
+    if towards is None:
+        towards = sun_directions(weather, model=sun_model)
+    place: dict[str, Any] = {"towards": towards, "rotation_deg": rotation_deg}
     visible = sky_series(weather, **place)
     radiance = sky_series(weather, "solar", **place) if solar else None
     return _of_series(

@@ -120,9 +120,14 @@ def sky_series(
     sun_model: str = "spa",
     rotation_deg: float = 0.0,
     measured_illuminance: bool = False,
+    towards: FloatArray | None = None,
 ) -> SkySeries:
-    """Sun and Perez sky in the middle of each interval; options as for `sky_matrix`."""
-    towards = sun_module.sun_directions(weather, model=sun_model)
+    """Sun and Perez sky in the middle of each interval; options as for `sky_matrix`.
+
+    Args: towards: `sun_directions` of the weather [H, 3], where they are known.
+    """
+    if towards is None:
+        towards = sun_module.sun_directions(weather, model=sun_model)
     series = given_series(
         sun_module.rotated(towards, rotation_deg),
         weather.direct_normal,

@@ -58,7 +58,7 @@ def thermal(
     rows = [row for state in found for row in state.rows()]
     for line in printed(rows):
         click.echo(line)
-    for note in dict.fromkeys(n for s in found for n in (*s.heat.notes, s.heat.named_model)):
+    for note in dict.fromkeys(n for s in found for n in s.notes):
         if place is None:
             click.echo(f"note: {note}")
     if out is not None and out.suffix == ".json":

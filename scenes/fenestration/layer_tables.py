@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -131,6 +132,13 @@ class GlazingLayerTable(TomlTable):
             pane.infrared_transmittance,
             solar=self.solar or tuple(float(v[0]) for v in values),
         )
+
+
+def spectral_panes(layers: Sequence[GlazingLayerTable]) -> tuple[SpectralPane, ...]:
+    """The panes of layers that all come from files of spectra; none where one does not."""
+    if any(layer.pane is None for layer in layers):
+        return ()
+    return tuple(layer.spectral() for layer in layers)
 
 
 def _listed() -> str:

@@ -8,8 +8,8 @@ import numpy as np
 
 from mitsuba_cfs.bsdf.angular import ANGLES, AngularTable, specular_matrices, stack_table
 from mitsuba_cfs.bsdf.glazing import Pane
-from mitsuba_cfs.bsdf.spectral_pane import spectral_glazing
-from scenes.fenestration.layer_tables import GlazingLayerTable
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, spectral_glazing
+from scenes.fenestration.layer_tables import GlazingLayerTable, spectral_panes
 from scenes.fenestration.systems import FenestrationSystem
 
 BANDS = ("Visible", "Solar")
@@ -23,8 +23,9 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
     (`mitsuba_cfs.bsdf.angular.stack_table`).
     """
     name = "panes " + ", ".join(_named(layer) for layer in layers)
-    if all(layer.pane is not None for layer in layers):
-        notes, tables = [], _by_wavelength(layers)
+    panes = spectral_panes(layers)
+    if panes:
+        notes, tables = [], _by_wavelength(panes)
     else:
         notes = [
             f"{name}: layer {number} states no visible values: the sun's stand in for them."
@@ -35,12 +36,12 @@ def system_of_panes(layers: Sequence[GlazingLayerTable]) -> FenestrationSystem:
     visible, solar = (specular_matrices(tables[band]) for band in BANDS)
     return FenestrationSystem(
         name, visible, solar, shading_position="none", notes=tuple(notes),
-        angular=tables["Visible"],
+        angular=tables["Visible"], panes=panes,
     )  # fmt: skip
 
 
-def _by_wavelength(layers: Sequence[GlazingLayerTable]) -> dict[str, AngularTable]:
-    found = spectral_glazing([layer.spectral() for layer in layers], ANGLES)
+def _by_wavelength(panes: Sequence[SpectralPane]) -> dict[str, AngularTable]:
+    found = spectral_glazing(panes, ANGLES)
     return {
         band: AngularTable(
             ANGLES,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mitsuba_cfs.bsdf.spectral_pane import SpectralRating, spectral_rating
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.layer_sun import sun_in_layers
 from scenes.fenestration.systems import FenestrationSystem, read_system
@@ -15,6 +16,7 @@ from scenes.fenestration.thermal_system import ThermalSystem, checked_system
 from thermal.errors import ThermalInputError
 from thermal.ratings import (
     CLASSES,
+    EUROPEAN,
     REFERENCE_GLAZINGS,
     ThermalRating,
     layered_ratings,
@@ -22,6 +24,7 @@ from thermal.ratings import (
 )
 
 TITLES = {"g": "class of g_tot", "secondary": "class of q_i", "tau": "class of tau_e"}
+LIGHT = ("tau_UV", "R_a")  # EN 410: UV transmittance, colour rendering index
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +35,15 @@ class RatedState:
     system: FenestrationSystem
     heat: ThermalSystem
     ratings: tuple[ThermalRating, ...]
+    spectral: SpectralRating | None = None  # of panes that are known by wavelength
+    notes: tuple[str, ...] = ()
 
     def rows(self) -> list[dict[str, object]]:
-        """A row for each method."""
+        """A row for each method; UV and colours in EN 410's, where the panes' spectra are known."""
+        none = (None, None)
+        light = none
+        if self.spectral is not None:
+            light = (self.spectral.ultraviolet, self.spectral.colour_rendering)
         return [
             {
                 "state": self.path.stem,
@@ -44,6 +53,7 @@ class RatedState:
                 "q_i": rating.secondary,
                 "g_tot": rating.g_value,
                 **{TITLES[of]: rating.solar_class(of) for of in CLASSES},
+                **dict(zip(LIGHT, light if rating.method == EUROPEAN else none, strict=True)),
             }
             for rating in self.ratings
         ]
@@ -65,9 +75,17 @@ def rated_state(path: Path, *, place: str | None, glazing: str | None, kappa: fl
             path, system, heat, tuple(shade_ratings(tau, rho, place, known, kappa=kappa))
         )
     try:
-        return RatedState(path, system, heat, tuple(system_ratings(system, heat)))
+        ratings = tuple(system_ratings(system, heat))
     except ThermalInputError as error:
         raise DataError(error.message, file=path.with_suffix(".toml")) from error
+    notes = (*heat.notes, heat.named_model)
+    if not system.panes:
+        return RatedState(path, system, heat, ratings, notes=notes)
+    try:
+        return RatedState(path, system, heat, ratings, spectral_rating(system.panes), notes)
+    except ValueError as error:
+        left_out = f"{system.name}: neither tau_UV nor R_a: {error}."
+        return RatedState(path, system, heat, ratings, notes=(*notes, left_out))
 
 
 def system_ratings(system: FenestrationSystem, heat: ThermalSystem) -> list[ThermalRating]:

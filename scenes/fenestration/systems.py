@@ -14,12 +14,15 @@ from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.resample import klems_of
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.angular_file import check_specular
 from scenes.fenestration.thermal_file import ThermalFile
 from thermal.closure import Closure
+
+Panes = tuple[SpectralPane, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,7 @@ class FenestrationSystem:
     file: Path | None = None  # that it was read from
     source: str = ""  # where the system comes from, in words
     angular: AngularTable | None = None  # visible, of a specular system: exact at every angle
+    panes: Panes = ()  # all its layers, where each is known by wavelength
 
     @property
     def fine(self) -> Bsdf:
@@ -95,6 +99,7 @@ def read_system(
         closure=beside.closure,
         shading_position=beside.shading_position,
         angular=beside.angular,
+        panes=beside.panes,
         notes=file.notes,
         file=path,
         source=f"{by} {path.name}".strip(),
@@ -107,7 +112,7 @@ def system_of(
     *,
     path: Path,
     notes: Sequence[str] = (),
-    **more: float | str | Path | NDArray[np.float64] | Closure | AngularTable | None,
+    **more: float | str | Path | NDArray[np.float64] | Closure | AngularTable | Panes | None,
 ) -> FenestrationSystem:
     """The system of BSDF data by band, Klems full or tensor trees.
 

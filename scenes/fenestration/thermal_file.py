@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.angular import AngularTable
+from mitsuba_cfs.bsdf.spectral_pane import SpectralPane
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.angular_file import AngularData
+from scenes.fenestration.layer_tables import spectral_panes
 from scenes.fenestration.tables import ByPatch, WindowHeatTable
 from scenes.toml_file import Share, read_table, validated
 from thermal.closure import Closure
@@ -54,6 +56,7 @@ class ThermalFile:
     closure: Closure | None = None
     shading_position: str | None = None
     angular: AngularTable | None = None  # visible, of a specular system
+    panes: tuple[SpectralPane, ...] = ()  # all layers, where each is a file of spectra
 
     @classmethod
     def read(cls, path: Path) -> ThermalFile:
@@ -62,7 +65,8 @@ class ThermalFile:
             return cls()
         table = validated(ThermalTable, read_table(path), path)
         try:
-            closure = table.placed(path.parent).closure()
+            placed = table.placed(path.parent)
+            closure = placed.closure()
         except ThermalInputError as error:
             raise DataError(str(error), file=path) from error
         return cls(
@@ -72,4 +76,5 @@ class ThermalFile:
             closure,
             table.shading_position,
             None if table.angular is None else table.angular.read(path),
+            spectral_panes(placed.layers),
         )

@@ -97,10 +97,8 @@ def run_study(
     notes |= dict.fromkeys(heat.named_model for heat in heats)
     variants.activate()
     options, trace = study.options, study.trace
-    skies, cache = (
-        skies_for(weather, options.method, options.sampling, **options.sky),
-        MatrixCache.of_user(),
-    )
+    cache = MatrixCache.of_user()
+    skies = skies_for(weather, options.method, options.sampling, cache, **options.sky)
     rooms, radiants = [], []
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)

@@ -29,6 +29,8 @@ from scenes.results import RunResult
 
 FILES = page_files("scenes.report")  # that other pages share
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
+UNIT_EXPONENT = re.compile(r"(?<![\w.-])(k?m|cm|mm)([23])(?![\w.-])")
+EXPONENTS = {"2": "²", "3": "³"}
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
 
 
@@ -106,8 +108,14 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
     environment.filters["script_json"] = script_json
     environment.globals["say"] = said
     environment.filters["packed_json"] = packed_json
-    environment.filters["tied"] = lambda text: UNIT_AFTER_NUMBER.sub("\\1\u00a0\\2", text)
+    environment.filters["tied"] = prose
     return environment
+
+
+def prose(text: str) -> str:
+    """A sentence as it is printed: numbers stay with their units, "W/(m2 K)" is "W/(m² K)"."""
+    text = UNIT_EXPONENT.sub(lambda found: found[1] + EXPONENTS[found[2]], text)
+    return UNIT_AFTER_NUMBER.sub("\\1\u00a0\\2", text)
 
 
 def script_json(value: object) -> Markup:

@@ -45,6 +45,7 @@ from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.heated import HeatInputs, heat_alone
 from scenes.room.holes import hole_problems
 from scenes.room.inner_glass import inner_glass
+from scenes.room.kept_sun import kept_sun
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
@@ -67,13 +68,23 @@ TRACED = {"daylight": 0.6}
 WORST = 4  # pictures of an annual glare without hours asked for
 
 
-def skies_for(weather: Weather, method: str, sampling: Sampling, **choices: str) -> AnnualSky:
+def skies_for(
+    weather: Weather,
+    method: str,
+    sampling: Sampling,
+    cache: MatrixCache | None = None,
+    /,
+    **choices: str,
+) -> AnnualSky:
     """The year's skies as a method needs them; the same for every room.
 
-    Args: choices: `RoomOptions.sky`.
+    Args: cache: where the sun's directions are found and kept; choices: `RoomOptions.sky`.
     """
     with_sun = method != "three-phase"
-    return annual_sky(weather, sampling.subdivision, sun=with_sun, solar=True, **choices)
+    towards = kept_sun(weather, choices.get("sun_model", "spa"), cache)
+    return annual_sky(
+        weather, sampling.subdivision, sun=with_sun, solar=True, towards=towards, **choices
+    )
 
 
 class RoomSimulation:
@@ -105,7 +116,7 @@ class RoomSimulation:
         self.operation, self.cache, self.progress = operation, cache, progress
         self.grids = tuple(grids) or (options.grid,)
         self.skies = (
-            skies_for(weather, options.method, options.sampling, **options.sky)
+            skies_for(weather, options.method, options.sampling, cache, **options.sky)
             if skies is None
             else skies
         )

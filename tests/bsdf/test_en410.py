@@ -116,6 +116,10 @@ def test_solar_values_are_those_of_windows_table(real_data):
 def test_data_that_do_not_reach_are_refused():
     with pytest.raises(ValueError, match="expected 300"):
         solar_value(WHOLE[50:], np.ones(len(WHOLE) - 50))
+    with pytest.raises(ValueError, match="expected 380"):
+        colour_rendering_index(WHOLE[30:], np.ones(len(WHOLE) - 30))
+    # files of panes begin at 300 nm, the table of the UV at 297.5
+    assert ultraviolet_value(WHOLE[4:], np.ones(len(WHOLE) - 4)) == pytest.approx(1)
     with pytest.raises(ValueError, match="rising"):
         visible_value(WHOLE[::-1], np.ones(len(WHOLE)))
 

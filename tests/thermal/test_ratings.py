@@ -106,6 +106,36 @@ def test_command_rates_a_state_and_writes_what_the_balance_takes(tmp_path, shade
     assert again.shading_position == "internal"
 
 
+def test_command_gives_uv_and_colours_of_panes_by_wavelength(tmp_path, shade, capsys):
+    """Clear panes by closed form: each grey but for a red cut, which the other passes on."""
+    nm = np.arange(300, 2501, 5)
+    for name, tau in (("clear", np.full(len(nm), 0.8)), ("red", np.where(nm < 380, 0.1, 0.5))):
+        rows = [f"{1e-3 * w:.4f} {t:.4f} 0.0 0.0" for w, t in zip(nm, tau, strict=True)]
+        head = ["{Units, Wavelength Units } SI Microns", "{Thickness } 6", "{Coated Side } Front"]
+        (tmp_path / f"{name}.dat").write_text("\n".join([*head, *rows]))
+    files = '[[layers]]\npane = "clear.dat"\ngap = { width = 0.016 }\n[[layers]]\npane = "red.dat"'
+    shade.with_suffix(".toml").write_text(files)
+    out = tmp_path / "table.json"
+    assert cli.run(["bsdf", "thermal", str(shade), "--out", str(out)]) == 0
+    assert "tau_UV" in capsys.readouterr().out
+    rows = {row["method"]: row for row in json.loads(out.read_text())["rows"]}
+    european = rows["EN 673, EN 410"]
+    # no reflection: shares multiply; 0.0907 of the UV lies in the band that 377.5 stands for, 380
+    # nm is clear again
+    assert european["tau_UV"] == pytest.approx(0.8 * (0.1 + 0.4 * 0.09073 * 0.5), abs=2e-4)
+    assert european["R_a"] == pytest.approx(100.0, abs=1e-6)  # grey where it is seen
+    assert rows["NFRC"]["tau_UV"] is None
+
+
+def test_command_says_why_there_is_no_colour(tmp_path, shade, capsys):
+    rows = [f"{w} 0.0 0.1 0.1" for w in (0.3, 0.5, 2.5)]
+    head = ["{Units, Wavelength Units } SI Microns", "{Thickness } 6", "{Coated Side } Front"]
+    (tmp_path / "black.dat").write_text("\n".join([*head, *rows]))
+    shade.with_suffix(".toml").write_text('[[layers]]\npane = "black.dat"')
+    assert cli.run(["bsdf", "thermal", str(shade)]) == 0
+    assert "neither tau_UV nor R_a: colour rendering" in capsys.readouterr().out
+
+
 def test_command_rates_a_shade_alone(shade, capsys):
     words = ["bsdf", "thermal", str(shade), "--place", "internal", "--glazing", "C"]
     assert cli.run(words) == 0

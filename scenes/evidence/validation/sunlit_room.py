@@ -42,28 +42,34 @@ def first_hits(room: BoxRoom, directions: FloatArray, *, grid: tuple[int, int] =
     nx, ny = grid
     x = np.interp((np.arange(nx) + 0.5) / nx, [0, 1], room.window_x)
     y = np.interp((np.arange(ny) + 0.5) / ny, [0, 1], room.window_y)
-    px, py = (a.ravel() for a in np.meshgrid(x, y))
     share = np.zeros((len(directions), 6))
     for start in range(0, len(directions), 20_000):
         d = directions[start : start + 20_000]
-        share[start : start + len(d)] = _shares(room, d, px, py)
+        share[start : start + len(d)] = _shares(room, d, x, y)
     return share
 
 
 def _shares(room: BoxRoom, d: FloatArray, px: FloatArray, py: FloatArray) -> FloatArray:
-    reach = np.full((6, len(d), len(px)), np.inf)
+    """Shares [T, 6] from the grid of all x with all y; of planes at one distance the lower goes."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        planes = (
-            (1, d[:, 0] < 0, -px, d[:, 0]),
-            (2, d[:, 0] > 0, room.width - px, d[:, 0]),
-            (4, d[:, 1] < 0, -py, d[:, 1]),
-            (5, d[:, 1] > 0, room.height - py, d[:, 1]),
-            (3, d[:, 2] < 0, np.full_like(px, -room.depth), d[:, 2]),
-        )
-        for surface, towards, gap, component in planes:
-            reach[surface, towards] = gap[None, :] / component[towards, None]
-    first = np.argmin(reach, axis=0)
-    return np.stack([(first == s).mean(axis=1) for s in range(6)], axis=1)
+        to_x = _reach(d[:, :1], px, room.width)[:, :, None]
+        to_y = _reach(d[:, 1:2], py, room.height)[:, None, :]
+        to_z = np.where(d[:, 2] < 0, -room.depth / d[:, 2], np.inf)[:, None, None]
+    side = (to_x <= to_z) & (to_x <= to_y) & np.isfinite(to_x)
+    back = (to_z < to_x) & (to_z <= to_y)
+    slab = (to_y < to_x) & (to_y < to_z)
+    share = np.zeros((len(d), 6))
+    for hit, component, ends in ((side, 0, (1, 2)), (back, 2, (3, 3)), (slab, 1, (4, 5))):
+        place = np.where(d[:, component] < 0, *ends)
+        share[np.arange(len(d)), place] = hit.mean(axis=(1, 2))
+    share[:, 0] = 1.0 - (side | back | slab).mean(axis=(1, 2))
+    return share
+
+
+def _reach(component: FloatArray, start: FloatArray, width: float) -> FloatArray:
+    """How far [T, n] it is along directions with a component [T, 1] to the wall at 0 or `width`."""
+    reach = np.where(component < 0, -start, width - start) / component
+    return np.where(component == 0, np.inf, reach)
 
 
 def diffuse_hits(room: BoxRoom, *, rings: int = 30, sectors: int = 60) -> FloatArray:

@@ -1,0 +1,34 @@
+"""Where the sun is in a weather's intervals, computed once and kept on disk."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache
+from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.sky.weather import Weather
+
+
+def kept_sun(weather: Weather, model: str, cache: MatrixCache | None) -> NDArray[np.float64]:
+    """`sun_directions` [H, 3] of a weather, found in a cache or put there.
+
+    The Solar Position Algorithm and the library that brings it take half a second, which a study
+    whose matrices are kept would spend on little else.
+    """
+    if cache is None:
+        return sun_directions(weather, model=model)
+    place = (weather.latitude_deg, weather.longitude_deg, weather.timezone_h, weather.elevation_m)
+    air = (weather.pressure_pa, weather.dry_bulb_c)
+    times = np.asarray(weather.midpoints.asi8)
+    entry = cache.entry(
+        "sun directions", *place, weather.turned_deg, model, times, *air,
+        by=sun_directions.__module__,
+    )  # fmt: skip
+    kept = entry.load()
+    if kept is not None and kept.finished:
+        return kept.mean
+    found = sun_directions(weather, model=model)
+    none = np.zeros_like(found)
+    entry.save(BatchMean(1, found, none, none[:, 0], 0.0, finished=True))
+    return found
