@@ -1,6 +1,7 @@
 // Numbers under the pointer: hour and value on carpet plots, all curves on charts.
 (() => {
   "use strict";
+  const language = document.documentElement.lang, comma = language === "en" ? "." : ",";
   const tip = document.createElement("div");
   tip.className = "tip";
   tip.hidden = true;
@@ -30,13 +31,14 @@
       const length = Math.round(1440 / data.rows);
       const date = new Date(start.getTime() + day * 864e5);
       const clock = (m) => two(Math.floor(m / 60)) + ":" + two(m % 60);
-      let value = "none";
+      let value = "–";
       if (data.names) { if (code >= 0) value = data.names[code].replace(/: [\d.]+ %$/, ""); }
       else if (code !== -32768) {
-        value = (code / data.divide).toFixed(Math.round(Math.log10(data.divide))) + " " + data.unit;
+        const digits = Math.round(Math.log10(data.divide));
+        value = (code / data.divide).toFixed(digits).replace(".", comma) + " " + data.unit;
       }
-      const name = date.toLocaleDateString("en-GB", { day: "numeric", month: "short", timeZone: "UTC" });
-      show(event, name + ", " + clock(minutes) + " to " + clock(minutes + length) + "\n" + value);
+      const name = date.toLocaleDateString(language === "en" ? "en-GB" : language, { day: "numeric", month: "short", timeZone: "UTC" });
+      show(event, name + ", " + clock(minutes) + " – " + clock(minutes + length) + "\n" + value);
     });
     plot.addEventListener("pointerleave", hide);
   }

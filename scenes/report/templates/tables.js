@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const text = (cell) => cell.textContent.trim();
-  const number = (s) => (s === "" || s === "–" ? NaN : Number(s.replace(/\u202f/g, "").replace("−", "-")));
+  const number = (s) => (s === "" || s === "–" ? NaN : Number(s.replace(/\u202f/g, "").replace("−", "-").replace(",", ".")));
   function sort(table, column, th) {
     const down = th.getAttribute("aria-sort") === "ascending";
     const body = table.tBodies[0];
@@ -60,8 +60,10 @@
       const table = button.closest(".table-box").querySelector("table");
       const lines = [...table.rows].map((row) => [...row.cells].map(text).join("\t"));
       const done = copyText(lines.join("\n"));
-      button.textContent = done ? "Copied" : "Not copied";
-      setTimeout(() => { button.textContent = "Copy"; }, 1500);
+      const before = button.textContent;
+      button.textContent = done ? "✓" : "✗";
+      button.disabled = true;
+      setTimeout(() => { button.textContent = before; button.disabled = false; }, 1500);
     });
   }
 })();
