@@ -22,6 +22,7 @@ SITE_CLASSES = ("IfcSite", "IfcGeographicElement")
 RAYS = 36
 FACE = 0.99  # cosine to the biggest part of a pane from which another is of its faces
 BEFORE_GLASS = 0.5  # what is nearer to a window's plane is of its own facade [m]
+WINDOWS_AT_ONCE = 256  # that the faces of a pane are held against
 NOTHING = np.empty((0, 3, 3))
 GRAZING = 0.3  # cosine: flatter rays meet the reveals of every window
 
@@ -76,11 +77,13 @@ def mirrors_in_view(
     """
     result: list[Element] = []
     seen: list[Element] = []
+    centres = np.array([window.centre for window in windows]).reshape(-1, 3)
+    facing = np.array([window.normal for window in windows]).reshape(-1, 3)
     for element in elements:
         if element.gloss is not CLEAR_GLAZING:
             result.append(element)
             continue
-        mirrors = _faces_in_view(element.triangles, windows)
+        mirrors = _faces_in_view(element.triangles, centres, facing)
         if mirrors.any():
             seen.append(replace(element, triangles=element.triangles[mirrors]))
             result.append(seen[-1])
@@ -97,18 +100,21 @@ def mirrors_in_view(
     return result, [Problem(seen[0].guid, what, "mirror as clear double glazing, 15 % straight on")]
 
 
-def _faces_in_view(triangles: NDArray[np.float64], windows: Sequence[Window]) -> NDArray[np.bool_]:
-    """Triangles [T] of a pane's two faces that some window may see."""
+def _faces_in_view(
+    triangles: NDArray[np.float64], centres: NDArray[np.float64], facing: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Triangles [T] of a pane's two faces that one of the windows [W, 3] may see."""
     vectors = area_vectors(triangles)
     areas = np.linalg.norm(vectors, axis=1)
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     along = np.abs(normals @ normals[np.argmax(areas)]) > FACE
-    middles = triangles.mean(axis=1)
+    plane, own = (centres * facing).sum(axis=1), (triangles.mean(axis=1) * normals).sum(axis=1)
     found = np.zeros(len(triangles), dtype=bool)
-    for window in windows:
-        before = ((triangles - window.centre) @ window.normal).max(axis=1) > BEFORE_GLASS
-        towards = np.einsum("ij,ij->i", window.centre - middles, normals) > 0
-        found |= along & before & towards
+    for start in range(0, len(centres), WINDOWS_AT_ONCE):
+        some = slice(start, start + WINDOWS_AT_ONCE)
+        before = (triangles @ facing[some].T).max(axis=1) - plane[some] > BEFORE_GLASS
+        towards = normals @ centres[some].T > own[:, None]
+        found |= along & (before & towards).any(axis=1)
     return found
 
 

@@ -1,51 +1,104 @@
-"""The script beside an exported room: Radiance's three phases with nothing but Radiance."""
+"""The script beside an exported room: three or five phases with nothing but Radiance."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
-# Source: A. McNeil, "The Three-Phase Method for Simulating Complex Fenestration with Radiance"
-# (LBNL 2013), with rfluxmtx in place of rcontrib; the lm/W of Radiance's three channels
+# Source: A. McNeil, "The Three-Phase Method for Simulating Complex Fenestration with Radiance" and
+# "The Five-Phase Method" (LBNL 2013), with rfluxmtx in place of rcontrib; the lm/W of Radiance's
+# three channels
 SCRIPT = """#!/bin/sh
-# Illuminance of the room's sensors by Radiance alone: V T D s, the three-phase method.
+# Illuminance of the room's sensors by Radiance alone, the three- or the five-phase method:
 #
-#   ./run.sh                 coefficients.mtx: lux at each sensor by the luminance of each patch
+#   V T D s    or    V T D s - V_d T D_d s_d + C_ds s_ds
+#
+#   ./run.sh                 coefficients.mtx: V T D, lux at each sensor by each patch's luminance
 #   ./run.sh WEATHER.wea     also illuminance.txt [lx]: a row for each sensor, a column for each
 #                            hour (epw2wea CITY.epw CITY.wea makes the weather)
 #
 # SENSORS   points and directions, default sensors.pts; surfaces.pts: on all walls
+# PHASES    3, or 5: also direct.mtx, V_d T D_d, and sun_coefficients.mtx, C_ds
 # INDOORS   rays from each sensor, OUTDOORS: from each direction of a window's basis
 # BOUNCES   in the room and outdoors
+# SUNS      Reinhart's MF of the places of the sun: 6 has 5,185
+# STRAIGHT  rays from each sensor to what a window scatters of the sun
 set -eu
+[ $# -eq 0 ] || weather=$(realpath "$1")
 cd "$(dirname "$0")"
 sensors=${SENSORS:-sensors.pts}
+phases=${PHASES:-3}
 indoors=${INDOORS:-20000}
 outdoors=${OUTDOORS:-1000}
 bounces=${BOUNCES:-8}
+suns=${SUNS:-6}
+straight=${STRAIGHT:-20000}
 count=$(wc -l < "$sensors")
+case $phases in 3|5) ;; *) echo "PHASES=$phases: 3 or 5" >&2; exit 1;; esac
+
+# weight below which a ray ends: a hundredth of one of many
+least() { echo "0.01 / $1" | awk '{ printf "%.3g", $1 / $3 }'; }
+# coefficients of one group of windows: view matrix, daylight matrix, and both with its BSDF between
+# them; $2: name of the scenes and results, $3, $4: bounces in the room and outdoors
+group() {
+    rfluxmtx -faf -I+ -ab "$3" -ad "$indoors" -lw "$(least "$indoors")" -y "$count" \\
+        - "windows_$1.rad" -i "room$2.oct" < "$sensors" > "view$2_$1.mtx"
+    rfluxmtx -ffa -ab "$4" -ad 16 -lw 1e-4 -c "$outdoors" \\
+        "windows_$1.rad" sky.rad -i "outdoors$2.oct" > "daylight$2_$1.mtx"
+    rmtxop -ff "view$2_$1.mtx" . "windows_$1.xml" . "daylight$2_$1.mtx" > "part$2_$1.mtx"
+}
+groups() {
+{groups}
+}
 
 oconv materials.rad room.rad > room.oct
 oconv materials.rad outdoors.rad > outdoors.oct
-# one group of windows: view matrix, daylight matrix, and both with its BSDF between them
-group() {
-    rfluxmtx -faf -I+ -ab "$bounces" -ad "$indoors" -lw "$(least "$indoors")" -y "$count" \\
-        - "windows_$1.rad" -i room.oct < "$sensors" > "view_$1.mtx"
-    rfluxmtx -ffa -ab "$bounces" -ad 16 -lw 1e-4 -c "$outdoors" \\
-        "windows_$1.rad" sky.rad -i outdoors.oct > "daylight_$1.mtx"
-    rmtxop -ff "view_$1.mtx" . "windows_$1.xml" . "daylight_$1.mtx" > "part_$1.mtx"
-}
-# weight below which a ray ends: a hundredth of one of many
-least() { echo "0.01 / $1" | awk '{ printf "%.3g", $1 / $3 }'; }
+groups "" "$bounces" "$bounces"
+rmtxop -ff {sum} > whole.mtx
+rmtxop -fa -c 0.265 0.67 0.065 whole.mtx > coefficients.mtx
 
-{groups}
-rmtxop -fa {sum} -c 0.265 0.67 0.065 > coefficients.mtx
+if [ "$phases" = 5 ]; then
+    echo "void plastic black 0 0 5 0 0 0 0 0" > black.rad
+    xform -m black room.rad | oconv black.rad - > room_direct.oct
+    xform -m black outdoors.rad | oconv black.rad - > outdoors_direct.oct
+    groups _direct 1 0
+    rmtxop -ff {direct} > direct.mtx
+    # a sun in the middle of each patch, seen through the windows' own materials; by their light
+    # (-V+), since rcontrib drops coefficients below 1e-6, which is much of what a blind scatters
+    echo "void light solar 0 0 3 1e6 1e6 1e6" > suns.rad
+    printf 'solar source sun\\n0\\n0\\n4 ${ Dx } ${ Dy } ${ Dz } 0.533\\n' > suns.fmt
+    cnt $((144 * suns * suns + 1)) |
+        rcalc -e "MF:$suns" -f reinsrc.cal -e "Rbin=recno" -o suns.fmt >> suns.rad
+    for one in {names}; do xform -m "system_$one" "windows_$one.rad"; done > panes.rad
+    xform -m black room.rad outdoors.rad |
+        oconv black.rad systems.rad - panes.rad suns.rad > suns.oct
+    rcontrib -faf -I+ -V+ -ab 1 -ad "$straight" -lw "$(least "$straight")" \\
+        -dc 1 -dt 0 -dj 0 -y "$count" \\
+        -e "MF:$suns" -f reinhart.cal -b rbin -bn Nrbins -m solar suns.oct \\
+        < "$sensors" | rmtxop -ff -s 1e-6 - > sun_coefficients.mtx
+fi
 if [ $# -gt 0 ]; then
-    gendaymtx -m {division} -of "$1" > sky_of_hours.mtx
-    rmtxop -ff {sum} > whole.mtx
-    rmtxop -ff whole.mtx . sky_of_hours.mtx > hours.mtx
+    gendaymtx -m {division} -of "$weather" | rmtxop -ff whole.mtx . - > hours.mtx
+    if [ "$phases" = 5 ]; then
+        gendaymtx -m {division} -d -of "$weather" | rmtxop -ff direct.mtx . - > direct_hours.mtx
+        gendaymtx -m "$suns" -5 0.533 -d -of "$weather" |
+            rmtxop -ff sun_coefficients.mtx . - > sun_hours.mtx
+        rmtxop -ff hours.mtx + -s -1 direct_hours.mtx + sun_hours.mtx > five.mtx
+        mv five.mtx hours.mtx
+    fi
     rmtxop -fa -c 47.435 119.93 11.635 hours.mtx | getinfo - > illuminance.txt
 fi
+"""
+MAKEFILE = """# make                 coefficients.mtx, with PHASES=5 also sun_coefficients.mtx
+# make WEATHER=FILE.wea [PHASES=5]   illuminance.txt; see run.sh
+PHASES ?= 3
+export PHASES
+RESULT = $(if $(WEATHER),illuminance.txt,$(if $(filter 5,$(PHASES)),sun_)coefficients.mtx)
+SCENE = run.sh materials.rad room.rad outdoors.rad sky.rad systems.rad sensors.pts
+all: $(RESULT)
+$(RESULT): $(SCENE) $(wildcard windows_*) $(WEATHER)
+\t./run.sh $(abspath $(WEATHER))
+.PHONY: all
 """
 NO_BSDF = """#!/bin/sh
 echo "no BSDF is known of the windows {names}: put windows_NAME.xml beside this script, run" >&2
@@ -64,7 +117,11 @@ def run_script(groups: Mapping[str, Path | None], division: int) -> str:
     unknown = [name for name, bsdf in groups.items() if bsdf is None]
     if unknown:
         return NO_BSDF.format(names=", ".join(unknown))
-    calls = "\n".join(f"group {name}" for name in groups)
-    total = " + ".join(f"part_{name}.mtx" for name in groups)
-    text = SCRIPT.replace("{groups}", calls).replace("{sum}", total)
-    return text.replace("{division}", str(division))
+    calls = "\n".join(f'    group {name} "$@"' for name in groups)
+    sums = (" + ".join(f"part{kind}_{name}.mtx" for name in groups) for kind in ("", "_direct"))
+    filled = dict(zip(("{sum}", "{direct}"), sums, strict=True))
+    filled |= {"{groups}": calls, "{names}": " ".join(groups), "{division}": str(division)}
+    text = SCRIPT
+    for place, words in filled.items():
+        text = text.replace(place, words)
+    return text

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Building, Element, Face, Space
-from bim.radiance_script import run_script
+from bim.radiance_script import MAKEFILE, run_script
 from bim.sensors import sensor_grid, view_point
 from bim.surface_sensors import surface_sensors
 from bim.to_tracer import window_groups
@@ -46,6 +46,15 @@ sky_glow source sky
 
 
 @dataclass(frozen=True, slots=True)
+class FilledGroup:
+    """A window group and what is known of its fenestration."""
+
+    group: WindowGroup
+    bsdf: BsdfFile | None = None  # on Klems patches: the T of the matrices
+    fine: BsdfFile | None = None  # for the sun alone, such as a tensor tree; else the same
+
+
+@dataclass(frozen=True, slots=True)
 class RadianceFiles:
     """What `write_radiance` wrote."""
 
@@ -54,6 +63,7 @@ class RadianceFiles:
     outdoors: Path  # what stands outdoors
     windows: dict[str, Path]  # group name -> glass with its rfluxmtx comment, normals into the room
     bsdfs: dict[str, Path]  # group name -> BSDF XML, the T of `dctimestep`, where it is known
+    systems: Path  # the groups' materials for the sun, with their BSDFs
     sky: Path  # ground and sky as rfluxmtx receivers
     sensors: Path  # x y z dx dy dz on each line
     view: Path  # fisheye view file
@@ -71,11 +81,12 @@ def write_radiance(
     spacing: float = 0.5,
     height: float = 0.8,
     margin: float = 0.5,
-    filled: Sequence[tuple[WindowGroup, BsdfFile | None]] | None = None,
+    filled: Sequence[FilledGroup] | None = None,
 ) -> RadianceFiles:
     """Write the room, what stands outdoors, its window groups, sensors and a view into a folder.
 
-    `run.sh` there computes the sensors' illuminance with Radiance alone.
+    `run.sh` there computes the sensors' illuminance with Radiance alone, by three or five phases;
+    `make` runs it again where a file is newer than its results.
     The view matrix of a group is
     `rfluxmtx -I+ -faa - windows_<group>.rad -i room.oct < sensors.pts`, its daylight matrix
     `rfluxmtx windows_<group>.rad sky.rad -i outdoors.oct`, with room.oct made of materials and room
@@ -85,7 +96,7 @@ def write_radiance(
         band: reflectances of "visible" or "solar".
         sky_division: Reinhart division MF of sky.rad, 1 for Tregenza's 145 patches.
         spacing, height, margin: of the sensor grid [m], see `sensor_grid`.
-        filled: the window groups with their BSDF, where it is known; by default the orientations.
+        filled: the window groups with their BSDFs; by default the orientations, without.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -97,14 +108,15 @@ def write_radiance(
     room = _write(folder / "room.rad", inside)
     scene = _write(folder / "outdoors.rad", _parts(outdoors, materials, inwards=False))
     written = _write(folder / "materials.rad", materials.lines())
-    windows, bsdfs = {}, {}
-    for group, bsdf in [(g, None) for g in window_groups(space)] if filled is None else filled:
-        name = identifier(group.name)
-        glass = _window_group(name, [w.triangles for w in group.windows])
-        windows[group.name] = _write(folder / f"windows_{name}.rad", glass)
-        if bsdf is not None:
-            bsdfs[group.name] = folder / f"windows_{name}.xml"
-            write_bsdf_xml(bsdf, bsdfs[group.name])
+    windows, bsdfs, systems = {}, {}, []
+    for known in map(FilledGroup, window_groups(space)) if filled is None else filled:
+        name = identifier(known.group.name)
+        glass = _window_group(name, [w.triangles for w in known.group.windows])
+        windows[known.group.name] = _write(folder / f"windows_{name}.rad", glass)
+        if known.bsdf is not None:
+            bsdfs[known.group.name] = folder / f"windows_{name}.xml"
+            write_bsdf_xml(known.bsdf, bsdfs[known.group.name])
+            systems.append(_system(known, name, folder))
     sky = _write(folder / "sky.rad", [SKY.format(division=sky_division)])
     points, directions = sensor_grid(space, spacing, height, margin)
     rows = np.concatenate([points, directions], axis=1)
@@ -118,7 +130,21 @@ def write_radiance(
     files = {identifier(name): bsdfs.get(name) for name in windows}
     script = _write(folder / "run.sh", [run_script(files, sky_division)])
     script.chmod(0o755)
-    return RadianceFiles(written, room, scene, windows, bsdfs, sky, sensors, view, surfaces, script)
+    _write(folder / "Makefile", [MAKEFILE])
+    return RadianceFiles(
+        written, room, scene, windows, bsdfs, _write(folder / "systems.rad", systems), sky,
+        sensors, view, surfaces, script,
+    )  # fmt: skip
+
+
+def _system(known: FilledGroup, name: str, folder: Path) -> str:
+    """A group's material as a ray to the sun meets it; its peak straight on is Radiance's."""
+    data = folder / f"windows_{name}.xml"
+    if known.fine is not None:
+        data = folder / f"windows_{name}_fine.xml"
+        write_bsdf_xml(known.fine, data)
+    up = _numbers(known.group.frame[1])
+    return f"void aBSDF system_{name}\n5 ./{data.name} {up} .\n0\n0\n\n"
 
 
 def _surface_lines(space: Space, spacing: float) -> Iterable[str]:

@@ -56,8 +56,11 @@ def room_side_radiance(
     daylight = np.asarray(daylight)
     if len(transmission) != len(daylight):
         raise ValueError(f"{len(transmission)} transmission matrices for {len(daylight)} groups")
-    through = np.stack([np.asarray(t) @ d for t, d in zip(transmission, daylight, strict=True)])
-    return times_sky(through, sky)
+    pairs = zip(transmission, daylight, strict=True)
+    hours = sky.shape[0] if isinstance(sky, sparse.csr_array) else np.shape(sky)[1]
+    if hours < daylight.shape[1]:  # the least work: few hours before many directions
+        return np.stack([np.asarray(t) @ times_sky(d, sky) for t, d in pairs])
+    return times_sky(np.stack([np.asarray(t) @ d for t, d in pairs]), sky)
 
 
 def three_phase(

@@ -37,10 +37,12 @@ class Surfaces:
             raise ValueError("reflectance: expected values from 0 to 1")
         if self.gloss and n and len(self.gloss) <= np.max(self.surface):
             raise ValueError(f"gloss: {len(self.gloss)} entries, one for each surface is expected")
-        for number, gloss in enumerate(self.gloss):
-            diffuse = np.max(self.reflectance[self.surface == number], initial=0.0)
-            if gloss is not None and diffuse + gloss.at_normal > 1 + 1e-6:
-                raise ValueError(f"surface {number}: reflects more than it gets")
+        if self.gloss:
+            diffuse = np.zeros(len(self.gloss))
+            np.maximum.at(diffuse, self.surface, self.reflectance)
+            for number, gloss in enumerate(self.gloss):
+                if gloss is not None and diffuse[number] + gloss.at_normal > 1 + 1e-6:
+                    raise ValueError(f"surface {number}: reflects more than it gets")
 
     @classmethod
     def none(cls) -> Surfaces:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from bim.model import Space, Window
 from bim.to_energyplus import DEFAULT_G, DEFAULT_U, UAndG
+from bim.to_radiance import FilledGroup
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
-from mitsuba_cfs.surfaces import WindowGroup
 from scenes.fenestration.resolver import (
     held_systems,
     source_notes,
@@ -56,19 +56,20 @@ class KnownFenestration:
                 notes.append(f"{windows_named(names)}: no {name} is known, {value:g} is written.")
         return found, tuple(notes)
 
-    def groups(self, space: Space) -> list[tuple[WindowGroup, BsdfFile | None]]:
-        """The window groups of a room by orientation and system, with their Klems matrices."""
+    def groups(self, space: Space) -> list[FilledGroup]:
+        """The window groups of a room by orientation and system, with their matrices."""
         nothing = FenestrationSystem("unknown", None, None)
         systems = {w.guid: (self.systems.get(w.guid, nothing),) for w in space.windows}
         windows = room_windows(space, systems)
-        bands = (
-            None if system is nothing else {"Visible": system.visible, "Solar": system.solar}
-            for (system,) in windows.systems
-        )
-        return [
-            (group, None if both is None else BsdfFile(both, system.name))
-            for group, both, (system,) in zip(windows.groups, bands, windows.systems, strict=True)
-        ]
+        found = []
+        for group, (system,) in zip(windows.groups, windows.systems, strict=True):
+            if system is nothing:
+                found.append(FilledGroup(group))
+                continue
+            klems = BsdfFile({"Visible": system.visible, "Solar": system.solar}, system.name)
+            tree = None if system.tree is None else BsdfFile({"Visible": system.tree}, system.name)
+            found.append(FilledGroup(group, klems, tree))
+        return found
 
     def bsdfs(self) -> dict[str, BsdfFile]:
         """The visible band of each window as finely as it is known, by GUID."""

@@ -14,6 +14,7 @@ from pydantic import Field
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import reason
 from scenes.figures.picture import bytes_uri
+from scenes.language.catalogue import Language
 from scenes.toml_file import TomlTable, read_table, validated
 
 # Sections that a page can do without, by their names in a file; those of a room hold for each.
@@ -40,6 +41,7 @@ class PageTable(TomlTable, Generic[Section]):
     title: Line | None = None
     author: Line | None = None
     logo: Path | None = None
+    language: Language = "en"
     sections: dict[Section, bool] = Field(default_factory=dict)
 
 
@@ -51,6 +53,7 @@ class PageOptions:
     author: str = ""
     logo: str = ""  # data URI
     left_out: tuple[str, ...] = ()  # names of sections
+    language: Language = "en"
     inputs: tuple[Path, ...] = ()  # files that this was read from
 
     @property
@@ -66,22 +69,28 @@ class PageOptions:
 OWN_PAGE = PageOptions()
 
 
-def read_page(path: Path | None, sections: Any) -> PageOptions:
+def read_page(path: Path | None, sections: Any, *, translated: bool = False) -> PageOptions:
     """The options of a page; the page's own where there is no file.
 
-    Args: sections: literal type of the sections that this page can do without.
+    Args:
+        sections: literal type of the sections that this page can do without.
+        translated: whether there is a translation of the page.
 
     Raises: `DataError` that names file and key.
     """
     if path is None:
         return OWN_PAGE
     table: PageTable = validated(PageTable[sections], read_table(path), path)
+    if table.language != "en" and not translated:
+        message = f"{table.language}: this page is there in English alone"
+        raise DataError(message, file=path, field="language")
     logo = None if table.logo is None else path.parent / table.logo
     return PageOptions(
         title=table.title or "",
         author=table.author or "",
         logo="" if logo is None else _logo_uri(logo, path),
         left_out=tuple(name for name, shown in table.sections.items() if not shown),
+        language=table.language,
         inputs=(path,) if logo is None else (path, logo),
     )
 

@@ -25,6 +25,7 @@ RANKS = {
         {"methods"},
     ),
     "scenes": (
+        {"language"},
         {"demo", "figures", "plausible", "quick", "result_folder", "results", "streams",
          "toml_file", "user_errors", "pictures", "picture_options", "room_views",
          "bsdf_combination", "bsdf_generation", "bsdf_plots"},

@@ -7,17 +7,17 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from mitsuba_cfs import phases
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.methods.exact_sun import exact_sun, shining_hours
-from mitsuba_cfs.methods.group_light import SensorLight, WindowLight
+from mitsuba_cfs.methods.group_light import SensorLight, WindowLight, window_light
 from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourly_states, in_state
 from mitsuba_cfs.methods.phase_error import exchange_variance, matrix_variance
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
-from mitsuba_cfs.methods.straight_views import StraightViews, sun_beam
+from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -66,16 +66,21 @@ class PhaseSystems:
         """
         optics = self.optics([state] * len(self.systems))
         view, daylight = self.traced.sensors.values, self.traced.daylight.values
-        through = np.stack([o.transmission @ d for o, d in zip(optics, daylight, strict=True)])
-        found = np.einsum("sqk,qkp->sp", view, through, optimize=True)
+        found = self.through(optics, view.reshape(len(view), -1))
         if self.mirrored.reflects(optics):
-            found += self.mirrored.sensors(optics) @ through.reshape(-1, through.shape[-1])
+            found += self.through(optics, self.mirrored.sensors(optics))
         if self.mirrored.reflects_outdoors(optics):
             before = self.mirrored.outdoors(optics, self.mirrored.shares(optics))
             found += before @ daylight.reshape(-1, daylight.shape[-1])
         for g in range(len(self.systems)):
             found += self.straight.coefficients(g, min(state, len(self.systems[g]) - 1))
         return found[: len(self.traced.scene.points)]
+
+    def through(self, optics: Sequence[SystemOptics], shares: NDArray) -> NDArray[np.float64]:
+        """Shares [n, Q * K] of the windows' luminance, T D before them, as of the sky's [n, P]."""
+        parts = np.split(shares, len(optics), axis=1)
+        rows = zip(parts, optics, self.traced.daylight.values, strict=True)
+        return sum(part @ o.transmission @ d for part, o, d in rows)
 
     def seen_sun(self, state: tuple[int, ...]) -> tuple[PictureSun, OutdoorCoefficients]:
         """The sun and the outdoors in the view's pixels, with each group in a state."""
@@ -134,26 +139,15 @@ class PhaseLight:
         self.filled, self.sky, self.progress = filled, sky, progress
         self._traced = filled.traced
         self._last: tuple[bytes, NDArray[np.float64]] | None = None  # of `_of_all`
+        self._few: tuple[bytes, dict[tuple[int, int], WindowLight]] = b"", {}  # of the last hours
 
     @cached_property
     def windows(self) -> list[list[WindowLight]]:
-        """Luminance of each part [Q] of the window groups in each of its states."""
-        # single precision: the noise of D is a hundred thousand times its rounding
-        daylight, sky, found = self._traced.daylight.values.astype(np.float32), self.sky, []
-        whole_sky = sky.whole.astype(np.float32)
-        for q, g in enumerate(self._traced.parts.group):
-            states = self.filled.systems[g]
-            T = [s.transmission.astype(np.float32) for s in states]
-            whole = phases.room_side_radiance(T, [daylight[q]] * len(states), whole_sky)
-            sun: Sequence = [None] * len(states)
-            beams: Sequence = [(None, None)] * len(states)
-            if self._traced.five_phase:
-                D = [self._traced.direct_daylight[q].astype(np.float32)] * len(states)
-                sun = phases.room_side_radiance(T, D, sky.lit_sun.astype(np.float32))
-                beams = [sun_beam(self._traced, q, optics, self.sky) for optics in states]
-            lights = zip(whole, sun, beams, strict=True)
-            found.append([WindowLight(w, s, *both) for w, s, both in lights])
-        return found
+        """Luminance of each part [Q] of the window groups in each of its states, in all hours."""
+        return [
+            [window_light(self._traced, q, optics, self.sky) for optics in self.filled.systems[g]]
+            for q, g in enumerate(self._traced.parts.group)
+        ]
 
     @cached_property
     def sensors(self) -> list[list[SensorLight]]:
@@ -228,9 +222,10 @@ class PhaseLight:
             luminance = self._window_luminance("whole", rows, hours)
             optics, mirrored = self.filled.optics(state), self.filled.mirrored
             if mirrored.reflects_outdoors(optics):
-                through = block_diag(*(o.transmission for o in optics))
-                added = self._by_outdoors(optics, through, hours)
-                luminance = luminance + added.reshape(luminance.shape)
+                back = mirrored.returned(optics, self._before(hours)).reshape(luminance.shape)
+                luminance = luminance + [
+                    o.transmission @ light for o, light in zip(optics, back, strict=True)
+                ]
             if mirrored.reflects(optics):
                 in_sun = self._in_sun(rows, hours) if traced.five_phase else None
                 luminance = luminance + mirrored.windows(optics, luminance, in_sun)
@@ -265,15 +260,14 @@ class PhaseLight:
         return shining_hours(self._traced, self.sky)
 
     def _sensor_light(self, g: int, j: int, exact: list[Estimate | None]) -> SensorLight:
-        diffuse = sum(self._diffuse_light(q, g, j) for q in self._traced.parts.of(g))
-        diffuse = diffuse + self.filled.straight.light(g, j, self.sky)
+        diffuse = self._diffuse_light(g, j) + self.filled.straight.light(g, j, self.sky)
         if not self._traced.five_phase:
             return SensorLight(diffuse, None, 0.0)
         error = 0.0
         outdoors = g < len(self._traced.scene.outdoor_groups)
         if self._reflected_sun is not None and outdoors:
-            beams = (self.windows[q][j].beam is not None for q in self._traced.parts.of(g))
-            more = self._reflected_sun.sensors(g, j, beam=any(beams))
+            beam = bool(self.filled.straight.held(g, j).any())
+            more = self._reflected_sun.sensors(g, j, beam=beam)
             diffuse, error = diffuse + more.values, more.sum_error
         sun, shining = np.zeros_like(diffuse), self._shining
         if exact[j] is None:
@@ -283,19 +277,21 @@ class PhaseLight:
         sun[:, shining] = found.values * luminance
         return SensorLight(diffuse, sun, np.hypot(error, found.error_of(luminance)))
 
-    def _diffuse_light(self, q: int, g: int, j: int) -> NDArray[np.float64]:
-        """What a part of a group gives to the sensors [S, L] but for the sun straight."""
-        traced, window = self._traced, self.windows[q][j]
-        view = traced.sensors.values[:, q]
-        three_phase = view @ window.whole
+    def _diffuse_light(self, g: int, j: int) -> NDArray[np.float64]:
+        """What a group gives to the sensors [S, L] but for the sun straight: few before many."""
+        traced, sky, straight = self._traced, self.sky, self.filled.straight
+        T, parts = straight.transmission(g, j), traced.parts.of(g)
+        view, daylight = traced.sensors.values, traced.daylight.values
+        found = sum(view[:, q] @ T @ daylight[q] for q in parts) @ sky.whole
         if not traced.five_phase:
-            return three_phase
-        three_phase = three_phase - traced.direct_sensors[:, q] @ window.sun
-        reflected = view - traced.direct_sensors[:, q]
-        more, beam = self._reflected_sun, window.beam
-        if beam is not None:
-            three_phase += reflected @ (window.beam_at_sun - beam if more is None else -beam)
-        return three_phase
+            return found
+        held, direct, by_sun = straight.held(g, j), traced.direct_sensors, traced.direct_daylight
+        shares = ((q, direct[:, q] @ T + (view[:, q] - direct[:, q]) @ held) for q in parts)
+        found -= phases.times_sky(sum(share @ by_sun[q] for q, share in shares), sky.lit_sun)
+        if self._reflected_sun is None and held.any():
+            for q in parts:
+                found += (view[:, q] - direct[:, q]) @ self.windows[q][j].beam_at_sun
+        return found
 
     def _of_all(self, state: State | None) -> NDArray[np.float64]:
         """Illuminance of sensors and eye [S + 1, L] by all groups; that of the last state is kept.
@@ -323,8 +319,8 @@ class PhaseLight:
         for kind, hours in combinations(rows):
             optics, added = self.filled.optics(kind), []
             if mirrored.reflects(optics):
-                window = self._window_luminance("whole", rows[:, hours], hours)
-                added.append(mirrored.sensors(optics) @ window.reshape(-1, len(hours)))
+                shares = self.filled.through(optics, mirrored.sensors(optics))
+                added.append(shares @ self._lit(hours))
             if mirrored.reflects_outdoors(optics):
                 added.append(self._by_outdoors(optics, mirrored.shares(optics), hours))
             if added:
@@ -337,10 +333,26 @@ class PhaseLight:
     ) -> NDArray[np.float64]:
         """What shares [n, Q * K] of what windows reflect outdoors and get back are [n, h]."""
         shares, daylight = self.filled.mirrored.outdoors(optics, shares), self._traced.daylight
-        found = shares @ daylight.values.reshape(shares.shape[1], -1) @ self.sky.whole[:, hours]
+        found = shares @ daylight.values.reshape(shares.shape[1], -1) @ self._lit(hours)
         if self._reflected_sun is not None:
             found += self._reflected_sun.before(shares, hours)
         return found
+
+    def _before(self, hours: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Luminance before the windows [Q * K, h], but for what they send there themselves."""
+        daylight = self._traced.daylight.values
+        found = daylight.reshape(-1, daylight.shape[2]) @ self._lit(hours)
+        if self._reflected_sun is not None:
+            found += self._reflected_sun.before(None, hours)
+        return found
+
+    def _lit(self, hours: NDArray[np.int64]) -> NDArray[np.floating]:
+        """The sky of some of its hours [P, h]; a year's is not copied."""
+        return self.sky.whole if self._all(hours) else self.sky.whole[:, hours]
+
+    def _all(self, hours: NDArray[np.int64]) -> bool:
+        """Whether they are the sky's hours, each in its place."""
+        return np.array_equal(hours, np.arange(len(self.sky.lit)))
 
     def _chosen(self, g: int, name: str, row: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """What a group gives [S, L] in the state of each hour [L]."""
@@ -358,15 +370,26 @@ class PhaseLight:
         """Luminance [Q, K, n] of the windows in some hours [n], in the state [G, n] of each."""
         hours = np.arange(len(self.sky.lit)) if hours is None else hours
         found = []
-        for group, g in zip(self.windows, self._traced.parts.group, strict=True):
-            states = np.minimum(rows[g], len(group) - 1)
-            values = np.zeros((len(group[0].whole), len(hours)), dtype=np.float32)
-            for j in np.unique(states):
-                light = getattr(group[j], name)
+        for q, g in enumerate(self._traced.parts.group):
+            states = np.minimum(rows[g], len(self.filled.systems[g]) - 1)
+            values = np.zeros((KLEMS_FULL.size, len(hours)), dtype=np.float32)
+            for j in np.unique(states).tolist():
+                light = getattr(self._in_hours(q, j, hours), name)
                 if light is not None:
-                    values[:, states == j] = light[:, hours[states == j]]
+                    values[:, states == j] = light[:, states == j]
             found.append(values)
         return np.stack(found)
+
+    def _in_hours(self, q: int, j: int, hours: NDArray[np.int64]) -> WindowLight:
+        """Luminance of a part of a window group in a state, in some hours; found again."""
+        if "windows" in self.__dict__ or self._all(hours):
+            return self.windows[q][j].some(hours)
+        if self._few[0] != hours.tobytes():
+            self._few = hours.tobytes(), {}
+        found, systems = self._few[1], self.filled.systems[self._traced.parts.group[q]]
+        if (q, j) not in found:
+            found[q, j] = window_light(self._traced, q, systems[j], self.sky.part(hours))
+        return found[q, j]
 
     def _state(self, state: State | None) -> NDArray[np.int64]:
         """The state of each group in each hour [G, L], as far as it has states."""

@@ -92,8 +92,9 @@ class ReflectedSun:
             paths = traced.sampling.patch_samples // WINDOW_SHARE // BATCHES
             samples = paths * len(traced.scene.groups) // len(traced.parts.groups)
             self._windows[batch] = window_shares(
-                self.outside, samples=max(samples, 4), seed=self.seed(batch)
-            )
+                self.outside, samples=max(samples, 4), places=traced.sampling.sun_points,
+                seed=self.seed(batch),
+            )  # fmt: skip
         return self._windows[batch]
 
     def room(self, batch: int) -> NDArray[np.float64]:
@@ -114,7 +115,7 @@ class ReflectedSun:
             self._views[g, j, batch] = view_shares(
                 self.inside, self.outside, g, self.systems[g][j].scattering,
                 self.traced.scene.sensors(), samples=self._samples(SENSOR_SHARE),
-                seed=self.seed(batch),
+                places=self.traced.sampling.sun_points, seed=self.seed(batch),
             )  # fmt: skip
         return self._views[g, j, batch]
 
@@ -158,20 +159,28 @@ class ReflectedSunLight:
         """
         if not self._found.outdoors_reflects:
             return np.zeros(self._shape)
-        some = hours[self._shining]
-        mean = sum(self._windows(b)[..., some].sum(axis=-1) for b in range(BATCHES)) / BATCHES
+        some = hours[self._shining].astype(np.float32)
+        mean = sum(self._windows(b) @ some for b in range(BATCHES)) / BATCHES
         return mean - self._reflected_daylight() @ self._sky.sun[:, hours].sum(axis=1)
 
-    def before(self, shares: Array, hours: NDArray[np.int64]) -> Array:
-        """The same of each of some hours [h], as rows of shares [n, Q * K] have it [n, h]."""
-        found, number = np.zeros((len(shares), len(hours))), np.full(len(self._sky.illuminance), -1)
+    def before(self, shares: Array | None, hours: NDArray[np.int64]) -> Array:
+        """The same of each of some hours [h], as rows of shares [n, Q * K] have it [n, h].
+
+        Without shares [Q * K, h].
+        """
+        by_patches = self._reflected_daylight().reshape(np.prod(self._shape), -1)
+        if shares is not None:
+            by_patches = shares @ by_patches
+        found, number = np.zeros((len(by_patches), len(hours))), np.full(len(self._sky.lit), -1)
         number[self._shining] = np.arange(len(self._shining))
         some = number[hours][number[hours] >= 0]
         if not self._found.outdoors_reflects or not len(some):
             return found
-        windows = sum(self._windows(b)[..., some] for b in range(BATCHES)) / BATCHES
-        found[:, number[hours] >= 0] = shares @ windows.reshape(shares.shape[1], -1)
-        by_patches = shares @ self._reflected_daylight().reshape(shares.shape[1], -1)
+        batches = (self._flat(b)[:, some] for b in range(BATCHES))
+        if shares is not None:  # in single precision, as the windows' light is
+            single = shares.astype(np.float32)
+            batches = (single @ light for light in batches)
+        found[:, number[hours] >= 0] = sum(batches) / BATCHES
         return found - times_sky(by_patches, self._sky.sun[:, hours])
 
     def _batch(self, number: int, g: int, j: int, *, beam: bool) -> Array:
@@ -179,15 +188,17 @@ class ReflectedSunLight:
         found = self._found
         light = np.zeros((len(found.traced.scene.sensors()[0]), len(self._shining)))
         if found.outdoors_reflects:
-            for q in found.traced.parts.of(g):
-                light += found.straight.rest(g, j, q) @ self._windows(number)[q]
+            parts = found.traced.parts.of(g)
+            rest = np.concatenate([found.straight.rest(g, j, q) for q in parts], axis=1)
+            light += rest.astype(np.float32) @ self._flat(number, parts)
             seen = found.view(g, j, number)
             if seen is not None:
                 light += outdoor_light(seen, found.outside, *self._suns)
         if beam:
             light += room_light(
                 found.cells[0], found.room(number), (found.inside, found.outside), g,
-                found.systems[g][j].scattering, self._suns, seed=found.seed(number),
+                found.systems[g][j].scattering, self._suns,
+                points=found.traced.sampling.sun_points, seed=found.seed(number),
             )  # fmt: skip
         return light
 
@@ -213,6 +224,13 @@ class ReflectedSunLight:
             light = outdoor_light(shares, outside, *self._suns)
             self._before[batch] = light.reshape(*self._shape, -1)
         return self._before[batch]
+
+    def _flat(self, batch: int, parts: Sequence[int] | None = None) -> NDArray[np.float32]:
+        """The same one part after the other [Q * K, h], of all or of some."""
+        found = self._windows(batch)
+        if parts is not None and len(parts) < len(found):
+            found = found[list(parts)]
+        return found.reshape(len(found) * found.shape[1], found.shape[2])
 
     @property
     def _shape(self) -> tuple[int, ...]:

@@ -11,7 +11,9 @@ class Sampling:
 
     sensor_samples: int = 32_768  # paths of a sensor, for V
     patch_samples: int = 16_384  # paths of a window patch, for D
-    sun_points: int = 1_024  # places on each window group that the direct sun is taken at
+    # places on each window group that the direct sun is taken at, and its beam into the room; and
+    # places outdoors that the sun is taken at for all that reflect it
+    sun_points: int = 1_024
     view_samples: int = 8  # paths of a pixel, for the matrices of a view; a tile shares them
     outdoor_samples: int = 8  # paths of a pixel straight through the windows
     picture_samples: int = 16  # point-in-time: paths of a pixel under one sky

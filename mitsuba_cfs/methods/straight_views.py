@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.klems_peak import held_beams
-from mitsuba_cfs.methods.optics import States, SystemOptics
+from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_scene import OUTDOOR_DEPTH, PhaseScene
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.trace.direct_sun import patch_beams, through_beams
+from mitsuba_cfs.trace.direct_sun import patch_beams
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.straight_view import straight_view_matrix
 
@@ -125,40 +125,14 @@ class StraightViews:
         if whole is None:
             return 0.0
         traced = self._traced
-        found = whole.values @ sky.whole - self._in_patches(g, j, traced.daylight.values, sky.whole)
+        found = self.coefficients(g, j) @ sky.whole
         if traced.five_phase:
             direct = self.matrix(g, j, direct=True)
-            found -= phases.times_sky(direct.values, sky.lit_sun)
-            found += self._in_patches(g, j, traced.direct_daylight, sky.sun)
+            direct = direct.values - self._in_patches(g, j, traced.direct_daylight)
+            found -= phases.times_sky(direct, sky.lit_sun)
         return found
 
-    def _in_patches(
-        self, g: int, j: int, daylight: NDArray[np.float64], sky: NDArray | None = None
-    ) -> NDArray[np.float64]:
-        """V_d diag(tau) D [S, P], or with a sky's luminance [S, L]."""
-        beam, total = self.beam(g, j), 0.0
-        for q in self._traced.parts.of(g):
-            ways = [self._traced.direct_sensors[:, q] * beam, daylight[q]]
-            # in the order of least work: few sensors before many hours
-            total = total + np.linalg.multi_dot(ways if sky is None else [*ways, sky])
-        return total
-
-
-def sun_beam(
-    traced: PhaseScene, q: int, optics: SystemOptics, sky: AnnualSky
-) -> tuple[NDArray[np.float32] | None, ...]:
-    """The sun's beam of a part [K, L] by its patches and at its own angle; None without a beam."""
-    ways, sun = [optics.scattering], sky.lit_sun
-    patches = patch_beams(ways, KLEMS_FULL)
-    if not patches.any():
-        return None, None
-    at_sun = through_beams(traced.parts.groups[q : q + 1], ways, sky.direction)
-    T = [held_beams(optics.transmission, patches[0], KLEMS_FULL)]
-    daylight = traced.straight_daylight[q : q + 1]
-    by_patch, by_angle = phases.sun_beams(T, at_sun, daylight, sun)
-    if traced.straight_daylight is not traced.direct_daylight:  # out of a mirror, by patches
-        daylight = traced.direct_daylight[q : q + 1]
-        straight = by_patch
-        by_patch, _ = phases.sun_beams(T, at_sun, daylight, sun)
-        by_angle = by_angle + (by_patch - straight)
-    return by_patch[0].astype(np.float32), by_angle[0].astype(np.float32)
+    def _in_patches(self, g: int, j: int, daylight: NDArray[np.float64]) -> NDArray[np.float64]:
+        """V_d diag(tau) D [S, P]."""
+        beam, direct = self.beam(g, j), self._traced.direct_sensors
+        return sum((direct[:, q] * beam) @ daylight[q] for q in self._traced.parts.of(g))

@@ -132,6 +132,26 @@ class WindowReflection:
             total += found
         return total
 
+    def returned(
+        self, optics: Sequence[SystemOptics], light: NDArray[np.floating]
+    ) -> NDArray[np.float64]:
+        """What comes back to the windows of their light [Q * K, h] by their reflection outdoors.
+
+        (X R_f + (X R_f)^2 + ...) I, for few hours less work than `outdoors`
+        """
+        exchange, K = self._traced.outdoor_exchange.values, KLEMS_FULL.size
+        parts, total = len(exchange), np.zeros(light.shape)
+        flat, found = exchange.reshape(parts * K, -1), light
+        for _ in range(OUTDOOR_ORDERS):
+            sent = np.zeros((flat.shape[1], light.shape[1]))
+            for q, one in enumerate(optics[:parts]):
+                if one.outdoor_reflection is not None:
+                    mine = slice(q * K, (q + 1) * K)
+                    sent[mine] = one.outdoor_reflection @ found[mine]
+            found = flat @ sent
+            total[: parts * K] += found
+        return total
+
     def shares(self, optics: Sequence[SystemOptics]) -> NDArray[np.float64]:
         """What the sensors have of the light before the parts' windows, by patches [S, Q * K]."""
         view = self._traced.sensors.values

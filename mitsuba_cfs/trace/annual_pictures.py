@@ -26,7 +26,7 @@ from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.trace.image import picture_part_blocks
+from mitsuba_cfs.trace.image import PictureBlock, picture_part_blocks
 from mitsuba_cfs.trace.picture_beam import BeamLight, faces_luminance
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_rows import PictureRows
@@ -103,9 +103,10 @@ def view_matrices(
     sums = [_storage(shape, 8 * math.prod(shape) > memory, folder) for _ in range(2)]
     options["window_reflectance"] = window_reflectance
     times = shared.times(smoothed=True)
-    options["pixels"] = np.repeat(pixels, times)
+    number = np.repeat(np.arange(len(pixels)), times)
+    options.update(pixels=pixels[number], row=half[number], weight=(1 / times)[number])
     blocks = picture_part_blocks(surfaces, groups, view, progress=progress, **options)
-    seen = _summed(blocks, half, times, sums)
+    seen = _summed(blocks, number, sums)
     share = np.maximum(1 - np.asarray(seen.sum(axis=1)).ravel(), 0)
     if window_reflectance is not None:  # where a window reflects, all of a pixel does
         reflecting = np.append(np.asarray(window_reflectance) > 0, False)  # OPAQUE is the last
@@ -114,7 +115,8 @@ def view_matrices(
     elements, close = None, None
     if options.get("max_depth", 2) > 1:
         area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
-        elements, close = sun_elements(tracer, area, view, shared, times, seed=seed)
+        paths = {"samples": options.get("samples", 32), "seed": seed}
+        elements, close = sun_elements(tracer, area, view, shared, times, **paths)
     mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     found = (None, None)
     if elements is not None:
@@ -125,24 +127,17 @@ def view_matrices(
 
 
 def _summed(
-    blocks: Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]],
-    half: NDArray[np.int64],
-    times: NDArray[np.int64],
-    sums: Sequence[NDArray[np.float32]],
+    blocks: Iterator[PictureBlock], number: NDArray[np.int64], sums: Sequence[NDArray[np.float32]]
 ) -> sparse.csr_array:
     """Add what comes after more reflections, and after one, to the rows' sums; what is seen.
 
-    Args: half, times: [n] the half of a row that each pixel is of, and how often it comes.
+    Args: number: of the view's pixel that each of the blocks' is.
     """
-    seen, start, number = [], 0, np.repeat(np.arange(len(half)), times)
-    weight = (1 / times).astype(np.float32)[number]
-    for block, parts in blocks:
-        part = slice(start, start + len(block))
-        parts = parts.reshape(len(parts), len(block), -1) * weight[part, None]
-        for rows, values in zip(sums, (parts[2], parts[1]), strict=True):
-            _add_rows(rows, half[number[part]], values)
-        seen.append(sparse.csr_array(parts[0]))
-        start += len(block)
+    seen = []
+    for block in blocks:
+        for rows, values in zip(sums, (block.later, block.lit), strict=True):
+            rows[block.row] += values.reshape(len(values), -1)
+        seen.append(sparse.csr_array(block.seen.reshape(len(block.seen), -1)))
     ones = np.ones(len(number), dtype=np.float32)
     of_pixel = sparse.csr_array((ones, (number, np.arange(len(number)))))
     return sparse.csr_array(of_pixel @ sparse.vstack(seen))
@@ -170,14 +165,6 @@ def _smooth(
             of_halves = np.array(rows[:, part])
             rows[:m, part], rows[m:, part] = (means @ (a @ of_halves) for a in (mean, noise))
     return mean, noise, smooth
-
-
-def _add_rows(rows: NDArray, row: NDArray[np.int64], values: NDArray) -> None:
-    """Add values [b, N] to the rows [b] that they share."""
-    chosen, place = np.unique(row, return_inverse=True)
-    ones = np.ones(len(row), dtype=np.float32)
-    gather = sparse.csr_array((ones, (place, np.arange(len(row)))), (len(chosen), len(row)))
-    rows[chosen] += gather @ values
 
 
 class FivePhasePictures:

@@ -15,7 +15,6 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.image import add_picture_paths
-from mitsuba_cfs.trace.sampling import opaque
 from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
@@ -61,7 +60,9 @@ def borrowed_daylight(
             paths.outward,
             mi.Bool(True),
             row=paths.patch,
-            apart=opaque(0, mi.UInt32),
+            lit=paths.patch,
+            later=paths.patch,
+            beta=mi.Float(1),
             stream=paths.patch,
             sample=path - paths.patch * dr.opaque(mi.UInt32, n),
             generator=paths.generator,

@@ -158,5 +158,5 @@ def _add_paths(
         active &= ~met
     add_picture_paths(
         tracer, bins, matrix, start, direction, active,
-        apart=opaque(0, mi.UInt32), generator=generator, **paths,
+        lit=paths["row"], later=paths["row"], beta=mi.Float(1), generator=generator, **paths,
     )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -31,7 +32,6 @@ from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
 from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
-PARTS = 3  # of a pixel's row: windows seen, their light on what is seen, the rest
 
 
 def luminance_pictures(
@@ -71,8 +71,19 @@ def picture_matrix_blocks(
 
     Args: options: of `picture_part_blocks`.
     """
-    for pixels, parts in picture_part_blocks(surfaces, groups, view, **options):
-        yield pixels, parts.sum(axis=0)
+    for block in picture_part_blocks(surfaces, groups, view, **options):
+        yield block.pixels, block.seen + block.lit + block.later
+
+
+@dataclass(frozen=True, slots=True)
+class PictureBlock:
+    """Rows of the view matrix of some pixels [n], by what the light has met before the eye."""
+
+    pixels: NDArray[np.int64]  # [n] row * width + column
+    seen: NDArray[np.float32]  # [n, G, K] the windows that a pixel shows
+    row: NDArray[np.int64]  # [b] numbers of the rows that pixels share
+    lit: NDArray[np.float32]  # [b, G, K] what surfaces that they show reflect of the windows' light
+    later: NDArray[np.float32]  # [b, G, K] what comes after more reflections
 
 
 def picture_part_blocks(
@@ -86,50 +97,60 @@ def picture_part_blocks(
     window_reflectance: ArrayLike | None = None,
     seed: int = 0,
     pixels: NDArray[np.int64] | None = None,
+    row: NDArray[np.int64] | None = None,
+    weight: NDArray[np.floating] | None = None,
     progress: Progress = silent,
-) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
-    """Blocks of the view matrix of a picture in three parts [3, n, G, K], of the same paths.
+) -> Iterator[PictureBlock]:
+    """Blocks of the view matrix of a picture in its parts, of the same paths.
 
-    The first holds the windows that a pixel shows, the second what surfaces that it shows reflect
-    of the windows' light, the last what comes after more reflections.  Pixels that show nothing
-    (row * width + column) are left out.  Results do not depend on the block size.
+    Pixels that show nothing are left out.  Results do not depend on the block size.
 
     Args:
         samples: paths for each pixel, at as many places within it.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
         pixels: [n] those to trace; one that comes again has other paths, stratified with its first.
+        row: [n] that each pixel adds what it shows by reflection to; by default one of its own.
+        weight: [n] of each pixel's light in its rows; 1 by default.
     """
     tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
     bins = DirectionBins(basis)
-    shape = (len(groups), bins.size)
-    size = max(256, BLOCK_BYTES // (8 * PARTS * int(np.prod(shape))))
-    size = min(size, max(1, 2**31 // samples))
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
+    row = np.arange(len(shown)) if row is None else row
+    weight = np.ones(len(shown)) if weight is None else weight
+    held = 1 + 2 * len(np.unique(row)) / max(len(row), 1)  # rows for each pixel
+    size = max(256, int(BLOCK_BYTES / (8 * held * len(groups) * bins.size)))
+    size = min(size, max(1, 2**31 // samples))
     time = numbered(shown)
     options = {"samples": samples, "max_depth": max_depth, "seed": seed}
     for start in range(0, len(shown), size):
-        part = slice(start, start + size)
-        matrix = _block(tracer, bins, view, shown[part], time[part], **options)
-        yield shown[part], matrix.reshape(PARTS, len(shown[part]), *shape)
-        progress("picture", (start + len(shown[part])) / len(shown))
+        end = start + size
+        part = shown[start:end], time[start:end], row[start:end], weight[start:end]
+        yield _block(tracer, bins, view, part, **options)
+        progress("picture", min(end, len(shown)) / len(shown))
 
 
 def _block(
     tracer: TracedScene,
     bins: DirectionBins,
     view: View,
-    pixels: NDArray[np.int64],
-    time: NDArray[np.int64],
+    chosen: tuple[NDArray, NDArray, NDArray, NDArray],
     *,
     samples: int,
     max_depth: int,
     seed: int,
-) -> NDArray[np.float32]:
-    """Rows [PARTS * n, G * K] of some pixels [n], each for the first time (0) or again [n]."""
-    shape = PARTS * len(pixels), bins.size * len(tracer.groups)
+) -> PictureBlock:
+    """The rows of some pixels.
+
+    Args: chosen: pixels [n], each for the first time (0) or again [n], their rows and weights [n].
+    """
+    pixels, time, row, weight = chosen
+    rows, place = np.unique(row, return_inverse=True)
+    n, b = len(pixels), len(rows)
+    shape = n + 2 * b, len(tracer.groups), bins.size
     matrix = empty_sums(math.prod(shape))
-    eye = tracer.place(view.position)
+    eye, share = tracer.place(view.position), column(weight)
     number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
+    lit, again = column(n + place, mi.UInt32), dr.opaque(mi.UInt32, b)
     path = column(pixels + time * view.width * view.height & 0xFFFFFFFF, mi.UInt32)
     places = pixel_places((int(time.max(initial=0)) + 1) * samples)
     for j in range(samples):
@@ -143,14 +164,17 @@ def _block(
             vectors(directions),
             column(exists, mi.Bool),
             row=dr.arange(mi.UInt32, dr.width(number)),
-            apart=dr.opaque(mi.UInt32, len(pixels)),
+            lit=lit,
+            later=lit + again,
+            beta=share,
             stream=number,
             sample=first + dr.opaque(mi.UInt32, j),
             generator=path_generator(path, batch_key(seed, j)),
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
         dr.eval(matrix)
-    return (sums_of(matrix, shape) / samples).astype(np.float32)
+    sums = np.divide(sums_of(matrix, shape), samples, dtype=np.float32, casting="same_kind")
+    return PictureBlock(pixels, sums[:n], rows, sums[n : n + b], sums[n + b :])
 
 
 def add_picture_paths(
@@ -161,14 +185,19 @@ def add_picture_paths(
     direction: mi.Vector3f,
     active: mi.Bool,
     *,
-    row: mi.UInt32,
-    apart: mi.UInt32,  # rows between what is seen, what that reflects, and what more reflect; or 0
+    row: mi.UInt32,  # of what is seen
+    lit: mi.UInt32,  # row of what that reflects of the windows' light
+    later: mi.UInt32,  # row of what comes after more reflections
+    beta: mi.Float,  # weight of the path
     stream: mi.UInt32,  # of the stratified samples: a pixel
     sample: mi.UInt32,
     generator: mi.PCG32,
     max_depth: mi.UInt32,
 ) -> None:
-    """One path for each lane: L = 1 of the patch seen directly, else rho / pi E of the surface."""
+    """One path for each lane: L = 1 of the patch seen directly, else rho / pi E of the surface.
+
+    The three rows may be one.
+    """
     K = mi.UInt32(bins.size)
     width = opaque(bins.size * len(tracer.groups), mi.UInt32)
     ray = mi.Ray3f(eye, direction)
@@ -180,7 +209,7 @@ def add_picture_paths(
     local = tracer.to_local(group, direction, glazed)
     glazed &= local.z > 0
     slot = row * width + mi.UInt32(group) * K + bins.index(local)
-    dr.scatter_add(matrix, mi.Float64(1.0), slot, glazed)
+    dr.scatter_add(matrix, mi.Float64(beta), slot, glazed)
 
     position, face, reflectance = tracer.surface_at(hit, eye, direction, active)
     mirrors = mi.PCG32(generator)  # a copy: the loop changes what it is given
@@ -188,11 +217,11 @@ def add_picture_paths(
         tracer,
         bins,
         matrix,
-        row + apart,
+        lit,
         position,
         face,
-        later=apart,
-        beta=reflectance * dr.inv_pi,
+        later=later - lit,
+        beta=beta * reflectance * dr.inv_pi,
         sample=sample,
         stream=mi.sample_tea_32(stream, mi.UInt32(0x1F123BB5))[0],
         generator=generator,
@@ -204,6 +233,6 @@ def add_picture_paths(
     if tracer.gloss is not None:
         add_mirrored(
             tracer, bins, matrix, hit, eye, direction,
-            row=row, later=2 * apart, beta=mi.Float(1), sample=sample, stream=stream,
+            row=row, later=later - row, beta=beta, sample=sample, stream=stream,
             generator=mirrors, max_depth=max_depth, active=active,
         )  # fmt: skip

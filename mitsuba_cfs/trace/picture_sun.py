@@ -235,34 +235,47 @@ class PictureSun:
 
         That is where the sun falls on its middle and not on a neighbour's, or the reverse.
         """
-        hour, column = edge_pixels(found > 0, self.pixels[self._surface], self._view)
+        hour, pixel = edge_pixels(found > 0, self.pixels[self._surface], self._view)
+        order = np.argsort(pixel, kind="stable")  # each is looked at once for all of its hours
+        hour, pixel = hour[order], pixel[order]
         step = LANES // EDGE_PLACES
         for start in range(0, len(hour), step):
-            part = slice(start, start + step)
-            way = places_in_pixels(self._view, self.pixels[self._surface[column[part]]])
-            to_sun = np.repeat(suns[hour[part]], EDGE_PLACES, axis=0)
-            number = (column[part, None] * EDGE_PLACES + np.arange(EDGE_PLACES)).ravel()
-            shown = self._beam_seen(way, to_sun, number).reshape(-1, EDGE_PLACES).mean(axis=1)
-            found[hour[part], column[part]] = shown * light[hour[part]]
+            some, part = pixel[start : start + step], hour[start : start + step]
+            found[part, some] = self._beam_in_pixels(some, suns[part]) * light[part]
 
-    def _beam_seen(
-        self, way: NDArray, suns: NDArray, number: NDArray[np.int64]
-    ) -> NDArray[np.float32]:
-        """Luminance [r] of surfaces in directions from the eye per unit illuminance of suns.
+    def _beam_in_pixels(self, pixel: NDArray[np.int64], suns: NDArray) -> NDArray[np.float32]:
+        """Luminance [r] of surfaces per unit illuminance of suns [r, 3], mean over each pixel.
 
-        Args: number: [r] of the place, that its point on the disc goes by.
+        Args: pixel: [r] number among those that show surfaces, in ascending order.
         """
-        tracer, direction = self._inside, vectors(way)
+        shown, row = np.unique(pixel, return_inverse=True)
+        place, normal, rho = self._places_in(self.pixels[self._surface[shown]])
+        lane = dr.arange(mi.UInt32, len(pixel) * EDGE_PLACES)
+        pair = lane // EDGE_PLACES
+        number = lane - pair * EDGE_PLACES
+        at = dr.gather(mi.UInt32, column(row, mi.UInt32), pair) * EDGE_PLACES + number
+        on_disc = dr.gather(mi.UInt32, column(pixel, mi.UInt32), pair) * EDGE_PLACES + number
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(suns), pair), on_disc)
+        cosine = dr.dot(dr.gather(mi.Vector3f, normal, at), to_sun)
+        rho = dr.gather(mi.Float, rho, at)
+        tau = self._straight(dr.gather(mi.Point3f, place, at), to_sun, (rho > 0) & (cosine > 0))
+        value = dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0)
+        return (dr.block_sum(value, EDGE_PLACES) / EDGE_PLACES).numpy()
+
+    def _places_in(self, pixels: NDArray[np.int64]) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
+        """Surfaces that places spread over pixels [k] show, their normals and reflectances.
+
+        The reflectance is 0 where they show none.
+        """
+        tracer, direction = self._inside, vectors(places_in_pixels(self._view, pixels))
         ray = mi.Ray3f(self._eye, direction)
-        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True)
         shown = hit.is_valid()
         place, normal, rho = tracer.surface_at(hit, self._eye, direction, shown)
         shown &= dr.gather(mi.Int32, tracer.group, hit.prim_index, shown) == OPAQUE
-        places = column(number, mi.UInt32)
-        to_sun = on_disc_of(vectors(suns), places)
-        cosine = dr.dot(normal, to_sun)
-        tau = self._straight(place, to_sun, shown & (cosine > 0))
-        return dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0).numpy()
+        found = place, normal, dr.select(shown, rho, 0.0)
+        dr.eval(found)
+        return found
 
     @dr.syntax
     def _straight(self, place: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:

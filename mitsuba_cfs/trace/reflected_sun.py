@@ -37,7 +37,7 @@ from mitsuba_cfs.trace.sun_paths import (
 )
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
-PLACES = 1024  # that stand for all that paths meet, at most
+PLACES = 1024  # that stand for all that paths meet, at most and where nothing is said
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
 ROUGH = 4096  # rough faces whose lobes a row sees, at most
@@ -53,11 +53,13 @@ class SunShares:
     rough: RoughFaces | None = None  # whose lobes the rows see
 
     @classmethod
-    def of(cls, met: Sequence[_Met], rows: int, seed: int) -> SunShares:
+    def of(cls, met: Sequence[_Met], rows: int, seed: int, *, most: int = PLACES) -> SunShares:
         """From what paths met: one of each run of near places, drawn by weight, stands for all.
 
         The weights are shares of each row's: a sensor in the depth has as many places as one that
         sees more.
+
+        Args: most: places, at the most.
         """
         places = Places.joined([m.places for m in met])
         row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
@@ -68,7 +70,7 @@ class SunShares:
         if not len(weight):
             return cls(places, sparse.csr_array((rows, 0)), rough)
         of_row = weight / np.bincount(row, weight, rows)[row]
-        run, chosen = _runs(places, of_row, np.random.default_rng(seed))
+        run, chosen = _runs(places, of_row, most, np.random.default_rng(seed))
         few = places.some(chosen)
         share = sparse.csr_array(sparse.coo_array((weight, (row, run)), shape=(rows, len(chosen))))
         return cls(few, share, rough)
@@ -84,10 +86,12 @@ class _Met:
     rough: list[RoughFaces]
 
 
-def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunShares:
+def window_shares(
+    outside: TracedScene, *, samples: int, places: int = PLACES, seed: int = 0
+) -> SunShares:
     """What window patches have of the sun on surfaces outdoors; rows [Q * K], radiance.
 
-    Args: samples: paths of each patch.
+    Args: samples: paths of each patch; places: that stand for what they meet, at the most.
     """
     bins, starts = DirectionBins(KLEMS_FULL), []
     K, count = bins.size, len(outside.groups) * bins.size
@@ -105,7 +109,7 @@ def window_shares(outside: TracedScene, *, samples: int, seed: int = 0) -> SunSh
     row = column(np.repeat(np.arange(count), samples), mi.UInt32)
     weight = opaque(1.0 / samples) + dr.zeros(mi.Float, count * samples)
     met = _met(outside, row, weight, vectors(position, mi.Point3f), vectors(way), seed)
-    return SunShares.of([met], count, seed)
+    return SunShares.of([met], count, seed, most=places)
 
 
 def view_shares(
@@ -116,18 +120,19 @@ def view_shares(
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
     samples: int,
+    places: int = PLACES,
     seed: int = 0,
 ) -> SunShares:
     """What sensors see of the sun on surfaces outdoors through a group's beam; rows [S].
 
     Args:
         sensors: positions and normals [S, 3].
-        samples: points on the group for each sensor.
+        samples: points on the group for each sensor; places: as for `window_shares`.
     """
     key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
     sensor, target, omega, weight = straight_rays(inside, group, way, sensors, samples, key)
     met = _met(outside, sensor, weight / samples, target, omega, seed)
-    return SunShares.of([met], len(sensors[0]), seed)
+    return SunShares.of([met], len(sensors[0]), seed, most=places)
 
 
 def outdoor_light(
@@ -229,7 +234,7 @@ def _few(rough: RoughFaces) -> RoughFaces:
 
 
 def _runs(
-    places: Places, weight: NDArray[np.float64], random: np.random.Generator
+    places: Places, weight: NDArray[np.float64], most: int, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The run of near places, even in weight, that each is of; the one that stands for each run.
 
@@ -239,7 +244,7 @@ def _runs(
     order = np.lexsort((_morton(places.point), side))
     side, weight = side[order], weight[order]
     climbed, total = np.cumsum(weight), np.bincount(side, weight)
-    number = np.ceil(PLACES * total / total.sum()).astype(np.int64)
+    number = np.ceil(most * total / total.sum()).astype(np.int64)
     within = (climbed - 0.5 * weight - (np.cumsum(total) - total)[side]) / total[side]
     run = np.clip((within * number[side]).astype(np.int64), 0, number[side] - 1)
     run = np.unique((np.cumsum(number) - number)[side] + run, return_inverse=True)[1]

@@ -35,8 +35,8 @@ AREA_POINTS = 2**18  # by which the cells' areas are counted
 CELL_RAYS = 128  # from each cell, in each batch
 LAST = 1e-4  # share of a sensor's light by the last reflection that is counted
 BOUNCES = 256  # at most; light falls to `LAST` before in all but white rooms
-WINDOW_POINTS = 256  # on each group in each batch, that the sun is followed from
-EDGE_POINTS = 1024  # where the sun does not reach all of them
+POINTS = 1024  # on each group in each batch, that the sun is followed from
+EDGE_SHARE = 4  # of them, one in so many where the sun reaches all
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 RAYS = 2**21  # at once
 
@@ -123,6 +123,7 @@ def room_light(
     way: Scattering,
     suns: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
+    points: int = POINTS,
     seed: int = 0,
 ) -> NDArray[np.float64]:
     """Illuminance of sensors [S, h] by what the room reflects of a group's straight beam.
@@ -131,12 +132,14 @@ def room_light(
         share: [S, c] of `room_shares`.
         scenes: the room, with its window groups, and the outdoors.
         suns: [h, 3] directions, and [h] illuminance normal to them.
+        points: on the group, that the sun is followed from where it does not reach all of them.
     """
     towards, strength = suns
     found = np.zeros((len(share), len(towards)))
-    beam = _Beam(scenes, group, way, seed)
-    for start in range(0, len(towards), RAYS // WINDOW_POINTS):
-        hours = slice(start, start + RAYS // WINDOW_POINTS)
+    beam = _Beam(scenes, group, way, points, seed)
+    step = max(RAYS // beam.fewer, 1)
+    for start in range(0, len(towards), step):
+        hours = slice(start, start + step)
         found[:, hours] = (share @ beam.flux(cells, towards[hours])) * strength[hours]
     return found
 
@@ -148,22 +151,29 @@ class _Beam:
     scenes: tuple[TracedScene, TracedScene]
     group: int
     way: Scattering
+    points: int
     seed: int
+
+    @property
+    def fewer(self) -> int:
+        """Points for hours whose sun reaches all of them."""
+        return max(self.points // EDGE_SHARE, 1)
 
     def flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
         """Luminous flux on the cells [c, h], per unit illuminance normal to the sun."""
         found = sparse.csr_array((cells.size, len(suns)))
         for by in sun_ways(self.scenes[1]):
             hours = np.arange(len(suns))
-            value, position, to_sun = self._entering(by, suns, WINDOW_POINTS)
+            value, position, to_sun = self._entering(by, suns, self.fewer)
             lit = value > 0
             crossed = lit.any(axis=1) & ~lit.all(axis=1)
             value[crossed] = 0
             found = found + self._landed(cells, value, position, to_sun, hours, len(suns))
             hours = hours[crossed]
-            for start in range(0, len(hours), RAYS // EDGE_POINTS):
-                some = hours[start : start + RAYS // EDGE_POINTS]
-                rays = self._entering(by, suns[some], EDGE_POINTS)
+            step = max(RAYS // self.points, 1)
+            for start in range(0, len(hours), step):
+                some = hours[start : start + step]
+                rays = self._entering(by, suns[some], self.points)
                 found = found + self._landed(cells, *rays, some, len(suns))
         return found
 

@@ -43,6 +43,7 @@ MOST_PATHS = 32  # of a pixel
 RAYS = 2**18  # at once
 NEAR_TILES = 12  # [tiles' widths] that a surface is near within, twice what smoothing spans
 NEAR_RAYS = 1024  # of each tile to what is near: narrow strips of sun beside a corner are small
+SAMPLES = 8  # paths of a pixel for all else, with fewer of which these too are fewer, in proportion
 FINENESS = 0.5  # edge of an element near a tile over how near it is
 HALVINGS = 4  # of the elements' edge at most
 
@@ -207,6 +208,7 @@ def sun_elements(
     rows: PictureRows,
     times: NDArray[np.int64],
     *,
+    samples: int = SAMPLES,
     seed: int = 0,
 ) -> tuple[SunElements, NDArray[np.bool_]]:
     """Elements by the places that paths of a view's pixels meet after what the pixel shows.
@@ -217,9 +219,10 @@ def sun_elements(
     Args:
         area: of the room's surfaces [m2].
         rows: of the picture's pixels; times: [n] how often a pixel has paths to what is far.
+        samples: paths of a pixel for the rest of the picture.
     """
-    every, tile = np.arange(len(rows.pixels)), rows.tiles.size
-    samples = int(np.clip(PATHS // max(int(times.sum()), 1), 1, MOST_PATHS))
+    every, tile, share = np.arange(len(rows.pixels)), rows.tiles.size, min(samples / SAMPLES, 1.0)
+    samples = int(np.clip(PATHS * share // max(int(times.sum()), 1), 1, MOST_PATHS))
     edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
     look = _Look(tracer, view, tile, edge, seed)
     far, close = [], np.zeros(len(rows.keys), dtype=bool)
@@ -227,7 +230,7 @@ def sun_elements(
         hits, beside = look.far(part, samples, number * RAYS // samples)
         far.append(hits)
         close[beside // 2] = True
-    rays_each = -(-NEAR_RAYS // tile**2)
+    rays_each = int(np.ceil(NEAR_RAYS * share / tile**2))
     chosen, again = np.flatnonzero(close[rows.row]), rows.times(smoothed=False)
     blocks = _Pixels.of(rows, chosen, again[chosen]).blocks(rays_each)
     near = [look.near(part, rays_each) for part in blocks]

@@ -24,7 +24,7 @@ from mitsuba_cfs.trace.sampling import (
 )
 from mitsuba_cfs.trace.traced_gloss import TracedGloss
 
-KEPT = 6  # scenes that are found again: what one room is traced by, indoors and outdoors
+KEPT = 8  # scenes that are found again: what one room is traced by, indoors and outdoors
 OPAQUE = -1  # window index of a triangle that is not glazed
 SERIES_GAP = 1.0  # widest between a screen and its panes [m]
 SERIES_PLACES = 256  # on each window group, from which they are looked for

@@ -107,7 +107,7 @@ def command(
         result = check_building(options, progress, files)
         write_compliance(result, folder, quick=quick, page=page_options)
     for verdict in result.verdicts:
-        if verdict.rooms:
+        if verdict.rooms and verdict.criterion.over != "no building":
             name = f"{verdict.rule}, {verdict.criterion.title}"
             click.echo(f"{name}: {verdict.reached} ({verdict.rooms} room(s))")
     for text in (*result.assumptions, *result.notes):

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from scenes.fenestration_exports import KnownFenestration
 
 PATTERNS = {  # of the files that an export writes
-    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml", "run.sh"),
+    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml", "run.sh", "Makefile"),
     "--mitsuba": ("scene.xml", "glass_*.xml", "*.ply"),
 }
 

@@ -117,7 +117,7 @@ def run_to_folder(options: JobOptions, out: Path, page: Path | None = None) -> N
     from scenes.result_folder import ResultFolder
     from scenes.run.files import read_files
 
-    page_options = read_page(page, RunSection)
+    page_options = read_page(page, RunSection, translated=True)
     inputs = (options.building, options.weather, options.system, options.operation)
     inputs += (*options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "run", inputs=inputs)

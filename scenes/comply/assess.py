@@ -23,6 +23,7 @@ class RoomVerdict:
     criterion: CriterionTable
     applies: bool
     values: tuple[tuple[float | None, ...], ...] = ()  # by level, by need
+    asked: bool = True  # of this very room; else another one may have it, or none need have it
 
     def level_met(self, number: int) -> bool | None:
         """Whether the needs of a level are all met; None where one was not computed."""
@@ -95,6 +96,8 @@ def applies(criterion: CriterionTable, space: Space, use: RoomUse) -> bool:
         return False
     if criterion.uses and use.key not in criterion.uses:
         return False
+    if use.key in criterion.other_than:
+        return False
     if criterion.openings == "any":
         return True
     roof = bool(space.windows) and all(one.is_horizontal for one in openings_of(space))
@@ -114,18 +117,25 @@ def asked_of(rules: Mapping[str, RuleTable], space: Space, use: RoomUse) -> froz
 
 
 def assess_building(
-    verdicts: Sequence[Sequence[RoomVerdict]], areas: Sequence[float]
+    verdicts: Sequence[Sequence[RoomVerdict]],
+    areas: Sequence[float],
+    dwellings: Sequence[str] | None = None,
 ) -> list[BuildingVerdict]:
     """All rooms together, criterion by criterion.
 
-    Args: verdicts: of each room, in the same order of criteria; areas: floor area of each [m2].
+    Args:
+        verdicts: of each room, in the same order of criteria.
+        areas: floor area of each [m2].
+        dwellings: name of each room's dwelling, "" where it is in none; None: in none.
     """
     found = []
     for rows in zip(*verdicts, strict=True):
         used = [(v, area) for v, area in zip(rows, areas, strict=True) if v.applies]
+        homes = dwellings or [""] * len(rows)
+        named = [home for v, home in zip(rows, homes, strict=True) if v.applies]
         values, met = [], []
         for number, level in enumerate(rows[0].criterion.level):
-            value = level_value(level, number, used)
+            value = level_value(level, number, used, named)
             values.append(value)
             met.append(_level_met(level, value))
         found.append(
@@ -135,14 +145,18 @@ def assess_building(
 
 
 def level_value(
-    level: LevelTable, number: int, rooms: Sequence[tuple[RoomVerdict, float]]
+    level: LevelTable,
+    number: int,
+    rooms: Sequence[tuple[RoomVerdict, float]],
+    dwellings: Sequence[str],
 ) -> float | None:
     """What of the rooms with their areas is compared with a level; None where not computed.
 
-    "area mean": the mean of its one need over the floor area; else the share of the floor area
-    whose rooms meet the level.
+    "area mean": the mean of its one need over the floor area; "room of each dwelling": the share
+    of the dwellings of which a room meets the level, a room in none being one by itself; else the
+    share of the floor area whose rooms meet the level.
     """
-    if not rooms:
+    if not rooms or level.over == "no building":
         return None
     total = sum(area for _, area in rooms)
     if level.over == "area mean":
@@ -154,6 +168,10 @@ def level_value(
     met = [(verdict.level_met(number), area) for verdict, area in rooms]
     if any(one is None for one, _ in met):
         return None
+    if level.over == "room of each dwelling":
+        homes = [name or str(i) for i, name in enumerate(dwellings)]
+        having = {home for home, (one, _) in zip(homes, met, strict=True) if one}
+        return len(having) / len(set(homes))
     return sum(area for one, area in met if one) / total
 
 

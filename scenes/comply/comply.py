@@ -18,8 +18,9 @@ from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded
 from mitsuba_cfs.metrics.lm83 import sunlit_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from scenes.comply.assess import asked_of, assess_building, assess_room, values_of
+from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
+from scenes.comply.dwellings import dwelling_words, judged
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
 from scenes.comply.glare import seat_glare
@@ -99,7 +100,7 @@ def check_rooms(
             rooms.append(check.dark_room(space, uses[space.guid]))
     if not rooms:
         raise DataError("none of its rooms could be computed", file=options.building)
-    verdicts = assess_building([r.verdicts for r in rooms], [r.space.floor_area for r in rooms])
+    rooms, verdicts = judged(rooms)
     return Compliance(
         check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
         check.day, tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
@@ -309,6 +310,7 @@ class Check:
     def assumptions(self, rooms: list[CheckedRoom], left: list[Space]) -> list[str]:
         """What was assumed, in sentences; `left` are rooms that no rule was held against."""
         found = [*self._ray_words(), *self._light_words()]
+        found += dwelling_words(rooms)
         if left:
             names = ", ".join(space.label for space in left)
             found.append(f"Left out, without a window and not regularly occupied: {names}.")

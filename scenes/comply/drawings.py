@@ -21,6 +21,7 @@ LIGHT_PLANS = {
     "Sunlit hours": ("ase",),
 }
 MOST_BARS = 12  # openings with a bar of their own
+MOST_LETTERS = 28  # of the name beside a bar
 
 
 def plans(result: Compliance, room: CheckedRoom) -> tuple[FloorPlan, ...]:
@@ -102,13 +103,20 @@ def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
     yield plan(frame, worst, scale, title="Glare", explanation=text, digits=2)
 
 
+def shortened(name: str) -> str:
+    """A name without its middle where it would take the room of the bars beside it."""
+    half = MOST_LETTERS // 2
+    return name if len(name) <= MOST_LETTERS else f"{name[:half]}…{name[-half:]}"
+
+
 def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
     """When the sun may shine on each opening, and on any."""
     wanted = any("sun" in rule.parts for rule in result.rules.values())
     if room.sun is None or not wanted or not room.sun.openings:
         return None
     openings = room.sun.openings[:MOST_BARS]
-    rows = [("any opening", room.sun.times), *((one.name, one.times) for one in openings)]
+    rows = [("any opening", room.sun.times)]
+    rows += [(shortened(one.name), one.times) for one in openings]
     count = len(rows)
     x_range, y_range = (60.0 * FIRST_HOUR, 60.0 * LAST_HOUR), (0.0, float(count))
     marks = []
@@ -120,7 +128,7 @@ def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
             for a, b in times
         )
         marks.append(ChartMark(path, style, filled=True))
-    hours = range(FIRST_HOUR, LAST_HOUR + 1)
+    hours = range(FIRST_HOUR, LAST_HOUR + 1, 2)
     span = LAST_HOUR - FIRST_HOUR
     more = len(room.sun.openings) - len(openings)
     return Chart(

@@ -320,7 +320,7 @@ class LightingEnergy(Need):
     standby_kwh_m2: Annotated[float, Field(ge=0)] = 0.0  # of controls and emergency lights, a year
 
     parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "kWh/m² a"
+    unit: ClassVar[str] = "kWh/(m² a)"
     digits: ClassVar[int] = 1
 
     @property

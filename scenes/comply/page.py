@@ -27,7 +27,8 @@ from scenes.report.tables import Column, Table
 FILES = page_files("scenes.comply")
 # what does not come apart at the end of a line: a sign and its number, a number and what it counts
 TOGETHER = re.compile(
-    r"(?<=[≥≤]) (?=\d)|(?<=\d) (?=%|°|lx|h\b|m\b|s\b|K h|kWh|points?\b|credits?\b)"
+    r"(?<=[≥≤]) (?=\d)|(?<=\d) (?=%|°|lx|h\b|m\b|s\b|K h\b|kWh|points?\b|credits?\b)"
+    r"|(?<=\bK) (?=h\b)"
 )
 
 
@@ -99,6 +100,8 @@ def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
     """Size, use and blinds of a room in words."""
     template = "" if room.light is None else room.light.template
     rows = [*facts(room.space, template), ("Use", f"{room.use.key}, {room.use.source}")]
+    if room.use.dwelling:
+        rows.append(("Dwelling", room.use.dwelling))
     if not room.use.occupied:
         rows.append(("Occupied", "not regularly: left out of what looks at occupied rooms"))
     if room.light is not None:

@@ -16,6 +16,10 @@ from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
 
 FOLDER = files(__package__) / "rules"
 NOT_MET = "not met"
+# What of the rooms is compared over the building; "no building": nothing, and no room misses it
+Over = Literal[
+    "room", "area mean", "each room", "area of rooms", "room of each dwelling", "no building"
+]
 
 
 class GridTable(TomlTable):
@@ -31,7 +35,7 @@ class LevelTable(TomlTable):
 
     name: str
     needs: Annotated[tuple[AnyNeed, ...], Field(min_length=1)]
-    over: Literal["room", "area mean", "each room", "area of rooms"] = "room"
+    over: Over = "room"
     share: Share | None = None  # of the area whose rooms meet the needs, for "area of rooms"
 
     @model_validator(mode="after")
@@ -50,7 +54,13 @@ class CriterionTable(TomlTable):
     openings: Literal["any", "walls", "roof"] = "any"  # of the rooms that it is for
     occupied: bool = False  # of regularly occupied rooms alone
     uses: tuple[str, ...] = ()  # of rooms of these uses alone; none: of all
+    other_than: tuple[str, ...] = ()  # not of rooms of these uses
     level: Annotated[tuple[LevelTable, ...], Field(min_length=1)]
+
+    @property
+    def over(self) -> Over:
+        """What of the rooms its levels compare over the building."""
+        return self.level[0].over
 
     @property
     def needs(self) -> Iterator[Need]:

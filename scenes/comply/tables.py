@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pandas as pd
 
@@ -14,9 +14,11 @@ from scenes.report.numbers import MISSING, rounded
 from scenes.report.tables import Column, Table
 
 OVER = "share of the floor area whose rooms meet it"
+MOST_DIGITS = 5  # behind the decimal point of a value beside its limit
+OVER_DWELLINGS = "share of the dwellings of which a room meets it"
 COLUMNS = (
     "room", "guid", "use", "floor_area_m2", "rule", "edition", "clause", "criterion", "level",
-    "quantity", "value", "limit", "unit", "met",
+    "quantity", "value", "limit", "unit", "met", "asked",
 )  # fmt: skip
 
 
@@ -25,7 +27,15 @@ def shown(need: Need, value: float | None) -> str:
     if value is None:
         return MISSING
     factor = 100 if need.unit == "%" else 1
-    return f"{rounded(factor * value, need.digits)} {need.unit}".strip()
+    number = beside_limit(factor * value, need.digits, lambda v: need.met(v / factor))
+    return f"{number} {need.unit}".strip()
+
+
+def beside_limit(value: float, digits: int, met: Callable[[float], bool | None]) -> str:
+    """A value with so many digits that it keeps or misses its limit as printed too."""
+    while digits < MOST_DIGITS and met(round(value, digits)) != met(value):
+        digits += 1
+    return rounded(value, digits)
 
 
 def limit_of(need: Need) -> str:
@@ -46,7 +56,7 @@ def building_table(result: Compliance, rule: str) -> Table:
     columns += [_text("By level"), _text("Reached"), Column("Rooms")]
     rows = []
     for verdict in result.verdicts:
-        if verdict.rule != rule or not verdict.rooms:
+        if verdict.rule != rule or not verdict.rooms or verdict.criterion.over == "no building":
             continue
         one = verdict.criterion
         compared = [
@@ -64,9 +74,12 @@ def _compared(level: LevelTable, value: float | None) -> tuple[str, str]:
     if level.over == "area mean":
         need = level.needs[0]
         return f"{need.words}; mean over the floor area", f"{shown(need, value)} ({limit_of(need)})"
-    number = MISSING if value is None else f"{rounded(100 * value, 0)} %"
     limit = 100.0 if level.share is None else 100 * level.share
-    return OVER, f"{number} (≥ {limit:g} %)"
+    number = MISSING
+    if value is not None:
+        number = f"{beside_limit(100 * value, 0, lambda v: v >= limit - 1e-7)} %"
+    words = OVER_DWELLINGS if level.over == "room of each dwelling" else OVER
+    return words, f"{number} (≥ {limit:g} %)"
 
 
 def without_rooms(result: Compliance, rule: str) -> tuple[str, ...]:
@@ -125,9 +138,9 @@ def _quantities(verdict: RoomVerdict) -> dict[str, tuple[str, list[str]]]:
 
 
 def missed(room: CheckedRoom) -> Iterator[str]:
-    """A sentence for each criterion of which the room reaches no level."""
+    """A sentence for each criterion that is asked of the room and of which it reaches no level."""
     for verdict in room.verdicts:
-        if not verdict.applies or verdict.reached != NOT_MET:
+        if not (verdict.applies and verdict.asked) or verdict.reached != NOT_MET:
             continue
         one, values = verdict.criterion, verdict.values[0]
         numbers = "; ".join(
@@ -175,7 +188,7 @@ def _rows(result: Compliance) -> Iterator[tuple[object, ...]]:
                         room.space.label, room.space.guid, room.use.key, room.space.floor_area,
                         verdict.rule, rule.edition, one.clause, one.key, level.name, need.words,
                         None if value is None else factor * value, factor * (limit or 0.0),
-                        need.unit, yes_or_no(need.met(value)),
+                        need.unit, yes_or_no(need.met(value)), yes_or_no(verdict.asked),
                     )  # fmt: skip
 
 

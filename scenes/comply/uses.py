@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -34,6 +35,7 @@ class UsesFile(TomlTable):
 
     use: tuple[UseTable, ...] = ()
     rooms: dict[str, str] = Field({})  # name, number, label or GUID: key of a use
+    dwellings: dict[str, tuple[str, ...]] = Field({})  # their rooms, "A1*" for all that begin so
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class RoomUse:
     occupied: bool  # people are there regularly and for long
     source: str  # in words
     assumed: bool = False
+    dwelling: str = ""  # that the room is in
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +56,27 @@ class RoomUses:
     uses: tuple[UseTable, ...]  # those of the user's file first
     rooms: Mapping[str, str]
     file: str = ""  # that names rooms
+    dwellings: Mapping[str, Sequence[str]] = field(default_factory=dict)  # patterns of their rooms
 
     def of(self, space: Space, texts: Sequence[tuple[str, str]] = ()) -> RoomUse:
-        """The use of a room.
+        """The use of a room, and its dwelling.
 
         Args: texts: what the IFC file says beside names and type, see `bim.ifc.room_uses`.
         """
-        for name in (space.guid, space.label, space.name, space.long_name):
-            if name and name in self.rooms:
+        names = [n for n in (space.guid, space.label, space.name, space.long_name) if n]
+        dwelling = next(
+            (
+                name
+                for name, patterns in self.dwellings.items()
+                if any(fnmatchcase(one, pattern) for one in names for pattern in patterns)
+            ),
+            "",
+        )
+        return replace(self._use(space, names, texts), dwelling=dwelling)
+
+    def _use(self, space: Space, names: Sequence[str], texts: Sequence[tuple[str, str]]) -> RoomUse:
+        for name in names:
+            if name in self.rooms:
                 return self._named(self.rooms[name])
         for where, text in self._texts(space, texts):
             for use in self.uses:
@@ -91,7 +107,7 @@ def read_uses(path: Path | None = None) -> RoomUses:
     if path is None:
         return RoomUses(shipped.use, {})
     own = validated(UsesFile, read_table(path), path)
-    return RoomUses((*own.use, *shipped.use), own.rooms, path.name)
+    return RoomUses((*own.use, *shipped.use), own.rooms, path.name, own.dwellings)
 
 
 def _holds(text: str, word: str) -> bool:

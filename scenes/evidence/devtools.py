@@ -14,7 +14,10 @@ from types import TracebackType
 from typing import Any
 
 WAIT = 120  # [s] for an answer: the processor may be shared with many
-KEYS = {"ArrowRight": 39, "ArrowLeft": 37, "ArrowDown": 40, "ArrowUp": 38, " ": 32, "Tab": 9}
+KEYS = {
+    "ArrowRight": 39, "ArrowLeft": 37, "ArrowDown": 40, "ArrowUp": 38, " ": 32, "Tab": 9,
+    "Enter": 13, "Escape": 27, "PageUp": 33, "PageDown": 34,
+}  # fmt: skip
 
 
 def chromium() -> str | None:
@@ -176,7 +179,8 @@ class Page:
     def press(self, key: str, times: int = 1) -> None:
         """Press a key on what has the focus."""
         code = {"key": key, "code": key, "windowsVirtualKeyCode": KEYS.get(key, ord(key[0]))}
-        text = {"text": key} if len(key) == 1 else {}
+        said = "\r" if key == "Enter" else key if len(key) == 1 else ""
+        text = {"text": said} if said else {}
         for _ in range(times):
             self.send("Input.dispatchKeyEvent", type="keyDown", **code, **text)
             self.send("Input.dispatchKeyEvent", type="keyUp", **code)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scenes.figures.chart import Chart
 from scenes.figures.picture import png_uri
 from scenes.figures.scale import ColourScale, Tick
+from scenes.language.catalogue import said, short_month
 
 
 def day_grid(times: pd.DatetimeIndex, values: ArrayLike) -> NDArray[np.float64]:
@@ -41,7 +40,9 @@ def month_ticks(times: pd.DatetimeIndex) -> tuple[Tick, ...]:
     if count < 40:
         step = max(1, count // 7)
         return tuple(
-            Tick(100 * (day + 0.5) / count, f"{date.day}", f" {date:%b}", line=False)
+            Tick(
+                100 * (day + 0.5) / count, f"{date.day}", f" {short_month(date.month)}", line=False
+            )
             for day in range(0, count, step)
             for date in [first + pd.Timedelta(days=day)]
         )
@@ -51,7 +52,8 @@ def month_ticks(times: pd.DatetimeIndex) -> tuple[Tick, ...]:
         end = min((start + pd.offsets.MonthBegin(1) - first).days, count)
         if end - begin >= 14:
             at = 100 * (begin + end) / 2 / count
-            ticks.append(Tick(at, f"{start:%b}"[0], f"{start:%b}"[1:], line=False))
+            name = short_month(start.month)
+            ticks.append(Tick(at, name[0], name[1:], line=False))
     return tuple(ticks)
 
 
@@ -79,7 +81,7 @@ def carpet(
         "days": grid.shape[1],
         "divide": factor,
         "unit": scale.unit,
-        "values": base64.b64encode(np.round(coded).astype("<i2").tobytes()).decode("ascii"),
+        "values": np.round(coded).astype(int).ravel().tolist(),
     }
     return _carpet(times, scale.rgba(grid), pointer, title, explanation, scale=scale)
 
@@ -102,7 +104,7 @@ def class_carpet(
         "rows": grid.shape[0],
         "days": grid.shape[1],
         "names": [name for _, name in legend],
-        "values": base64.b64encode(number.astype("<i2").tobytes()).decode("ascii"),
+        "values": number.ravel().tolist(),
     }
     return _carpet(times, rgba, pointer, title, explanation, classes=legend)
 
@@ -111,8 +113,8 @@ def _carpet(times, rgba, pointer, title: str, explanation: str, **legend) -> Cha
     return Chart(
         title,
         explanation,
-        x_label="Day of the year",
-        y_label="Hour of the day (local standard time)",
+        x_label=said("Day of the year"),
+        y_label=said("Hour of the day (local standard time)"),
         x_ticks=month_ticks(times),
         y_ticks=hour_ticks(),
         picture=png_uri(rgba),

@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib import colormaps
 from numpy.typing import ArrayLike, NDArray
 
+from scenes.language.catalogue import decimal
+
 GRADIENT_STOPS = 16
 STEPS = 256  # of a map of colours
 EQUAL_CONTRAST = 0.05 * (21**0.5 - 1)  # luminance on which black and white contrast alike
@@ -128,7 +130,7 @@ def log_values(low: float, high: float) -> NDArray[np.float64]:
 def plain(value: float) -> str:
     """A tick's number: no exponent, no needless zeros, thousands set apart."""
     text = f"{value:,.10g}" if abs(value) < 1e10 else f"{value:g}"
-    return ("−" + text[1:] if text.startswith("-") else text).replace(",", "\u202f")
+    return decimal(("−" + text[1:] if text.startswith("-") else text).replace(",", "\u202f"))
 
 
 def axis_ticks(low: float, high: float, count: int = 6) -> tuple[Tick, ...]:

@@ -11,6 +11,7 @@ from scenes.figures.carpet import carpet
 from scenes.figures.chart import Chart
 from scenes.figures.plan import FloorPlan, plan, plan_frame
 from scenes.figures.scale import ColourScale, round_limits
+from scenes.language.catalogue import said
 from scenes.report.headline import sensor_column
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded, significant
@@ -38,23 +39,27 @@ def plans(room: RoomYear, beside: Sequence[RoomYear] = ()) -> tuple[FloorPlan, .
             )
     if column := sensor_column(room, "daylight_factor", "df"):
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
-        scale = _from_zero(_of_all(column, room, beside), "Daylight factor", "%")
+        scale = _from_zero(_of_all(column, room, beside), said("Daylight factor"), "%")
         digits = 1 if scale.high > 1 else 2
         text = _mean(values, "%", quantity("daylight_factor").meaning)
         pictures.append(
-            plan(frame, values, scale, title="Daylight factor", explanation=text, digits=digits)
+            plan(
+                frame, values, scale, title=said("Daylight factor"), explanation=text, digits=digits
+            )
         )
     column = sensor_column(room, "sunlit_hours")
     if column and (every := _of_all(column, room, beside)).any():
         values = daylight.sensor_metrics[column].to_numpy(dtype=float)
-        scale = _from_zero(every, "Sunlit hours", "h")
+        scale = _from_zero(every, said("Sunlit hours"), "h")
         text = quantity("sunlit_hours").meaning
-        pictures.append(plan(frame, values, scale, title="Sunlit hours", explanation=text))
+        pictures.append(plan(frame, values, scale, title=said("Sunlit hours"), explanation=text))
     values = daylight.illuminance.mean(axis=0)
     every = np.concatenate([one.daylight.illuminance.mean(axis=0) for one in (room, *beside)])
-    scale = _from_zero(every, "Annual mean illuminance", "lx")
+    scale = _from_zero(every, said("Annual mean illuminance"), "lx")
     text = _mean(values, "lx", quantity("annual_mean").meaning)
-    pictures.append(plan(frame, values, scale, title="Annual mean illuminance", explanation=text))
+    pictures.append(
+        plan(frame, values, scale, title=said("Annual mean illuminance"), explanation=text)
+    )
     return tuple(pictures)
 
 
@@ -78,13 +83,20 @@ def illuminance_carpet(result: RunResult, room: RoomYear) -> Chart:
     """Median over the work plane for each hour."""
     median = np.median(room.daylight.illuminance, axis=1).astype(float)
     lit = median >= DARK_LX
-    scale = ColourScale(30, 10000, "Median illuminance", "lx", logarithmic=True)
-    text = "Illuminance that half of the work plane exceeds in each hour; nights are left empty."
+    scale = ColourScale(30, 10000, said("Median illuminance"), "lx", logarithmic=True)
+    text = said(
+        "Illuminance that half of the work plane exceeds in each hour; nights are left empty."
+    )
     if lit.any():
-        text += f" Median of the {rounded(lit.sum(), 0)} daylit hours: "
-        text += f"{significant(float(np.median(median[lit])), 2)} lx."
+        text += " " + said(
+            "Median of the {hours} daylit hours: {lux} lx.",
+            hours=rounded(lit.sum(), 0),
+            lux=significant(float(np.median(median[lit])), 2),
+        )
     values = np.where(lit, median, np.nan)
-    return carpet(result.times, values, scale, title="Light on the work plane", explanation=text)
+    return carpet(
+        result.times, values, scale, title=said("Light on the work plane"), explanation=text
+    )
 
 
 def _from_zero(values, label: str, unit: str) -> ColourScale:
@@ -105,4 +117,4 @@ def _mean(values, unit: str, meaning: str) -> str:
         return meaning
     mean = float(np.nanmean(values))
     text = percent(mean) if unit == "%" else significant(mean, 3)
-    return f"Mean {text} {unit}. {meaning}"
+    return said("Mean {value} {unit}.", value=text, unit=unit) + f" {meaning}"

@@ -11,8 +11,9 @@ from scipy.ndimage import binary_closing, binary_dilation, binary_erosion
 from mitsuba_cfs.images.view import View
 from scenes.figures.picture import photo_uri, png_uri, reduced
 from scenes.figures.scale import ColourScale
+from scenes.language.catalogue import said
 from scenes.pictures import tone_mapped
-from scenes.report.numbers import rounded, significant
+from scenes.report.numbers import counted, rounded, significant
 from scenes.report.tables import glare_class, spoken
 from scenes.results import LuminancePicture, RoomYear, RunResult
 
@@ -70,7 +71,7 @@ def luminance_scale(pictures: list[LuminancePicture]) -> ColourScale:
     lit = [p.luminance[p.luminance > 0] for p in pictures]
     top = max((float(np.quantile(values, 0.999)) for values in lit if values.size), default=0.0)
     high = _half_decade(top)
-    return ColourScale(max(high / 3000, 1.0), high, "Luminance", "cd/m²", True, "viridis")
+    return ColourScale(max(high / 3000, 1.0), high, said("Luminance"), "cd/m²", True, "viridis")
 
 
 def _half_decade(value: float) -> float:
@@ -87,14 +88,14 @@ def glare_picture(
     luminance = reduced(picture.luminance.astype(float), factor)
     glare = picture.glare
     seen = tone_mapped(luminance)
-    sources = "no glare source"
+    sources = said("no glare source")
     if picture.source_mask is not None and picture.source_mask.any():
         mask = reduced(picture.source_mask.astype(float), factor) > 0.5
         seen[outline(mask)] = OUTLINE
         count = int(glare.get("sources", 0))
-        sources = f"{count} glare source{'s' if count != 1 else ''} (outlined)" if count else ""
+        sources = f"{counted(count, 'glare source')} ({said('outlined')})" if count else ""
     numbers = f"Ev {significant(glare['ev'], 3)} lx" if "ev" in glare else ""
-    brightest = f"up to {significant(float(picture.luminance.max()), 2)} cd/m²"
+    brightest = said("up to {value} cd/m²", value=significant(float(picture.luminance.max()), 2))
     return GlarePicture(
         title=spoken(result.times[picture.hour]),
         words=sun_words(result, picture.hour),
@@ -112,8 +113,8 @@ def sun_words(result: RunResult, hour: int) -> str:
     sun = result.sun[hour]
     altitude = np.degrees(np.arcsin(np.clip(sun[2], -1, 1)))
     if altitude <= 0:
-        return "sun below the horizon"
-    return f"sun {altitude:.0f}° high in the {compass(sun)}"
+        return said("sun below the horizon")
+    return said(f"sun {{altitude}}° high in the {compass(sun)}", altitude=f"{altitude:.0f}")
 
 
 def compass(direction: NDArray[np.float64]) -> str:

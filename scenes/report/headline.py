@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.glare.classes import hour_not_exceeded, protection_level
+from scenes.language.catalogue import said
 from scenes.provision_levels import provision_levels
 from scenes.report.names import quantity
 from scenes.report.numbers import percent, rounded, significant
@@ -33,6 +34,7 @@ class Card:
     grade: str = PLAIN  # good, fair, poor, plain
     meaning: str = ""
     meter: float | None = None  # 0..100, drawn as a bar
+    traced: bool = False  # its error is that of the illuminances
 
 
 def cards(result: RunResult, room: RoomYear) -> tuple[Card, ...]:
@@ -84,10 +86,10 @@ def occupied(room: RoomYear) -> pd.Series:
 def heated(room: RoomYear) -> str:
     """Whether the room is heated and cooled, as a sentence."""
     if room.operation is None:
-        return "Without heating and cooling."
+        return said("Without heating and cooling.")
     energy = {name: room.operation.summary[f"{name}_kwh"] for name in ("heating", "cooling")}
     used = " and ".join(name for name, value in energy.items() if value > 0)
-    return f"With {used}." if used else "Without heating and cooling."
+    return said(f"With {used}." if used else "Without heating and cooling.")
 
 
 def applicable(comfort: pd.DataFrame) -> pd.Series:
@@ -110,10 +112,19 @@ def _spatial_autonomy(room: RoomYear) -> Card | None:
         if value >= 55
         else (POOR, "below the 55 % of LM-83")
     )
-    words = "of the work plane has 300 lx of daylight for at least half of the occupied hours"
+    words = said("of the work plane has 300 lx of daylight for at least half of the occupied hours")
     meaning = quantity("sda300_50").meaning
-    return Card("Spatial daylight autonomy", percent(value), "%", words, verdict, grade, meaning,
-                value)  # fmt: skip
+    return Card(
+        said("Spatial daylight autonomy"),
+        percent(value),
+        "%",
+        words,
+        said(verdict),
+        grade,
+        meaning,
+        value,
+        traced=True,
+    )
 
 
 def _sunlight(room: RoomYear) -> Card | None:
@@ -123,10 +134,19 @@ def _sunlight(room: RoomYear) -> Card | None:
     grade, verdict = (
         (GOOD, "within the 10 % of LM-83") if value <= 10 else (POOR, "above the 10 % of LM-83")
     )
-    words = "of the work plane gets direct sun over 1000 lx in more than 250 hours a year"
+    words = said("of the work plane gets direct sun over 1000 lx in more than 250 hours a year")
     meaning = quantity("ase1000_250").meaning
-    return Card("Annual sunlight exposure", percent(value), "%", words, verdict, grade, meaning,
-                value)  # fmt: skip
+    return Card(
+        said("Annual sunlight exposure"),
+        percent(value),
+        "%",
+        words,
+        said(verdict),
+        grade,
+        meaning,
+        value,
+        traced=True,
+    )
 
 
 def _autonomy(room: RoomYear) -> Card | None:
@@ -134,13 +154,15 @@ def _autonomy(room: RoomYear) -> Card | None:
     if column is None:
         return None
     values = room.daylight.sensor_metrics[column].to_numpy(dtype=float)
-    words = (
-        f"of the occupied hours have 300 lx of daylight, as a mean over the work plane "
-        f"({percent(values.min())} to {percent(values.max())} % by place)"
+    words = said(
+        "of the occupied hours have 300 lx of daylight, as a mean over the work plane "
+        "({least} to {most} % by place)",
+        least=percent(values.min()),
+        most=percent(values.max()),
     )
     meaning = quantity("da300").meaning
     mean = float(values.mean())
-    return Card("Daylight autonomy", percent(mean), "%", words, meaning=meaning, meter=mean)
+    return Card(said("Daylight autonomy"), percent(mean), "%", words, meaning=meaning, meter=mean)
 
 
 def _provision(room: RoomYear) -> Card | None:
@@ -152,16 +174,30 @@ def _provision(room: RoomYear) -> Card | None:
         return None
     index, levels = int(level), provision_levels()
     target, least = metrics.get("en17037_target_lx"), metrics.get("en17037_minimum_lx")
-    words = "level of daylight provision by EN 17037"
+    words = said("level of daylight provision by EN 17037")
     if target is not None and least is not None:
-        words += (
-            f": in half of the daylight hours half of the room has {significant(target)} lx or "
-            f"more and nearly all of it {significant(least)} lx"
+        words += ": " + said(
+            "in half of the daylight hours half of the room has {target} lx or more and nearly "
+            "all of it {least} lx",
+            target=significant(target),
+            least=significant(least),
         )
-    verdict = (f"below {levels[0].words}", *(one.words for one in levels))[index]
+    reached = levels[max(index - 1, 0)]
+    verdict = said(
+        "{target} and {least} lx" if index else "below {target} and {least} lx",
+        target=f"{reached.target:g}",
+        least=f"{reached.minimum:g}",
+    )
     grade = (POOR, FAIR, GOOD, GOOD)[index]
     return Card(
-        "Daylight provision", q.values[index].capitalize(), "", words, verdict, grade, q.meaning
+        said("Daylight provision"),
+        q.values[index].capitalize(),
+        "",
+        words,
+        verdict,
+        grade,
+        q.meaning,
+        traced=True,
     )
 
 
@@ -173,10 +209,23 @@ def _glare(result: RunResult, room: RoomYear) -> Card | None:
     dgp = worst.glare["dgp"]
     word = glare_class(dgp)
     grade = {"imperceptible": GOOD, "perceptible": FAIR}.get(word, POOR)
-    many = f"the worst of {len(pictures)} pictures" if len(pictures) > 1 else "the picture"
-    words = f"daylight glare probability in {many}, {spoken(result.times[worst.hour])}"
-    return Card("Glare at its worst", rounded(dgp, 2), "DGP", words, f"{word} glare", grade,
-                quantity("dgp").meaning, min(100 * dgp, 100))  # fmt: skip
+    words = said(
+        "daylight glare probability in the worst of {count} pictures, {hour}"
+        if len(pictures) > 1
+        else "daylight glare probability in the picture, {hour}",
+        count=len(pictures),
+        hour=spoken(result.times[worst.hour]),
+    )
+    return Card(
+        said("Glare at its worst"),
+        rounded(dgp, 2),
+        "DGP",
+        words,
+        said(f"{word} glare"),
+        grade,
+        quantity("dgp").meaning,
+        min(100 * dgp, 100),
+    )
 
 
 def _protection(room: RoomYear) -> Card | None:
@@ -186,13 +235,16 @@ def _protection(room: RoomYear) -> Card | None:
     dgp = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
     level = protection_level(dgp)
     grade = {"high": GOOD, "medium": GOOD, "minimum": FAIR}.get(level, POOR)
-    words = (
-        "protection from glare by EN 17037: DGP is above "
-        f"{rounded(hour_not_exceeded(dgp), 2)} in no more than 5 % of the occupied hours"
+    words = said(
+        "protection from glare by EN 17037: DGP is above {dgp} in no more than 5 % of the occupied "
+        "hours",
+        dgp=rounded(hour_not_exceeded(dgp), 2),
     )
-    verdict = {"none": "above 0.45"}.get(level, f"{level}: at most {PROTECTION[level]}")
+    verdict = said("above 0.45" if level == "none" else f"{level}: at most {PROTECTION[level]}")
     meaning = quantity("dgp").meaning
-    return Card("Protection from glare", level.capitalize(), "", words, verdict, grade, meaning)
+    return Card(
+        said("Protection from glare"), said(level.capitalize()), "", words, verdict, grade, meaning
+    )
 
 
 def _warm_hours(room: RoomYear) -> Card | None:
@@ -204,12 +256,15 @@ def _warm_hours(room: RoomYear) -> Card | None:
     warm = (temperatures["operative_c"].to_numpy() > WARM_C) & used
     hours, total = float(warm.sum()) * step, float(used.sum()) * step
     share = 100 * hours / total if total else float("nan")
-    words = (
-        f"with an operative temperature above {WARM_C:.0f} °C, {percent(share)} % of the "
-        f"{rounded(total, 0)} occupied hours. {heated(room)}"
+    words = said(
+        "with an operative temperature above {limit} °C, {share} % of the {total} occupied hours.",
+        limit=f"{WARM_C:.0f}",
+        share=percent(share),
+        total=rounded(total, 0),
     )
+    words += f" {heated(room)}"
     meaning = quantity("operative_c").meaning
-    return Card("Warm hours", rounded(hours, 0), "h", words, meaning=meaning, meter=share)
+    return Card(said("Warm hours"), rounded(hours, 0), "h", words, meaning=meaning, meter=share)
 
 
 def _comfort(room: RoomYear) -> Card | None:
@@ -220,14 +275,15 @@ def _comfort(room: RoomYear) -> Card | None:
         return None
     widest = columns[-1]
     value = 100 * float(comfort.loc[used, widest].mean())
-    words = f"of the occupied hours are {_lower_first(quantity(widest).label)} of adaptive comfort"
+    words = said("of the occupied hours: {band} of adaptive comfort", band=quantity(widest).label)
     outside = 100 * float((~applicable(comfort))[used].mean())
     if outside > 0.5:
-        words += (
-            f"; {percent(outside)} % have weather that the model does not cover (counted as no)"
+        words += "; " + said(
+            "{share} % have weather that the model does not cover (counted as no)",
+            share=percent(outside),
         )
     meaning = quantity(widest).meaning
-    return Card("Adaptive comfort", percent(value), "%", words, meaning=meaning, meter=value)
+    return Card(said("Adaptive comfort"), percent(value), "%", words, meaning=meaning, meter=value)
 
 
 def comfort_columns(comfort: pd.DataFrame) -> list[str]:
@@ -241,14 +297,13 @@ def _peak(room: RoomYear) -> Card | None:
     if not {"air_c", "operative_c"} <= set(temperatures):
         return None
     air, operative = temperatures["air_c"], temperatures["operative_c"]
-    words = (
-        f"highest operative temperature ({spoken(operative.idxmax())}); highest air temperature "
-        f"{rounded(float(air.max()), 1)} °C, lowest {rounded(float(air.min()), 1)} °C. "
-        f"{heated(room)}"
+    words = said(
+        "highest operative temperature ({hour}); highest air temperature {high} °C, lowest {low} "
+        "°C.",
+        hour=spoken(operative.idxmax()),
+        high=rounded(float(air.max()), 1),
+        low=rounded(float(air.min()), 1),
     )
-    return Card("Peak temperature", rounded(float(np.max(operative)), 1), "°C", words,
+    words += f" {heated(room)}"
+    return Card(said("Peak temperature"), rounded(float(np.max(operative)), 1), "°C", words,
                 meaning=quantity("operative_c").meaning)  # fmt: skip
-
-
-def _lower_first(text: str) -> str:
-    return text[:1].lower() + text[1:]

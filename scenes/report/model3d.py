@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from scenes.figures.scale import ColourScale
 from scenes.report.daylight_figures import top_of_scale, useful_column
 from scenes.report.headline import sensor_column
 from scenes.report.names import quantity
+from scenes.report.storeys import storey_name
 from scenes.results import RunResult
 
 MOST_TRIANGLES = 24_000  # of what stands outdoors; the smallest are left out beyond
@@ -23,6 +25,7 @@ KIND_OF_FACE = {
     "floor": "floor", "ceiling": "ceiling", "roof": "ceiling", "wall": "wall", "door": "door",
     "window frame": "frame", "reveal": "wall",
 }  # fmt: skip
+ON_TOP = 0.1  # what stands outdoors and begins so far below a storey's end lies on it [m]
 STEPS = 32000  # of the 16-bit coordinates over the model's half size
 
 
@@ -42,10 +45,11 @@ class Model3D:
 
     centre: tuple[float, float, float]  # [m]
     unit: float  # metres per integer step
-    batches: tuple[dict, ...]  # room index (-1 outdoors), kind, triangles, edges
-    sensors: dict  # room of each, corners, values by layer
+    batches: tuple[dict, ...]  # room index (-1 outdoors), storey, kind, triangles, edges
+    sensors: dict  # room and storey of each, corners
     layers: tuple[ColourLayer, ...]
     rooms: tuple[str, ...]
+    storeys: tuple[str, ...]  # names, the lowest first
     left_out: int
 
     def json(self) -> dict:
@@ -55,6 +59,7 @@ class Model3D:
             "batches": self.batches,
             "sensors": self.sensors,
             "rooms": self.rooms,
+            "storeys": self.storeys,
             "layers": [{"key": layer.key, "colours": layer.colours} for layer in self.layers],
         }
 
@@ -69,6 +74,7 @@ def model3d(result: RunResult) -> Model3D:
     centre = (low + high) / 2
     reach = np.abs(np.concatenate([corners, outdoors.reshape(-1, 3)]) - centre).max()
     unit = float(reach) / STEPS
+    names, levels, tops = storey_levels(spaces)
 
     def packed(points: NDArray[np.float64]) -> str:
         return _base64(np.round((points - centre) / unit).astype("<i2"))
@@ -77,11 +83,17 @@ def model3d(result: RunResult) -> Model3D:
     for index, space in enumerate(spaces):
         for kind, triangles, edges in room_batches(space):
             batches.append(
-                {"room": index, "kind": kind, "t": packed(triangles), "e": packed(edges)}
-            )
-    if len(outdoors):
-        edges = outline_edges(outdoors)
-        batches.append({"room": -1, "kind": "outdoors", "t": packed(outdoors), "e": packed(edges)})
+                {"room": index, "storey": levels[index], "kind": kind, "t": packed(triangles),
+                 "e": packed(edges)}
+            )  # fmt: skip
+    above = (outdoors[:, :, 2].min(axis=1)[:, None] + ON_TOP >= tops).sum(axis=1)
+    for level in np.unique(above):
+        part = outdoors[above == level]
+        edges = outline_edges(part)
+        batches.append(
+            {"room": -1, "storey": int(level), "kind": "outdoors", "t": packed(part),
+             "e": packed(edges)}
+        )  # fmt: skip
     cells, owners = [], []
     for index, room in enumerate(result.spaces):
         flat = sensor_cells(room.daylight.points)
@@ -90,9 +102,30 @@ def model3d(result: RunResult) -> Model3D:
         z = np.broadcast_to(room.daylight.points[:, None, 2:3], (*flat.shape[:2], 1))
         cells.append(np.concatenate([flat, z], axis=-1))
         owners += [index] * len(flat)
-    sensors = {"room": owners, "corners": packed(np.concatenate(cells))}
-    names = tuple(space.label for space in spaces)
-    return Model3D(tuple(centre), unit, tuple(batches), sensors, layers(result), names, left_out)
+    sensors = {
+        "room": owners, "storey": [levels[owner] for owner in owners],
+        "corners": packed(np.concatenate(cells)),
+    }  # fmt: skip
+    labels = tuple(space.label for space in spaces)
+    return Model3D(
+        tuple(centre), unit, tuple(batches), sensors, layers(result), labels, names, left_out
+    )
+
+
+def storey_levels(
+    spaces: Sequence[Space],
+) -> tuple[tuple[str, ...], list[int], NDArray[np.float64]]:
+    """Storeys, the lowest first: their names, that of each room, and where each ends above [m]."""
+    floors: dict[str, float] = {}
+    tops: dict[str, float] = {}
+    for space in spaces:
+        name = storey_name(space)
+        floors[name] = min(floors.get(name, np.inf), space.floor_level)
+        tops[name] = max(tops.get(name, -np.inf), float(space.shell[..., 2].max()))
+    names = tuple(sorted(floors, key=lambda name: floors[name]))
+    order = {name: i for i, name in enumerate(names)}
+    levels = [order[storey_name(space)] for space in spaces]
+    return names, levels, np.array([tops[name] for name in names])
 
 
 def room_batches(space: Space):

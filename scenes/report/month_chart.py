@@ -8,6 +8,7 @@ import pandas as pd
 
 from scenes.figures.chart import Chart, ChartMark, Readout
 from scenes.figures.scale import Tick, axis_ticks
+from scenes.language.catalogue import month_name, said, short_month
 from scenes.report.names import quantity
 from scenes.report.numbers import rounded
 
@@ -26,13 +27,19 @@ def month_chart(
     Args: names: columns of `monthly` [kWh] that are told under the pointer.
     """
     ticks = tuple(
-        Tick(100 * (i + 0.5) / len(monthly), f"{m:%b}"[0], f"{m:%b}"[1:], False)
-        for i, m in enumerate(monthly.index)
+        Tick(100 * (i + 0.5) / len(monthly), name[0], name[1:], False)
+        for i, name in enumerate(short_month(m.month) for m in monthly.index)
     )
     rows = tuple(
         (quantity(n).label, tuple(f"{rounded(v, 0)} kWh" for v in monthly[n])) for n in names
     )
     return Chart(
-        title, explanation, "Month", "Energy [kWh]", ticks, axis_ticks(0.0, top), tuple(marks),
-        readout=Readout(tuple(f"{m:%B}" for m in monthly.index), rows),
-    )  # fmt: skip
+        title,
+        explanation,
+        said("Month"),
+        said("Energy [kWh]"),
+        ticks,
+        axis_ticks(0.0, top),
+        tuple(marks),
+        readout=Readout(tuple(month_name(m.month) for m in monthly.index), rows),
+    )

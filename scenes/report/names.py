@@ -7,6 +7,8 @@ import tomllib
 from dataclasses import dataclass
 from importlib.resources import files
 
+from scenes.language.catalogue import said
+
 PERCENT = "%"
 WITHIN = re.compile(r"^within_(.+)$")
 UDI = re.compile(r"^udi_?(below|under|above|over)?_?(\d+)?_?(?:to_)?(\d+)?(?:_lx)?$")
@@ -37,20 +39,23 @@ WORDS = _words()
 
 def glossary() -> tuple[tuple[str, str], ...]:
     """Terms and their meanings, in the alphabet's order."""
-    return tuple(sorted(WORDS["glossary"].items(), key=lambda item: item[0].lower()))
+    found = ((said(term), said(meaning)) for term, meaning in WORDS["glossary"].items())
+    return tuple(sorted(found, key=lambda item: item[0].lower()))
 
 
 def option_words(key: str) -> tuple[str, str]:
     """Label and meaning of an option of the run."""
     entry = WORDS["options"].get(key, {})
-    return entry.get("label", key.replace("_", " ")), entry.get("meaning", "")
+    return said(entry.get("label", key.replace("_", " "))), said(entry.get("meaning", ""))
 
 
 def quantity(key: str) -> Quantity:
     """The quantity of that name; for an unknown one a label made from the name."""
     if key in WORDS["quantities"]:
         entry = WORDS["quantities"][key]
-        return Quantity(**{**entry, "values": tuple(entry.get("values", ()))})
+        label, meaning = said(entry["label"]), said(entry["meaning"])
+        values = tuple(said(value) for value in entry.get("values", ()))
+        return Quantity(label, entry["unit"], entry["digits"], meaning, values)
     if match := UDI.match(key):
         return _useful_illuminance(*match.groups())
     if match := WITHIN.match(key):
@@ -65,22 +70,31 @@ def _useful_illuminance(side: str | None, first: str | None, second: str | None)
     if first and second:
         label = f"UDI {first}–{second} lx"
         dim = int(second) <= 300
-        worth = "useful with some electric light" if dim else "neither too dark nor too bright"
-        what = f"between {first} and {second} lx, {worth}"
+        what = (
+            "between {first} and {second} lx, useful with some electric light"
+            if dim
+            else "between {first} and {second} lx, neither too dark nor too bright"
+        )
     elif first and side:
-        word = "below" if side in ("below", "under") else "above"
-        label, what = f"UDI {word} {first} lx", f"{word} {first} lx"
+        below = side in ("below", "under")
+        label = said("UDI below {first} lx" if below else "UDI above {first} lx", first=first)
+        what = "below {first} lx" if below else "above {first} lx"
     else:
         label, what = "UDI", "in the useful range"
-    meaning = f"Useful daylight illuminance: share of the occupied hours {what}."
+    what = said(what, first=first, second=second)
+    meaning = said("Useful daylight illuminance: share of the occupied hours {what}.", what=what)
     return Quantity(label, PERCENT, 0, meaning)
 
 
 def _within(limit: str) -> Quantity:
     """A column or figure of adaptive comfort."""
     if limit.isdigit():
-        meaning = f"the adaptive comfort band that {limit} % of people accept"
-        label = f"Within the {limit} % limits"
-    else:
-        meaning = label = f"Within {limit.replace('_', ' ')}"
-    return Quantity(label, PERCENT, 0, f"Share of the occupied hours in {meaning}.")
+        label = said("Within the {limit} % limits", limit=limit)
+        meaning = said(
+            "Share of the occupied hours in the adaptive comfort band that {limit} % of people "
+            "accept.",
+            limit=limit,
+        )
+        return Quantity(label, PERCENT, 0, meaning)
+    label = f"Within {limit.replace('_', ' ')}"
+    return Quantity(label, PERCENT, 0, f"Share of the occupied hours in {label}.")

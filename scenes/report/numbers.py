@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from scenes.language.catalogue import decimal, said
+
 NARROW_SPACE = "\u202f"
 MISSING = "–"
 
@@ -15,12 +17,12 @@ def rounded(value: float, digits: int) -> str:
     text = f"{value:,.{digits}f}".replace(",", NARROW_SPACE)
     if text.startswith("-"):
         text = text[1:] if not text.strip("-0.") else "−" + text[1:]
-    return text
+    return decimal(text)
 
 
 def counted(number: int, noun: str) -> str:
-    """So many of something, in English."""
-    return f"{rounded(number, 0)} {noun}{'' if number == 1 else 's'}"
+    """So many of something."""
+    return f"{rounded(number, 0)} {said(noun if number == 1 else noun + 's')}"
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -30,7 +32,7 @@ def significant(value: float, digits: int = 3) -> str:
     if value == 0:
         return "0"
     if not 1e-4 <= abs(value) < 1e9:
-        return f"{value:.{digits - 1}e}"
+        return decimal(f"{value:.{digits - 1}e}")
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
     return rounded(round(value, decimals), max(decimals, 0))
 
@@ -46,7 +48,7 @@ def percent(value: float) -> str:
 
 def cell(value: float, digits: int) -> str:
     """Fixed decimals for a table that is copied into a spreadsheet: no thousands marks."""
-    return f"{value:.{digits}f}" if value is not None and math.isfinite(value) else ""
+    return decimal(f"{value:.{digits}f}") if value is not None and math.isfinite(value) else ""
 
 
 def share(value: float) -> str:

@@ -8,6 +8,7 @@ import pandas as pd
 from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.scale import ColourScale, round_limits
+from scenes.language.catalogue import said
 from scenes.report.headline import occupied
 from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
@@ -42,9 +43,12 @@ def state_carpet(result: RunResult, room: RoomYear) -> Chart | None:
         result.times,
         np.where(lit, state, -1),
         legend,
-        title="Shading state",
-        explanation=f"Control: {RULES.get(ran.rule, ran.rule)}. Hours with the sun up; optics and "
-        "heat of the windows change together.",
+        title=said("Shading state"),
+        explanation=said(
+            "Control: {rule}. Hours with the sun up; optics and heat of the windows change "
+            "together.",
+            rule=said(RULES[ran.rule]) if ran.rule in RULES else ran.rule,
+        ),
     )
 
 
@@ -72,9 +76,11 @@ def loads_chart(room: RoomYear) -> Chart | None:
         names,
         marks,
         top,
-        title="Heating, cooling and light by month",
-        explanation="Heat that an ideal system gives or takes to keep the set points, and the "
-        "lamps' energy that daylight leaves to be given.",
+        title=said("Heating, cooling and light by month"),
+        explanation=said(
+            "Heat that an ideal system gives or takes to keep the set points, and the lamps' "
+            "energy that daylight leaves to be given."
+        ),
     )
 
 
@@ -85,12 +91,15 @@ def glare_carpet(result: RunResult, room: RoomYear) -> Chart | None:
         return None
     dgp = year["dgp"].to_numpy(dtype=float)
     used = dgp_in_use(room)
-    text = quantity("dgp").meaning + " Nights are left empty."
+    text = quantity("dgp").meaning + " " + said("Nights are left empty.")
     if len(used):
-        text += f" It is above 0.40 in {percent(100 * float(np.mean(used > 0.40)))} % of the "
-        text += f"{rounded(len(used), 0)} occupied hours."
-    scale = ColourScale(0.2, 0.6, "Daylight glare probability", "", colours="inferno")
-    return carpet(result.times, dgp, scale, title="Glare through the year", explanation=text,
+        text += " " + said(
+            "It is above 0.40 in {share} % of the {hours} occupied hours.",
+            share=percent(100 * float(np.mean(used > 0.40))),
+            hours=rounded(len(used), 0),
+        )
+    scale = ColourScale(0.2, 0.6, said("Daylight glare probability"), "", colours="inferno")
+    return carpet(result.times, dgp, scale, title=said("Glare through the year"), explanation=text,
                   digits=2)  # fmt: skip
 
 

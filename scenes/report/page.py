@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,13 +13,14 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
+from scenes.language.catalogue import in_language, said, short_month
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
 from scenes.report.names import glossary, option_words
-from scenes.report.numbers import counted
+from scenes.report.numbers import counted, rounded
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
@@ -26,6 +29,8 @@ from scenes.results import RunResult
 
 FILES = page_files("scenes.report")  # that other pages share
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
+UNIT_EXPONENT = re.compile(r"(?<![\w.-])(k?m|cm|mm)([23])(?![\w.-])")
+EXPONENTS = {"2": "²", "3": "³"}
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
 
 
@@ -38,6 +43,11 @@ def report_html(result: RunResult, page: PageOptions = OWN_PAGE) -> str:
     """The report as text: no script, font or picture is fetched from anywhere."""
     if not result.spaces:
         raise ValueError("a report needs at least one room")
+    with in_language(page.language):
+        return _filled(result, page)
+
+
+def _filled(result: RunResult, page: PageOptions) -> str:
     rooms = tuple(room_page(result, room, i) for i, room in enumerate(result.spaces, start=1))
     manifest = result.manifest
     model = model3d(result)
@@ -45,7 +55,7 @@ def report_html(result: RunResult, page: PageOptions = OWN_PAGE) -> str:
     metrics = room_metrics(result) if several else ()
     return environment().get_template("report.html.j2").render(
         page=page,
-        title=page.title or result.building.name or "Building",
+        title=page.title or result.building.name or said("Building"),
         result=result,
         rooms=rooms,
         verdict=verdict(result, [room.cards for room in rooms]),
@@ -54,12 +64,13 @@ def report_html(result: RunResult, page: PageOptions = OWN_PAGE) -> str:
         metrics=metrics,
         storeys=storey_plans(result) if several else (),
         storey_data=storey_data(metrics, len(rooms)),
-        summary=summary(result) + page.facts,
+        summary=summary(result) + tuple((said(name), value) for name, value in page.facts),
         problems=tables.problems_table(result),
+        version=manifest.get("versions", {}).get("mitsuba-cfs", ""),
         inputs=inputs_table(manifest.get("inputs", {})),
         options=options_table(manifest),
-        versions=tables.nested_table("Versions", manifest.get("versions", {})),
-        rest=tables.nested_table("Run", remaining(manifest)),
+        versions=tables.nested_table(said("Versions"), manifest.get("versions", {})),
+        rest=tables.nested_table(said("Run"), remaining(manifest)),
         timings=timings_table(result),
         method=method_words(result),
         glossary=glossary(),
@@ -95,8 +106,16 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
     )
     environment.filters["script_json"] = script_json
-    environment.filters["tied"] = lambda text: UNIT_AFTER_NUMBER.sub("\\1\u00a0\\2", text)
+    environment.globals["say"] = said
+    environment.filters["packed_json"] = packed_json
+    environment.filters["tied"] = prose
     return environment
+
+
+def prose(text: str) -> str:
+    """A sentence as it is printed: numbers stay with their units, "W/(m2 K)" is "W/(m² K)"."""
+    text = UNIT_EXPONENT.sub(lambda found: found[1] + EXPONENTS[found[2]], text)
+    return UNIT_AFTER_NUMBER.sub("\\1\u00a0\\2", text)
 
 
 def script_json(value: object) -> Markup:
@@ -104,26 +123,43 @@ def script_json(value: object) -> Markup:
     return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
 
 
+def packed_json(value: object) -> str:
+    """JSON for a script to unpack when it is asked for: deflated without a header, base64."""
+    text = json.dumps(value, separators=(",", ":")).encode()
+    packer = zlib.compressobj(9, wbits=-15)
+    return base64.b64encode(packer.compress(text) + packer.flush()).decode("ascii")
+
+
 def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     """The run in a few facts."""
     building = result.building
-    rows = [("Run", NOTE)] if result.manifest.get("quick") else []
-    rows.append(("Building", building.name or "without a name"))
+    rows = [(said("Run"), said(NOTE))] if result.manifest.get("quick") else []
+    rows.append((said("Building"), building.name or said("without a name")))
     if building.latitude_deg is not None and building.longitude_deg is not None:
         north, east = building.latitude_deg, building.longitude_deg
-        place = f"{abs(north):.2f}° {'N' if north >= 0 else 'S'}, "
-        rows.append(("Place", place + f"{abs(east):.2f}° {'E' if east >= 0 else 'W'}"))
+        place = (
+            f"{rounded(abs(north), 2)}° {said('N' if north >= 0 else 'S')}",
+            f"{rounded(abs(east), 2)}° {said('E' if east >= 0 else 'W')}",
+        )
+        rows.append((said("Place"), "; ".join(place)))
     manifest = result.manifest
     inputs = manifest.get("inputs", {})
     main = ("building", "weather", "system")
     rows += [(_title(name), _named(manifest, name)) for name in main if name in inputs]
     if "system" not in inputs and manifest.get("system"):
-        rows.append(("Fenestration", str(manifest["system"])))
+        rows.append((said("Fenestration"), str(manifest["system"])))
     first, last = result.times[0], result.times[-1]
-    rows.append(("Period", f"{first:%d %b} to {last:%d %b}, {counted(len(result.times), 'hour')}"))
+    period = said(
+        "{first} to {last}, {hours}",
+        first=f"{first.day} {short_month(first.month)}",
+        last=f"{last.day} {short_month(last.month)}",
+        hours=counted(len(result.times), "hour"),
+    )
+    rows.append((said("Period"), period))
     others = len(building.spaces) - len(result.spaces)
-    rooms = f"{len(result.spaces)} computed"
-    rows.append(("Rooms", rooms + (f", {others} more in the file" if others > 0 else "")))
+    rooms = said("{count} computed", count=len(result.spaces))
+    rooms += said(", {count} more in the file", count=others) if others > 0 else ""
+    rows.append((said("Rooms"), rooms))
     account = building.account
     return (*rows, *(account.facts if account is not None else ()))
 
@@ -135,19 +171,19 @@ def comparison(result: RunResult, rooms) -> tables.Table | None:
     labels = list(dict.fromkeys(card.label for room in rooms for card in room.cards))
     meaning = {card.label: card for room in rooms for card in room.cards}
     columns = (
-        tables.Column("Room", numeric=False),
+        tables.Column(said("Room"), numeric=False),
         *(tables.Column(text, meaning[text].unit, meaning[text].meaning) for text in labels),
     )
     rows = []
     for room in rooms:
         values = {card.label: card.value for card in room.cards}
         rows.append((room.name, *(values.get(label, "–") for label in labels)))
-    return tables.Table("All rooms", columns, tuple(rows))
+    return tables.Table(said("All rooms"), columns, tuple(rows))
 
 
 def options_table(manifest: Mapping) -> tables.Table:
     """What was chosen for the run; the input files have a table of their own."""
-    columns = tuple(tables.Column(c, numeric=False) for c in ("Option", "Value", "Meaning"))
+    columns = tuple(tables.Column(said(c), numeric=False) for c in ("Option", "Value", "Meaning"))
     files = {"building", "weather", "system", *manifest.get("inputs", {})}
     rows = []
     for key, value in manifest.get("options", {}).items():
@@ -155,17 +191,17 @@ def options_table(manifest: Mapping) -> tables.Table:
             continue
         label, meaning = option_words(key)
         rows.append((label, tables.plain_value(value), meaning))
-    return tables.Table("Options", columns, tuple(rows))
+    return tables.Table(said("Options"), columns, tuple(rows))
 
 
 def inputs_table(inputs: Mapping) -> tables.Table:
     """Input files with their hashes."""
-    columns = tuple(tables.Column(c, numeric=False) for c in ("Input", "File", "SHA-256"))
+    columns = tuple(tables.Column(said(c), numeric=False) for c in ("Input", "File", "SHA-256"))
     rows = []
     for name, entry in inputs.items():
         digest = entry.get("sha256", "–") if isinstance(entry, Mapping) else "–"
         rows.append((_title(name), file_name(entry), str(digest)))
-    return tables.Table("Input files", columns, tuple(rows))
+    return tables.Table(said("Input files"), columns, tuple(rows))
 
 
 def file_name(entry: object) -> str:
@@ -181,19 +217,19 @@ def file_name(entry: object) -> str:
 def timings_table(result: RunResult) -> tables.Table:
     """Seconds by stage: of each room, then of the run."""
     columns = (
-        tables.Column("Room", numeric=False),
-        tables.Column("Stage", numeric=False),
-        tables.Column("Time", "s"),
+        tables.Column(said("Room"), numeric=False),
+        tables.Column(said("Stage"), numeric=False),
+        tables.Column(said("Time"), "s"),
     )
     rows = [
-        (room.space.label, stage.replace("_", " "), f"{seconds:.1f}")
+        (room.space.label, stage.replace("_", " "), tables.cell(seconds, 1))
         for room in result.spaces
         for stage, seconds in room.seconds.items()
     ]
     total = result.manifest.get("seconds")
     if isinstance(total, int | float):
-        rows.append(("whole run", "all", f"{total:.1f}"))
-    return tables.Table("Time taken", columns, tuple(rows))
+        rows.append((said("whole run"), said("all"), tables.cell(total, 1)))
+    return tables.Table(said("Time taken"), columns, tuple(rows))
 
 
 def remaining(manifest: Mapping) -> dict:
@@ -227,4 +263,4 @@ def _title(name: str) -> str:
         "system_thermal": "Its thermal values",
         "building": "Model file",
     }
-    return known.get(name, name.replace("_", " ").capitalize())
+    return said(known.get(name, name.replace("_", " ").capitalize()))

@@ -11,6 +11,7 @@ import shapely
 from bim.model import Space
 from scenes.figures.plan import MARGIN, UNIT, plan_frame, rings
 from scenes.figures.scale import ColourScale, round_limits
+from scenes.language.catalogue import decimal, said
 from scenes.report.headline import WARM_C, occupied, room_metric, sensor_column
 from scenes.results import RoomYear, RunResult
 
@@ -29,7 +30,7 @@ class RoomMetric:
     def words(self, room: int) -> str:
         """The figure of a room."""
         value = self.values[room]
-        return "–" if np.isnan(value) else f"{value:.{self.digits}f}"
+        return "–" if np.isnan(value) else decimal(f"{value:.{self.digits}f}")
 
     @property
     def ranked(self) -> tuple[int, ...]:
@@ -64,11 +65,11 @@ class StoreyPlan:
 def room_metrics(result: RunResult) -> tuple[RoomMetric, ...]:
     """Every figure that at least one room has."""
     asked: tuple[tuple[ColourScale, int, bool, Callable[[RoomYear], float | None]], ...] = (
-        (_share("Spatial daylight autonomy"), 0, True, lambda room: room_metric(room, "sda")),
-        (_share("Daylight autonomy"), 0, True, _autonomy),
-        (_share("Annual sunlight exposure"), 0, False, lambda room: room_metric(room, "ase")),
-        (ColourScale(0.2, 0.5, "Highest DGP", "", colours="inferno"), 2, False, _glare),
-        (_share(f"Occupied hours above {WARM_C:.0f} °C"), 0, False, _warm),
+        (_share(said("Spatial daylight autonomy")), 0, True, lambda room: room_metric(room, "sda")),
+        (_share(said("Daylight autonomy")), 0, True, _autonomy),
+        (_share(said("Annual sunlight exposure")), 0, False, lambda room: room_metric(room, "ase")),
+        (ColourScale(0.2, 0.5, said("Highest DGP"), "", colours="inferno"), 2, False, _glare),
+        (_share(said("Occupied hours above {limit} °C", limit=f"{WARM_C:.0f}")), 0, False, _warm),
         (_temperatures(result), 1, False, _peak),
     )
     found = []
@@ -87,10 +88,15 @@ def storey_plans(result: RunResult) -> tuple[StoreyPlan, ...]:
     others = [space for space in result.building.spaces if space.guid not in numbers]
     storeys: dict[str, list[Space]] = {}
     for space in (*computed, *others):
-        storeys.setdefault(space.storey or f"Floor at {space.floor_level:.1f} m", []).append(space)
+        storeys.setdefault(storey_name(space), []).append(space)
     order = sorted(storeys, key=lambda name: min(space.floor_level for space in storeys[name]))
     shown = [name for name in order if any(space.guid in numbers for space in storeys[name])]
     return tuple(_storey(name, storeys[name], numbers) for name in shown)
+
+
+def storey_name(space: Space) -> str:
+    """The storey of a room; by its floor's height where the model has none."""
+    return space.storey or said("Floor at {level} m", level=decimal(f"{space.floor_level:.1f}"))
 
 
 def _storey(name: str, spaces: Sequence[Space], numbers: dict[str, int]) -> StoreyPlan:
@@ -120,7 +126,7 @@ def _share(label: str) -> ColourScale:
 def _temperatures(result: RunResult) -> ColourScale:
     peaks = [peak for room in result.spaces if (peak := _peak(room)) is not None]
     low, high = round_limits(peaks or [0.0, 1.0])
-    label = "Highest operative temperature"
+    label = said("Highest operative temperature")
     return ColourScale(low, max(high, low + 1.0), label, "°C", colours="cividis")
 
 

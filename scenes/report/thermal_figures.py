@@ -10,6 +10,7 @@ import pandas as pd
 from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, Readout, box, line
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
+from scenes.language.catalogue import month_name, said, short_month
 from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, occupied
 from scenes.report.month_chart import month_chart
 from scenes.report.names import quantity
@@ -26,9 +27,9 @@ def temperature_carpet(result: RunResult, room: RoomYear) -> Chart:
     """Operative temperature of every hour."""
     values = room.heat.temperatures["operative_c"].to_numpy()
     low, high = round_limits(values, 8)
-    scale = ColourScale(low, high, "Operative temperature", "°C", colours="cividis")
+    scale = ColourScale(low, high, said("Operative temperature"), "°C", colours="cividis")
     return carpet(
-        result.times, values, scale, title="Operative temperature", digits=1,
+        result.times, values, scale, title=said("Operative temperature"), digits=1,
         explanation=f"{quantity('operative_c').meaning} {heated(room)}",
     )  # fmt: skip
 
@@ -50,8 +51,13 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
         default=3,
     )
     wide, narrow = quantity(columns[-1]).label, quantity(columns[0]).label
-    legend = ((STRICT, narrow), (COMFORT, f"{wide} only"), (WARM, "Too warm"), (COLD, "Too cold"),
-              (UNKNOWN, "Weather that the model does not cover"))  # fmt: skip
+    legend = (
+        (STRICT, narrow),
+        (COMFORT, said("{band} only", band=wide)),
+        (WARM, said("Too warm")),
+        (COLD, said("Too cold")),
+        (UNKNOWN, said("Weather that the model does not cover")),
+    )
     share = 100 * np.bincount(classes[classes >= 0], minlength=5) / max((classes >= 0).sum(), 1)
     names = tuple(
         (c, f"{n}: {percent(float(s))} %") for (c, n), s in zip(legend, share, strict=True)
@@ -60,9 +66,11 @@ def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
     order = np.full(6, -1)
     order[used] = np.arange(len(used))
     return class_carpet(
-        result.times, order[classes], tuple(names[i] for i in used), title="Adaptive comfort",
-        explanation="Occupied hours, by how the operative temperature compares with what people "
-        "accept after the recent weather; other hours are left empty.",
+        result.times, order[classes], tuple(names[i] for i in used), title=said("Adaptive comfort"),
+        explanation=said(
+            "Occupied hours, by how the operative temperature compares with what people accept "
+            "after the recent weather; other hours are left empty."
+        ),
     )  # fmt: skip
 
 
@@ -90,17 +98,21 @@ def duration_curve(room: RoomYear, beside: Sequence[RoomYear] = ()) -> Chart:
     ]
     above = float((curves["operative_c"] > WARM_C).mean()) * hours if "operative_c" in curves else 0
     return Chart(
-        "Temperature duration",
-        "Each curve shows for how many hours a temperature is exceeded. The operative temperature "
-        f"is above {WARM_C:.0f} °C for {rounded(above, 0)} of {rounded(hours, 0)} hours, occupied "
-        "or not.",
-        "Hours above [h]",
-        "Temperature [°C]",
+        said("Temperature duration"),
+        said(
+            "Each curve shows for how many hours a temperature is exceeded. The operative "
+            "temperature is above {limit} °C for {above} of {hours} hours, occupied or not.",
+            limit=f"{WARM_C:.0f}",
+            above=rounded(above, 0),
+            hours=rounded(hours, 0),
+        ),
+        said("Hours above [h]"),
+        said("Temperature [°C]"),
         axis_ticks(*x_range, 6),
         axis_ticks(*y_range),
         tuple(marks),
         readout=Readout(
-            tuple(f"{rounded(s * hours, 0)} h above" for s in share),
+            tuple(said("{hours} h above", hours=rounded(s * hours, 0)) for s in share),
             tuple(
                 (quantity(n).label, tuple(f"{rounded(float(t), 1)} °C" for t in v))
                 for n, v in sorted_curves.items()
@@ -114,10 +126,13 @@ def extreme_weeks(room: RoomYear) -> tuple[Chart, ...]:
     temperatures = room.heat.temperatures
     daily = temperatures["operative_c"].resample("D").mean()
     if len(daily) < 8:
-        return (week(room, temperatures.index[0].normalize(), "The period"),)
+        return (week(room, temperatures.index[0].normalize(), said("The period")),)
     weekly = daily.rolling(7).mean()
     warm, cold = (day - pd.Timedelta(days=6) for day in (weekly.idxmax(), weekly.idxmin()))
-    return week(room, warm, "The warmest week"), week(room, cold, "The coldest week")
+    return (
+        week(room, warm, said("The warmest week")),
+        week(room, cold, said("The coldest week")),
+    )
 
 
 def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
@@ -138,17 +153,27 @@ def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
         for name, v in curves.items()
     ]
     days = [start + pd.Timedelta(days=i) for i in range(7)]
-    ticks = [Tick(100 * (i + 0.5) / 7, f"{d.day}", f" {d:%b}", False) for i, d in enumerate(days)]
+    ticks = [
+        Tick(100 * (i + 0.5) / 7, f"{d.day}", f" {short_month(d.month)}", False)
+        for i, d in enumerate(days)
+    ]
     last = stop - pd.Timedelta(days=1)
     return Chart(
-        f"{title}: {start.day} {start:%B} to {last.day} {last:%B}",
-        f"Temperatures outdoors and in the room. {heated(room)}",
-        "Day",
-        "Temperature [°C]",
+        said(
+            "{week}: {first_day} {first_month} to {last_day} {last_month}",
+            week=title,
+            first_day=start.day,
+            first_month=month_name(start.month),
+            last_day=last.day,
+            last_month=month_name(last.month),
+        ),
+        said("Temperatures outdoors and in the room.") + f" {heated(room)}",
+        said("Day"),
+        said("Temperature [°C]"),
         tuple(ticks),
         axis_ticks(*y_range),
         (ChartMark(_midnights(y_range), "grid"), *marks),
-        readout=_readout([f"{t:%d %b %H:%M}" for t in part.index], curves),
+        readout=_readout([f"{t.day} {short_month(t.month)} {t:%H:%M}" for t in part.index], curves),
     )
 
 
@@ -193,7 +218,9 @@ def gains_chart(monthly: pd.DataFrame) -> Chart | None:
         ([incident] if incident else []) + parts,
         marks,
         y_range[1],
-        title="Solar energy by month",
-        explanation="What reaches the glass from outside, and what of it passes into the room or "
-        "is absorbed in the window (part of which reaches the room as heat).",
+        title=said("Solar energy by month"),
+        explanation=said(
+            "What reaches the glass from outside, and what of it passes into the room or is "
+            "absorbed in the window (part of which reaches the room as heat)."
+        ),
     )

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.language.catalogue import decimal, month_name, said
 from scenes.report.glare_figures import sun_words
 from scenes.report.headline import WARM_C, Card, heated, occupied
-from scenes.report.numbers import percent, rounded, share, significant
+from scenes.report.numbers import counted, percent, rounded, share, significant
 from scenes.report.tables import Column, Table, glare_class, spoken, step_hours
 from scenes.results import ExploredRoom, LuminancePicture, RoomYear, RunResult
 
@@ -34,18 +35,22 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
     Args: cards: the headline figures of each room.
     """
     names = [room.space.label for room in result.spaces]
-    rooms = names[0] if len(names) == 1 else f"{len(names)} rooms"
     systems = [f"“{one['system']}”" for one in result.manifest.get("fenestration", ())]
-    system = " and ".join(systems) or result.manifest.get("system") or "what fills its windows"
-    asked = (
-        f"Daylight, glare and temperatures of {rooms} of {result.building.name or 'the building'} "
-        f"in a year of {result.manifest.get('site') or 'the given weather'}, with {system}, "
-        f"by the {result.method} method."
+    asked = said(
+        "Daylight, glare and temperatures of {rooms} of {building} in a year of {weather}, with "
+        "{systems}, by the {method} method.",
+        rooms=names[0] if len(names) == 1 else counted(len(names), "room"),
+        building=result.building.name or said("the building"),
+        weather=result.manifest.get("site") or said("the given weather"),
+        systems=", ".join(systems)
+        or result.manifest.get("system")
+        or said("what fills its windows"),
+        method=said(result.method),
     )
     sentences = (
-        ("Glare", _glare(result)),
-        ("Warmth", _warmth(result)),
-        ("Shading", _shading(result)),
+        (said("Glare"), _glare(result)),
+        (said("Warmth"), _warmth(result)),
+        (said("Shading"), _shading(result)),
     )
     return Verdict(asked, sentences, _limits(result, cards))
 
@@ -54,21 +59,33 @@ def _glare(result: RunResult) -> str:
     """Why it glares at its worst."""
     found = [(p.glare["dgp"], room, p) for room in result.spaces for p in room.glare.pictures]
     if not found:
-        return "No picture was made, so that glare is not known."
+        return said("No picture was made, so that glare is not known.")
     dgp, room, picture = max(found, key=lambda one: one[0])
     value = rounded(dgp, 2) + _plus_minus(picture)
     where = f"{room.space.label}, {spoken(result.times[picture.hour])}"
     if glare_class(dgp) == "imperceptible":
-        return (
-            f"No picture has more than imperceptible glare; the highest DGP is {value} ({where})."
+        return said(
+            "No picture has more than imperceptible glare; the highest DGP is {dgp} ({where}).",
+            dgp=value,
+            where=where,
         )
-    text = f"Of {len(found)} pictures the worst" if len(found) > 1 else "The one picture made"
-    text += f" has {glare_class(dgp)} glare, DGP {value} ({where}): "
-    text += f"{sun_words(result, picture.hour)}, and {_cause(picture)}."
+    text = said(
+        "Of {count} pictures the worst has {glare}, DGP {dgp} ({where}): {sun}, and {cause}."
+        if len(found) > 1
+        else "The one picture made has {glare}, DGP {dgp} ({where}): {sun}, and {cause}.",
+        count=len(found),
+        glare=said(f"{glare_class(dgp)} glare"),
+        dgp=value,
+        where=where,
+        sun=sun_words(result, picture.hour),
+        cause=_cause(picture),
+    )
     if room.annual_glare is not None and occupied(room).any():
         year = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
-        text += f" DGP is above 0.40 in {percent(100 * float((year > 0.40).mean()))} % of the "
-        text += "occupied hours."
+        text += " " + said(
+            "DGP is above 0.40 in {share} % of the occupied hours.",
+            share=percent(100 * float((year > 0.40).mean())),
+        )
     return text
 
 
@@ -76,44 +93,61 @@ def _cause(picture: LuminancePicture) -> str:
     """Which term of DGP is the larger."""
     glare = picture.glare
     if "ev" not in glare:
-        return "bright surfaces are in view"
+        return said("bright surfaces are in view")
     by_light = BY_LIGHT * glare["ev"]
     by_sources = glare["dgp"] - NO_LIGHT - by_light
-    light = f"{significant(glare['ev'], 2)} lx at the eye"
+    lux = significant(glare["ev"], 2)
     count = int(glare.get("sources", 0))
-    many = f"{count} bright sources" if count > 1 else "a bright source"
+    many = counted(count, "bright source")
     if by_sources > by_light:
-        return f"{many} in view weigh more than the {light} ({_parts(by_sources, by_light)})"
+        return said(
+            "{sources} in view weigh more than the {lux} lx at the eye ({parts})",
+            sources=many,
+            lux=lux,
+            parts=_parts(by_sources, by_light),
+        )
     if count == 0 or by_sources <= 0:
-        return f"the {light} are all of it"
-    return f"the {light} weigh more than {many} in view ({_parts(by_light, by_sources)})"
+        return said("the {lux} lx at the eye are all of it", lux=lux)
+    return said(
+        "the {lux} lx at the eye weigh more than {sources} in view ({parts})",
+        sources=many,
+        lux=lux,
+        parts=_parts(by_light, by_sources),
+    )
 
 
 def _parts(one: float, other: float) -> str:
     """Two shares of what DGP has beyond its value without light."""
     part = round(100 * one / (one + other))
-    return f"{part} to {100 - part} %"
+    return said("{one} to {other} %", one=part, other=100 - part)
 
 
 def _warmth(result: RunResult) -> str:
     """When it is too warm."""
     rooms = [room for room in result.spaces if "operative_c" in room.heat.temperatures]
     if not rooms:
-        return "Temperatures were not computed."
+        return said("Temperatures were not computed.")
     hours = [_warm_hours(room) for room in rooms]
     room, warm = max(zip(rooms, hours, strict=True), key=lambda one: one[1].sum())
     if not warm.any():
-        return f"No occupied hour is above {WARM_C:.0f} °C. {heated(room)}"
+        none = said("No occupied hour is above {limit} °C.", limit=f"{WARM_C:.0f}")
+        return f"{none} {heated(room)}"
     times, step = room.heat.temperatures.index, step_hours(room.heat.temperatures.index)
     months = np.bincount(times.month[warm], minlength=13)
     month = times[warm][times.month[warm] == months.argmax()][0]
     total, peak = occupied(room).sum() * step, room.heat.operative_c
-    highest = f"{rounded(float(peak.max()), 1)} °C, {spoken(peak.idxmax())}"
-    return (
-        f"{room.space.label} is above {WARM_C:.0f} °C in {rounded(warm.sum() * step, 0)} of its "
-        f"{rounded(total, 0)} occupied hours, most of them in {month:%B}; the highest operative "
-        f"temperature is {highest}. {heated(room)}"
+    text = said(
+        "{room} is above {limit} °C in {hours} of its {total} occupied hours, most of them in "
+        "{month}; the highest operative temperature is {peak} °C, {hour}.",
+        room=room.space.label,
+        limit=f"{WARM_C:.0f}",
+        hours=rounded(warm.sum() * step, 0),
+        total=rounded(total, 0),
+        month=month_name(month.month),
+        peak=rounded(float(peak.max()), 1),
+        hour=spoken(peak.idxmax()),
     )
+    return f"{text} {heated(room)}"
 
 
 def _warm_hours(room: RoomYear) -> NDArray[np.bool_]:
@@ -124,23 +158,36 @@ def _shading(result: RunResult) -> str:
     """What the shading costs in daylight."""
     moved = [r for r in result.spaces if r.operation is not None and len(r.operation.states) > 1]
     if not moved:
-        return "What fills the windows stays in one state all year: all figures are of that state."
+        return said(
+            "What fills the windows stays in one state all year: all figures are of that state."
+        )
     parts = []
     for room in moved:
         drawn = room.operation.hours["shading_state"].to_numpy() > 0
         used = occupied(room).to_numpy() & (room.daylight.illuminance.max(axis=1) > 0)
         part = percent(100 * float(drawn[used].mean())) if used.any() else "0"
-        text = f"in {room.space.label} it is drawn in {part} % of the occupied daylight hours"
-        if room.explored is not None:
-            open_share, as_run = _autonomies(room, room.explored)
-            text += f", which lowers daylight autonomy from {percent(open_share)} to "
-            text += f"{percent(as_run)} %"
-        parts.append(text)
-    rest = "" if any(r.explored for r in moved) else " --explore tells what that costs in daylight."
-    words = "; ".join(parts)
-    return f"{words[:1].upper()}{words[1:]}.{rest}".replace(
-        "it is drawn", "the shading is drawn", 1
-    )
+        facts = {"room": room.space.label, "share": part}
+        if room.explored is None:
+            parts.append(
+                said(
+                    "In {room} the shading is drawn in {share} % of the occupied daylight hours.",
+                    **facts,
+                )
+            )
+            continue
+        open_share, as_run = _autonomies(room, room.explored)
+        parts.append(
+            said(
+                "In {room} the shading is drawn in {share} % of the occupied daylight hours, which "
+                "lowers daylight autonomy from {most} to {least} %.",
+                **facts,
+                most=percent(open_share),
+                least=percent(as_run),
+            )
+        )
+    if not any(r.explored for r in moved):
+        parts.append(said("--explore tells what that costs in daylight."))
+    return " ".join(parts)
 
 
 def _autonomies(room: RoomYear, explored: ExploredRoom) -> tuple[float, float]:
@@ -160,15 +207,16 @@ def _limits(result: RunResult, cards: Sequence[Sequence[Card]]) -> Table:
     )
 
 
-def limits_table(rooms: Sequence[tuple[str, RoomYear, Sequence[Card]]], of: str = "Room") -> Table:
+def limits_table(rooms: Sequence[tuple[str, RoomYear, Sequence[Card]]], of: str = "") -> Table:
     """The figures that a rule limits, with the error of each where it is known.
 
-    Args: rooms: name, results and headline figures; of: what the names are of.
+    Args: rooms: name, results and headline figures; of: what the names are of; empty: rooms.
     """
     columns = (
-        Column(of, numeric=False), Column("Figure", numeric=False),
-        Column("Value", numeric=False, short=True), Column("Against the limit", numeric=False),
-        Column("Standard error", numeric=False),
+        Column(of or said("Room"), numeric=False), Column(said("Figure"), numeric=False),
+        Column(said("Value"), numeric=False, short=True),
+        Column(said("Against the limit"), numeric=False),
+        Column(said("Standard error"), numeric=False),
     )  # fmt: skip
     rows = []
     for name, room, own in rooms:
@@ -177,24 +225,20 @@ def limits_table(rooms: Sequence[tuple[str, RoomYear, Sequence[Card]]], of: str 
                 value = f"{card.value} {card.unit}".strip()
                 line = (name, card.label, value, card.verdict, _error(room, card))
                 rows.append(line)
-    return Table("Figures against the limits of the standards", columns, tuple(rows))
+    return Table(said("Figures against the limits of the standards"), columns, tuple(rows))
 
 
 def _error(room: RoomYear, card: Card) -> str:
     if card.unit == "DGP":
         worst = max(room.glare.pictures, key=lambda picture: picture.glare["dgp"])
-        return _plus_minus(worst).strip() or "not known"
-    if card.label in (
-        "Spatial daylight autonomy",
-        "Daylight provision",
-        "Annual sunlight exposure",
-    ):
+        return _plus_minus(worst).strip() or said("not known")
+    if card.traced:
         light = float(np.mean(room.daylight.relative_error))
-        return f"± {share(light)} % of each illuminance, from the tracing"
-    return "not known"
+        return said("± {share} % of each illuminance, from the tracing", share=share(light))
+    return said("not known")
 
 
 def _plus_minus(picture: LuminancePicture) -> str:
     """The standard error of a picture's DGP; empty where it is not known."""
     error = picture.glare.get("dgp_standard_error", float("nan"))
-    return "" if error != error else f" ± {max(error, 1e-4):.1g}"
+    return "" if error != error else decimal(f" ± {max(error, 1e-4):.1g}")

@@ -35,6 +35,7 @@ from scenes.room.room_year import compute_room
 from scenes.run.inputs import read_weather
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
+from scenes.study.straight_view import straight_view
 
 WARM_C = 26.0  # operative temperature above which hours are counted
 KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
@@ -79,6 +80,7 @@ def _computed(case: Case) -> CaseResult:
         rate=None if case.glare == "none" else (case.glare, hours),
     )  # fmt: skip
     figures, arrays = room_figures(room)
+    figures["straight_view_percent"] = _straight_view(room, systems, hours)
     if room.dgp is not None:
         figures |= glare_figures(room.dgp.dgp, weather, case.options.occupancy.hours)
         figures |= rating_figures(room.dgp)
@@ -92,6 +94,14 @@ def _computed(case: Case) -> CaseResult:
     figures["window_model"] = " ".join(dict.fromkeys(heats.values()))
     figures["seconds"] = round(time.monotonic() - start, 3)
     return CaseResult(case.key, figures, arrays)
+
+
+def _straight_view(room: RoomYear, systems: dict[str, States], hours: NDArray[np.int64]) -> float:
+    """The view through the windows, in the shading state of each of the hours [h]."""
+    state = np.zeros(len(hours), dtype=np.int64)
+    if room.operation is not None:
+        state = room.operation.hours["shading_state"].to_numpy(np.int64)[hours]
+    return straight_view(room.space.windows, systems, state)
 
 
 @lru_cache(maxsize=4)

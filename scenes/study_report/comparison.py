@@ -10,6 +10,7 @@ from scenes.figures.scale import Tick, axis_ticks, round_limits
 from scenes.report import tables
 from scenes.report.names import quantity
 from scenes.report.numbers import cell, percent, rounded
+from scenes.study.case import Case
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.case_page import case_label, label_of
@@ -20,8 +21,8 @@ SHAPES = ("round", "square", "diamond", "ring")
 COLUMNS = (
     "sda300_50", "ase1000_250", "da300", "udi_300_3000", "daylight_factor", "dgp_max",
     "glare_perceptible_h", "glare_disturbing_h", "glare_intolerable_h", "glare_protection",
-    "comfortable_80_h", "warm_h", "operative_max_c", "heating_kwh", "cooling_kwh", "lighting_kwh",
-    "illuminance_error_mean", "seconds",
+    "straight_view_percent", "comfortable_80_h", "warm_h", "operative_max_c", "heating_kwh",
+    "cooling_kwh", "lighting_kwh", "illuminance_error_mean", "seconds",
 )  # fmt: skip
 
 
@@ -63,7 +64,7 @@ class Bar:
     words: str
 
 
-def finished(study: StudyResult) -> list[tuple[int, object, CaseResult]]:
+def finished(study: StudyResult) -> list[tuple[int, Case, CaseResult]]:
     """Number from 1, case and result of the cases that have one."""
     pairs = zip(study.plan.cases, study.results, strict=True)
     return [(i, case, r) for i, (case, r) in enumerate(pairs, 1) if not r.error]
@@ -73,11 +74,7 @@ def scatter(study: StudyResult) -> Scatter:
     """Every case as a dot: better lies to the right and further down."""
     cases = finished(study)
     rated = all("glare_disturbing_h" in result.figures for _, _, result in cases)
-    names = list(dict.fromkeys(case.system for _, case, _ in cases))
-    looks = {
-        name: (COLOURS[i % len(COLOURS)], SHAPES[i // len(COLOURS) % len(SHAPES)])
-        for i, name in enumerate(names)
-    }
+    looks = system_looks(cases)
     x = [result.figures["da300"] for _, _, result in cases]
     y = [glare_share(result) if rated else warm_share(result) for _, _, result in cases]
     (x0, x1), (y0, y1) = round_limits([*x, 0.0, 100.0]), round_limits([*y, 0.0, 1.0])
@@ -104,9 +101,18 @@ def scatter(study: StudyResult) -> Scatter:
         axis_ticks(x0, x1),
         axis_ticks(y0, y1),
         dots,
-        tuple((*looks[name], name) for name in names),
+        tuple((*look, name) for name, look in looks.items()),
         pareto_front([(dot.x, dot.y) for dot in dots]),
     )
+
+
+def system_looks(cases: Sequence[tuple[int, Case, CaseResult]]) -> dict[str, tuple[str, str]]:
+    """Colour and shape of each system, by its name."""
+    names = dict.fromkeys(case.system for _, case, _ in cases)
+    return {
+        name: (COLOURS[i % len(COLOURS)], SHAPES[i // len(COLOURS) % len(SHAPES)])
+        for i, name in enumerate(names)
+    }
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

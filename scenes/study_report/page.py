@@ -26,9 +26,11 @@ from scenes.study_report.comparison import (
     scatter,
 )
 from scenes.study_report.model import study_model
+from scenes.study_report.parallel import parallel
 from scenes.study_report.verdict import study_verdict
 
 FILES = page_files("scenes.study_report")
+SCRIPTS = ("study.js", "parallel.js")
 MOST_BESIDE = 3  # cases that are shown at a time
 MOST_CASES = 60  # that have a section of their own: some 200 kB each
 
@@ -49,7 +51,8 @@ def study_report_html(study: StudyResult, page: PageOptions = OWN_PAGE) -> str:
     errors = [r.figures["illuminance_error_mean"] for _, _, r in done]
     worst = max(r.figures["illuminance_error_max"] for _, _, r in done)
     styles = (run_page.FILES["style.css"], FILES["study.css"])
-    scripts = [*(run_page.FILES[name] for name in run_page.SCRIPTS), FILES["study.js"]]
+    scripts = [run_page.FILES[name] for name in run_page.SCRIPTS]
+    scripts += [FILES[name] for name in SCRIPTS]
     return run_page.environment(FILES).get_template("study.html.j2").render(
         study=study,
         page=page,
@@ -59,6 +62,7 @@ def study_report_html(study: StudyResult, page: PageOptions = OWN_PAGE) -> str:
         beside=len(done) if len(done) <= MOST_BESIDE else 1,
         most_beside=min(len(pages), MOST_BESIDE),
         scatter=scatter(study),
+        parallel=parallel(study),
         bars=bars(study),
         table=comparison_table(study),
         failures=failures_table(study),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import subprocess
 
 import numpy as np
@@ -9,10 +11,13 @@ import pytest
 
 from bim.model import Element
 from bim.shoebox import WindowRectangle, shoebox
-from bim.to_radiance import write_radiance
-from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
+from bim.to_radiance import FilledGroup, write_radiance
+from bim.to_tracer import window_groups
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
-from scenes.demo import VENETIAN_BLIND
+from scenes.demo import VENETIAN_BLIND, WEATHER
+from tests.trace.test_pictures import random_tree_system
 
 WALL = np.array([[[0, -5, 0], [6, -5, 0], [6, -5, 4]], [[0, -5, 0], [6, -5, 4], [0, -5, 4]]], float)
 RUNS = 3  # of Radiance, whose seeds are the clock's
@@ -31,13 +36,13 @@ def exported(room, folder):
     blind = read_bsdf_xml(VENETIAN_BLIND)
     groups = window_groups(space)
     files = write_radiance(
-        space, room, folder, filled=[(group, blind) for group in groups], spacing=1.5
+        space, room, folder, filled=[FilledGroup(g, blind) for g in groups], spacing=1.5
     )
-    return files, groups, blind.bands["Visible"]
+    return files, blind
 
 
 def test_surfaces_have_sensors_that_look_into_the_room(room, tmp_path):
-    files, _, _ = exported(room, tmp_path)
+    files, _ = exported(room, tmp_path)
     rows = np.loadtxt(files.surfaces)
     space = room.spaces[0]
     low, high = (f(space.shell.reshape(-1, 3), axis=0) for f in (np.min, np.max))
@@ -54,37 +59,52 @@ def test_without_a_bsdf_the_script_says_what_to_do(room, tmp_path):
     assert done.returncode == 1 and "windows_NAME.xml" in done.stderr
 
 
+def test_the_script_and_the_makefile_are_sound(room, tmp_path):
+    files, _ = exported(room, tmp_path)
+    assert subprocess.run(["sh", "-n", str(files.script)], check=False).returncode == 0
+    done = subprocess.run(
+        [str(files.script)], capture_output=True, text=True, check=False,
+        env=os.environ | {"PHASES": "4"},
+    )  # fmt: skip
+    assert done.returncode == 1 and "PHASES=4: 3 or 5" in done.stderr
+    text = (tmp_path / "Makefile").read_text()
+    named = re.search(r"SCENE = (.*)", text).group(1).split()
+    assert all((tmp_path / name).is_file() for name in named)
+    assert "\t./run.sh $(abspath $(WEATHER))" in text
+
+
+def test_the_sun_meets_the_finest_data_of_a_window(room, tmp_path):
+    space, blind = room.spaces[0], read_bsdf_xml(VENETIAN_BLIND)
+    fine = BsdfFile({"Visible": random_tree_system(0)}, "fine")
+    groups = [FilledGroup(group, blind, fine) for group in window_groups(space)]
+    files = write_radiance(space, room, tmp_path, filled=groups)
+    materials = files.systems.read_text().split()
+    assert materials[:2] == ["void", "aBSDF"]
+    found = read_bsdf_xml(tmp_path / materials[4])
+    assert isinstance(found.bands["Visible"], TensorTreeBsdf)
+
+
 @pytest.mark.slow
 @pytest.mark.peer
 def test_the_folder_gives_our_light(room, tmp_path):
-    """V T D of Radiance's own programs and ours, under skies that weigh directions differently."""
+    """Radiance's own programs and ours: under skies that weigh directions, and in hours of sun."""
     pytest.importorskip("pyradiance")
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.view_matrix import view_matrix
-    from tests.radiance import environment
+    from scenes.evidence.validation import radiance_folder as folder
 
-    files, groups, visible = exported(room, tmp_path)
-    rows = np.loadtxt(files.sensors)
-    theirs = []
-    for _ in range(RUNS):
-        subprocess.run(
-            [str(files.script)], check=True, capture_output=True,
-            env=environment() | {"INDOORS": "20000", "OUTDOORS": "400"},
-        )  # fmt: skip
-        text = (tmp_path / "coefficients.mtx").read_text()
-        theirs.append(np.loadtxt(text.split("\n\n", 1)[1].splitlines()))
-    space = room.spaces[0]
-    inside, outside = interior_surfaces(space), exterior_surfaces(room, space)
-    view = view_matrix(inside, groups, rows[:, :3], rows[:, 3:], samples=60_000).values
-    daylight = daylight_matrix(outside, groups, samples=8_000, subdivision=1).values
-    passed = visible.transmission_front * visible.basis_in.projected_solid_angles()
-    ours = np.einsum("sgk,kj,gjp->sp", view, passed, daylight)
-    patches = np.arange(ours.shape[1])
+    files, blind = exported(room, tmp_path)
+    space, weather = room.spaces[0], folder.three_days(WEATHER, tmp_path)
+    both = folder.Room(room, space, blind, files, weather)
+    theirs = [folder.theirs(both, 20_000, 400) for _ in range(RUNS)]
+    ours = [folder.ours(both, seed) for seed in range(RUNS)]
+    patches = np.arange(theirs[0][0].shape[1])
     skies = [np.ones(len(patches)), patches % 30 < 15, patches % 30 >= 15, patches == 0]
-    for sky in skies:
-        values = np.array([run @ sky for run in theirs])
-        mean, spread = values.mean(axis=0), values.std(axis=0, ddof=1)
+    pairs = [[[whole @ sky for whole, _ in runs] for runs in (ours, theirs)] for sky in skies]
+    bright = np.mean([hours for _, hours in theirs], axis=0) > folder.LEAST
+    assert bright.sum() > 50
+    pairs.append([[hours[bright] for _, hours in runs] for runs in (ours, theirs)])
+    for a, b in pairs:
+        mean, spread = np.mean(b, axis=0), np.std(b, axis=0, ddof=1)
         error = float(np.sqrt(np.mean((spread / mean) ** 2) / RUNS))
-        rms = float(np.sqrt(np.mean((ours @ sky / mean - 1) ** 2)))
-        # ours is within 1 % at 60,000 paths; three standard errors of Radiance's mean besides
+        rms = float(np.sqrt(np.mean((np.mean(a, axis=0) / mean - 1) ** 2)))
+        # ours is within 1 % at these paths; three standard errors of Radiance's mean besides
         assert rms < 0.01 + 3 * error, (rms, error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from scenes.commands.comply import command
 from scenes.comply.comply import check_rooms
-from scenes.comply.drawings import plans
+from scenes.comply.drawings import plans, shortened, sun_bars
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
@@ -24,6 +25,7 @@ from scenes.comply.outputs import write_compliance, write_into_ifc
 from scenes.comply.page import dossier_html, glare_words, tied
 from scenes.comply.results import GridSummary, RoomLights
 from scenes.comply.rules import read_rule
+from scenes.comply.tables import beside_limit, shown
 from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, WEATHER
 from scenes.fenestration.systems import Given
@@ -145,6 +147,7 @@ def test_a_room_says_what_it_misses(result):
 
 def test_numbers_stay_with_their_units(result):
     """A limit that ends a line with "≥" reads as another one's; so it did in print."""
+    assert tied("12\u202f490 K h, 3 K higher") == "12\u202f490\xa0K\xa0h, 3 K higher"
     assert tied("high ≥ 750 lx (≥ 100 %); 2 points: 5 h") == (
         "high ≥\xa0750\xa0lx (≥\xa0100\xa0%); 2\xa0points: 5\xa0h"
     )
@@ -355,3 +358,35 @@ def test_files_are_read_by_their_options(tmp_path):
     found = read_files(options)
     assert list(found.rules) == ["en17037", "house"]
     assert found.given.light_only and isinstance(Path(str(path)), Path)
+
+
+def test_a_dossier_prints_on_a4_with_units_as_they_are_written(result):
+    """Notes and faults of a model are text of logs: "m2" there, "m²" on the page."""
+    note = "U 1.2 W/(m2 K), 0.5 m3/h of air, 3 cm2; m2 of glass from room-m2.ifc and M2"
+    html = dossier_html(replace(result, notes=(note,)))
+    assert "U 1.2 W/(m² K), 0.5" in html and "m³/h of air" in html and "3 cm²; m² of" in html
+    assert "room-m2.ifc and M2" in html
+    (page,) = re.findall(r"@page \{[^}]*size:[^}]*\}", html)
+    assert "size: A4;" in page
+
+
+def test_a_value_that_misses_its_limit_does_not_print_as_if_it_met_it():
+    """94.96 % of the hours for 95 %, 299.6 lx for 300 lx; no more digits where none are needed."""
+    rule = read_rule("en16798-1").criterion[0].level[0].needs[0]
+    assert [shown(rule, v) for v in (0.9496, 0.95, 0.9512)] == ["94.96 %", "95.0 %", "95.1 %"]
+    lux = next(c for c in read_rule("en17037").criterion if c.key == "provision").level[0].needs[0]
+    assert [shown(lux, v) for v in (299.6, 300.0, 299.4)] == ["299.6 lx", "300 lx", "299 lx"]
+    ase = read_rule("lm83").criterion[1].level[0].needs[0]
+    assert [shown(ase, v) for v in (0.10004, 0.1, 0.3)] == ["10.004 %", "10.0 %", "30.0 %"]
+    assert beside_limit(99.7, 0, lambda v: v >= 100) == "99.7"  # of the floor area
+
+
+def test_long_names_leave_the_bars_their_room(result):
+    """Revit's names of windows took so much of it that the hours ran into one another."""
+    room = result.rooms[0]
+    name = "M_Single-Glass 1:0813 x 2420mm:0813 x 2420mm:171975"
+    openings = tuple(replace(one, name=name) for one in room.sun.openings)
+    chart = sun_bars(result, replace(room, sun=replace(room.sun, openings=openings)))
+    assert chart.y_ticks[1].label == "M_Single-Glass… 2420mm:171975"
+    assert [tick.label for tick in chart.x_ticks][:3] == ["4", "6", "8"]
+    assert shortened("Fenster-2") == "Fenster-2"

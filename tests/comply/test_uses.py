@@ -62,3 +62,15 @@ def test_a_fault_of_the_mapping_file_is_one_line(tmp_path):
     path.write_text('[[use]]\nkey = "a"\noccupyed = true')
     with pytest.raises(DataError, match=r"uses.toml: use.0.occupyed: no such key; did you mean"):
         read_uses(path)
+
+
+def test_dwellings_are_named_in_the_mapping_file(tmp_path):
+    """By numbers that begin alike, or one by one."""
+    path = tmp_path / "uses.toml"
+    path.write_text('[dwellings]\nEast = ["A1*", "A2*"]\nWest = ["B101", "Studio"]\n')
+    assert use("Living room", file=path, name="A102").dwelling == "East"
+    assert use("Living room", file=path, name="B101").dwelling == "West"
+    assert use("Studio", file=path, name="C7").dwelling == "West"
+    assert use("Living room", file=path, name="B1012").dwelling == ""
+    assert use("Living room", file=path, name="A102").key == "living"
+    assert use("Living room").dwelling == ""

@@ -229,6 +229,23 @@ def sun_on_patch(sun, lux):
     return values
 
 
+def test_an_hour_is_the_same_among_others():
+    """Edges of shadows, that are looked at again for all hours of a batch together, too."""
+    from mitsuba_cfs.trace.picture_sun import PictureSun
+
+    suns = np.array([HIGH, SUN, [-0.45, -0.7, 0.8]])
+    suns /= np.linalg.norm(suns, axis=1)[:, None]
+    room, groups = rooms.test_room(0.5)
+    found = PictureSun(room, rooms.NOTHING, groups, [clear()], VIEW)
+    together = np.zeros((3, len(found.pixels)), dtype=np.float32)
+    found.add_to(together, suns, np.array([1.0, 2.0, 3.0]) * LUX)
+    for k, sun in enumerate(suns):
+        alone = np.zeros((1, len(found.pixels)), dtype=np.float32)
+        found.add_to(alone, sun[None], (k + 1) * LUX)
+        assert np.unique(alone).size > 30  # shares of pixels are among them
+        np.testing.assert_allclose(together[k], alone[0], rtol=1e-4)
+
+
 def test_a_direct_part_that_exceeds_the_whole_is_refused():
     transmission = np.diag(np.full(K, 0.8))
     direct = sun_on_patch(SUN, LUX)

@@ -85,6 +85,10 @@ USE = """
     headings[column].click();
     report.descending = values();
     const plot = document.querySelector(".carpet-data").parentElement, at = box(plot);
+    plot.dispatchEvent(new PointerEvent("pointerenter"));
+    for (let i = 0; i < 100 && !plot.dataset.read; i++) {
+      await new Promise((on) => setTimeout(on, 20));
+    }
     plot.dispatchEvent(new PointerEvent("pointermove", {
       clientX: at.left + at.width * 171.5 / 365, clientY: at.top + at.height * 11.5 / 24 }));
     report.tip = document.querySelector(".tip").textContent;

@@ -41,7 +41,7 @@ def test_page_works_in_a_browser(page, tmp_path, width, flags) -> None:
     assert found["ascending"] == sorted(found["ascending"])
     assert found["descending"] == sorted(found["ascending"], reverse=True)
     # day 171 of 2023 counted from 0 is 21 June; half a row below the 13th from above is 12 to 13 h
-    assert found["tip"].startswith("21 Jun, 12:00 to 13:00\n")
+    assert found["tip"].startswith("21 Jun, 12:00 – 13:00\n")
     assert found["tip"].endswith(" lx")
 
 

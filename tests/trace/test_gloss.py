@@ -73,6 +73,10 @@ def test_faults_are_said():
         mirror(0.5, 0.9)
     with pytest.raises(ValueError, match="reflects more than it gets"):
         facade(mirror(0.6), 0.5)
+    two, beside = np.tile(np.eye(3), (2, 1, 1)), np.array([0.9, 0.1])
+    Surfaces(two, beside, np.arange(2), ("wall", "pane"), (None, mirror(0.6)))
+    with pytest.raises(ValueError, match="surface 1: reflects more than it gets"):
+        Surfaces(two, beside[::-1], np.arange(2), ("pane", "wall"), (None, mirror(0.6)))
 
 
 def test_a_mirror_outdoors_is_an_image_of_the_sky():

@@ -117,6 +117,23 @@ def test_a_row_with_little_light_has_as_many_places_as_one_with_much():
     assert np.diff(found.share.indptr) == pytest.approx([PLACES / 2, PLACES / 2], rel=0.05)
 
 
+def test_fewer_points_of_the_sun_are_fewer_places_outdoors_with_the_same_light():
+    """A quick run asks at an eighth of them; what they say together has the same mean."""
+    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
+    from mitsuba_cfs.trace.scene import TracedScene
+
+    floor = rooms.quad((-40, -40, -2), (40, -40, -2), (40, 0, -2), (-40, 0, -2))
+    outside = TracedScene(rooms.surfaces([(floor, 0.5)]), rooms.test_room()[1])
+    suns = np.array([towards(40, 180), towards(60, 120)])
+    found = []
+    for places in (1024, 128):
+        several = [window_shares(outside, samples=32, places=places, seed=s) for s in range(4)]
+        assert all(0.8 * places < s.places.size <= places + 26 for s in several)
+        light = [outdoor_light(s, outside, suns, np.full(2, LUX)) for s in several]
+        found.append(np.mean(light, axis=(0, 1)))
+    np.testing.assert_allclose(*found, rtol=0.02)
+
+
 def test_what_stands_before_the_sun_leaves_a_floor_dark():
     from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
     from mitsuba_cfs.trace.scene import TracedScene

@@ -158,6 +158,29 @@ def test_the_sun_on_the_fins_comes_to_panes_hour_by_hour_as_in_their_sum() -> No
     np.testing.assert_allclose(found.sum(axis=1), whole.ravel(), rtol=1e-4, atol=0.1)
 
 
+def test_an_hour_alone_is_what_it_is_among_others() -> None:
+    """What windows send out and get back goes from hours on; that of sensors, from these on."""
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+
+    few = Sampling(
+        sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2, view_samples=1
+    )
+    filled = PhaseSystems(PhaseScene(between_fins(), few), [[mirroring(0.4)]])
+    light, every = filled.light(hours(1)), np.arange(2)
+    whole = light.pictures(every, [0]).values(every)
+    for some in ([1], [0], [1, 0]):
+        hour = filled.light(hours(1)).pictures(np.array(some), [0])
+        found = hour.values(np.arange(len(some)))
+        np.testing.assert_allclose(found, whole[some], rtol=1e-4, atol=1e-3 * whole.mean())
+    optics, sky = filled.optics([0]), np.random.default_rng(0).random((2 * K, 3))
+    shares = filled.mirrored.shares(optics)
+    expected = filled.mirrored.outdoors(optics, shares) @ sky
+    assert expected.min() > 0
+    np.testing.assert_allclose(shares @ filled.mirrored.returned(optics, sky), expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize("shares", [(0.4, 0.0), (0.0, 0.4)], ids=["outdoors", "room"])
 def test_the_stated_error_has_the_noise_of_what_windows_send_one_another(shares) -> None:
     """All else is that of one seed; the spread over 24 seeds by chi-square, one time in 1,000."""

@@ -187,6 +187,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the pictures")
     parser.add_argument("--only", nargs="+", choices=names, default=names)
     options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
     for name in options.only:
         print(draw(name, options.out / f"office_{name}.png"), flush=True)
 

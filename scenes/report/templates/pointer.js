@@ -1,6 +1,7 @@
 // Numbers under the pointer: hour and value on carpet plots, all curves on charts.
 (() => {
   "use strict";
+  const language = document.documentElement.lang, comma = language === "en" ? "." : ",";
   const tip = document.createElement("div");
   tip.className = "tip";
   tip.hidden = true;
@@ -17,7 +18,7 @@
   const hide = () => { tip.hidden = true; };
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   function carpet(plot, data) {
-    const values = new Int16Array(bytes(data.values).buffer);
+    const values = data.values;
     const start = new Date(data.start + "T00:00:00Z");
     const two = (n) => String(n).padStart(2, "0");
     plot.addEventListener("pointermove", (event) => {
@@ -30,13 +31,14 @@
       const length = Math.round(1440 / data.rows);
       const date = new Date(start.getTime() + day * 864e5);
       const clock = (m) => two(Math.floor(m / 60)) + ":" + two(m % 60);
-      let value = "none";
+      let value = "–";
       if (data.names) { if (code >= 0) value = data.names[code].replace(/: [\d.]+ %$/, ""); }
       else if (code !== -32768) {
-        value = (code / data.divide).toFixed(Math.round(Math.log10(data.divide))) + " " + data.unit;
+        const digits = Math.round(Math.log10(data.divide));
+        value = (code / data.divide).toFixed(digits).replace(".", comma) + " " + data.unit;
       }
-      const name = date.toLocaleDateString("en-GB", { day: "numeric", month: "short", timeZone: "UTC" });
-      show(event, name + ", " + clock(minutes) + " to " + clock(minutes + length) + "\n" + value);
+      const name = date.toLocaleDateString(language === "en" ? "en-GB" : language, { day: "numeric", month: "short", timeZone: "UTC" });
+      show(event, name + ", " + clock(minutes) + " – " + clock(minutes + length) + "\n" + value);
     });
     plot.addEventListener("pointerleave", hide);
   }
@@ -56,6 +58,19 @@
     });
     plot.addEventListener("pointerleave", () => { cursor.hidden = true; hide(); });
   }
-  for (const element of document.querySelectorAll(".carpet-data")) carpet(element.parentElement, JSON.parse(element.textContent));
-  for (const element of document.querySelectorAll(".readout-data")) readout(element.parentElement, JSON.parse(element.textContent));
+  // Unpacked when the pointer first comes: a building's page has hundreds of them
+  async function unpacked(element) {
+    const stream = new Blob([bytes(element.textContent)]).stream();
+    const text = stream.pipeThrough(new DecompressionStream("deflate-raw"));
+    return JSON.parse(await new Response(text).text());
+  }
+  for (const [name, show] of [["carpet", carpet], ["readout", readout]]) {
+    for (const element of document.querySelectorAll("." + name + "-data")) {
+      const plot = element.parentElement;
+      plot.addEventListener("pointerenter", async () => {
+        show(plot, await unpacked(element));
+        plot.dataset.read = "yes";
+      }, { once: true });
+    }
+  }
 })();

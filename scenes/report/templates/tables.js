@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const text = (cell) => cell.textContent.trim();
-  const number = (s) => (s === "" || s === "–" ? NaN : Number(s.replace(/\u202f/g, "").replace("−", "-")));
+  const number = (s) => (s === "" || s === "–" ? NaN : Number(s.replace(/\u202f/g, "").replace("−", "-").replace(",", ".")));
   function sort(table, column, th) {
     const down = th.getAttribute("aria-sort") === "ascending";
     const body = table.tBodies[0];
@@ -21,14 +21,29 @@
     for (const row of rows) body.insertBefore(row, sum);
   }
   for (const table of document.querySelectorAll("table.sortable")) {
-    [...table.tHead.rows[0].cells].forEach((th, column) => {
-      th.tabIndex = 0;
+    const heads = [...table.tHead.rows[0].cells];  // one tab stop; arrow keys go along the headings
+    heads.forEach((th, column) => {
+      th.tabIndex = column ? -1 : 0;
+      th.addEventListener("focus", () => heads.forEach((one) => { one.tabIndex = one === th ? 0 : -1; }));
       th.addEventListener("click", () => sort(table, column, th));
       th.addEventListener("keydown", (event) => {
+        const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+        if (step) {
+          event.preventDefault();
+          heads[(column + step + heads.length) % heads.length].focus();
+        }
         if (event.key === "Enter" || event.key === " ") { event.preventDefault(); sort(table, column, th); }
       });
     });
   }
+  // A table is a stop of its own where it is wider than its box, and then it can be moved by keys
+  const wide = new ResizeObserver((entries) => {
+    for (const { target } of entries) {
+      if (target.scrollWidth > target.clientWidth + 1) target.tabIndex = 0;
+      else target.removeAttribute("tabindex");
+    }
+  });
+  for (const box of document.querySelectorAll(".scroll")) wide.observe(box);
   function copyText(string) {
     const area = document.createElement("textarea");
     area.value = string;
@@ -45,8 +60,10 @@
       const table = button.closest(".table-box").querySelector("table");
       const lines = [...table.rows].map((row) => [...row.cells].map(text).join("\t"));
       const done = copyText(lines.join("\n"));
-      button.textContent = done ? "Copied" : "Not copied";
-      setTimeout(() => { button.textContent = "Copy"; }, 1500);
+      const before = button.textContent;
+      button.textContent = done ? "✓" : "✗";
+      button.disabled = true;
+      setTimeout(() => { button.textContent = before; button.disabled = false; }, 1500);
     });
   }
 })();

@@ -13,7 +13,7 @@
     door: [0.66, 0.54, 0.42, 1], frame: [0.5, 0.52, 0.55, 1], glass: [0.35, 0.65, 0.95, 0.3],
     furniture: [0.6, 0.55, 0.48, 1], outdoors: [0.55, 0.6, 0.66, 0.1],
   };
-  const see = { azimuth: -2.2, elevation: 0.62, distance: 1, target: [0, 0, 0], room: -1, layer: 0 };
+  const see = { azimuth: -2.2, elevation: 0.62, distance: 1, target: [0, 0, 0], room: -1, layer: 0, storey: -1 };
 
   // ---- the model as arrays: position and unit normal of each triangle corner
   function normals(p) {
@@ -29,32 +29,46 @@
   }
   const batches = data.batches.map((b) => {
     const p = points(b.t);
-    return { room: b.room, kind: b.kind, p, n: normals(p), e: points(b.e) };
+    return { room: b.room, storey: b.storey, kind: b.kind, p, n: normals(p), e: points(b.e) };
   });
   const corners = points(data.sensors.corners);
   const layers = data.layers.map((layer) => bytes(layer.colours));
+  const height = batches.reduce((most, b) => b.p.reduce((m, v, i) => (i % 3 === 2 ? Math.max(m, v) : m), most), 0);
+
+  // ---- the chosen storey: what stands above it, its ceilings too, is lifted or left out
+  const isAbove = (storey, kind) => see.storey >= 0
+    && (storey > see.storey || (storey === see.storey && kind === "ceiling"));
+  const lifted = () => byId("lift")?.checked;
+  const rise = (b) => (isAbove(b.storey, b.kind) ? 1.2 * height : 0);
   function sensorBatch(room) {
     const p = [], c = [];
     data.sensors.room.forEach((owner, s) => {
       if (room >= 0 && owner !== room) return;
+      const storey = data.sensors.storey[s], up = rise({ storey });
+      if (up && !lifted()) return;
       for (const k of [0, 1, 2, 0, 2, 3]) {
         for (let j = 0; j < 3; j++) {
-          p.push(corners[s * 12 + k * 3 + j]);
+          p.push(corners[s * 12 + k * 3 + j] + (j === 2 ? up : 0));
           c.push(layers[see.layer][s * 3 + j] / 255);
         }
       }
     });
     return { p: new Float32Array(p), c: new Float32Array(c) };
   }
-  const visible = () => batches.filter((b) => b.room < 0
-    ? byId("outdoors").checked : see.room < 0 || b.room === see.room);
+  const visible = () => batches.filter((b) => (lifted() || !rise(b)) && (b.room < 0
+    ? byId("outdoors").checked : see.room < 0 || b.room === see.room));
 
   // ---- camera
   function fit() {
     const low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
     for (const b of batches) {
-      if (b.room < 0 || (see.room >= 0 && b.room !== see.room)) continue;
-      b.p.forEach((v, i) => { low[i % 3] = Math.min(low[i % 3], v); high[i % 3] = Math.max(high[i % 3], v); });
+      if (b.room < 0 || (see.room >= 0 && b.room !== see.room) || (rise(b) && !lifted())) continue;
+      const up = [0, 0, rise(b)];
+      b.p.forEach((v, i) => {
+        const at = v + up[i % 3];
+        low[i % 3] = Math.min(low[i % 3], at);
+        high[i % 3] = Math.max(high[i % 3], at);
+      });
     }
     see.target = low.map((v, i) => (v + high[i]) / 2);
     const { back, right, up } = camera(), aspect = canvas.clientWidth / canvas.clientHeight, tan = Math.tan(0.3);
@@ -100,8 +114,8 @@
     };
     const program = gl.createProgram();
     gl.attachShader(program, compile(gl.VERTEX_SHADER, `
-      attribute vec3 position, shading; uniform mat4 view; uniform float shift; varying vec3 lit;
-      void main() { gl_Position = view * vec4(position, 1.0); gl_Position.z -= shift * gl_Position.w; lit = shading; }`));
+      attribute vec3 position, shading; uniform mat4 view; uniform float shift, up; varying vec3 lit;
+      void main() { gl_Position = view * vec4(position.xy, position.z + up, 1.0); gl_Position.z -= shift * gl_Position.w; lit = shading; }`));
     gl.attachShader(program, compile(gl.FRAGMENT_SHADER, `
       precision mediump float; uniform vec4 colour; varying vec3 lit;
       void main() { gl_FragColor = vec4(colour.rgb * lit * colour.a, colour.a); }`));
@@ -109,7 +123,7 @@
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) return null;
     gl.useProgram(program);
     const at = (name) => gl.getUniformLocation(program, name);
-    const view = at("view"), colour = at("colour"), shift = at("shift");
+    const view = at("view"), colour = at("colour"), shift = at("shift"), upwards = at("up");
     const places = ["position", "shading"].map((name) => gl.getAttribLocation(program, name));
     const buffer = (array) => {
       const b = gl.createBuffer();
@@ -122,7 +136,7 @@
       return [b, { p: buffer(b.p), s: buffer(lit), e: buffer(b.e) }];
     }));
     let sensors = null;
-    function draw(mode, position, shading, count, rgba, offset) {
+    function draw(mode, position, shading, count, rgba, offset, up = 0) {
       gl.bindBuffer(gl.ARRAY_BUFFER, position);
       gl.enableVertexAttribArray(places[0]);
       gl.vertexAttribPointer(places[0], 3, gl.FLOAT, false, 0, 0);
@@ -136,6 +150,7 @@
       }
       gl.uniform4fv(colour, rgba);
       gl.uniform1f(shift, offset);
+      gl.uniform1f(upwards, up);
       gl.drawArrays(mode, 0, count);
     }
     return {
@@ -156,17 +171,17 @@
         const shown = visible(), solid = shown.filter((b) => COLOURS[b.kind][3] === 1);
         gl.enable(gl.CULL_FACE);
         gl.cullFace(gl.FRONT);
-        for (const b of solid) draw(gl.TRIANGLES, stored.get(b).p, stored.get(b).s, b.p.length / 3, toned(COLOURS[b.kind]), 0);
+        for (const b of solid) draw(gl.TRIANGLES, stored.get(b).p, stored.get(b).s, b.p.length / 3, toned(COLOURS[b.kind]), 0, rise(b));
         gl.disable(gl.CULL_FACE);
         draw(gl.TRIANGLES, sensors.p, sensors.c, sensors.count, [1, 1, 1, 1], 0);
         gl.depthMask(false);
         const ink = lineColour();
         for (const b of shown) {
           const faint = b.room < 0 ? 0.25 : b.kind === "glass" ? 0.6 : 0.55;
-          draw(gl.LINES, stored.get(b).e, null, b.e.length / 3, [...ink, faint], 0.0004);
+          draw(gl.LINES, stored.get(b).e, null, b.e.length / 3, [...ink, faint], 0.0004, rise(b));
         }
         for (const b of shown) if (COLOURS[b.kind][3] < 1) {
-          draw(gl.TRIANGLES, stored.get(b).p, stored.get(b).s, b.p.length / 3, COLOURS[b.kind], 0);
+          draw(gl.TRIANGLES, stored.get(b).p, stored.get(b).s, b.p.length / 3, COLOURS[b.kind], 0, rise(b));
         }
         gl.depthMask(true);
       },
@@ -183,26 +198,26 @@
       paint() {
         pen.clearRect(0, 0, canvas.width, canvas.height);
         const m = matrix(), { eye } = camera();
-        const project = (p, i) => {
-          const [x, y, , w] = m.map((r) => r[0] * p[i] + r[1] * p[i + 1] + r[2] * p[i + 2] + r[3]);
+        const project = (p, i, up) => {
+          const [x, y, , w] = m.map((r) => r[0] * p[i] + r[1] * p[i + 1] + r[2] * (p[i + 2] + up) + r[3]);
           return w > see.distance * 0.02 ? [(x / w + 1) / 2 * canvas.width, (1 - y / w) / 2 * canvas.height, w] : null;
         };
         const shapes = [];
-        const triangle = (p, i, fill, group) => {
-          const q = [0, 3, 6].map((k) => project(p, i + k));
+        const triangle = (p, i, fill, group, up = 0) => {
+          const q = [0, 3, 6].map((k) => project(p, i + k, up));
           if (q.every(Boolean)) shapes.push({ q, fill, depth: q[0][2] + q[1][2] + q[2][2], group });
         };
         const ink = lineColour();
         for (const b of visible()) {
-          const c = toned(COLOURS[b.kind]);
+          const c = toned(COLOURS[b.kind]), up = rise(b);
           for (let i = 0; i < b.p.length; i += 9) {
             const n = b.n.subarray(i, i + 3);
-            const facing = n[0] * (eye[0] - b.p[i]) + n[1] * (eye[1] - b.p[i + 1]) + n[2] * (eye[2] - b.p[i + 2]);
+            const facing = n[0] * (eye[0] - b.p[i]) + n[1] * (eye[1] - b.p[i + 1]) + n[2] * (eye[2] - b.p[i + 2] - up);
             if (c[3] === 1 && facing > 0) continue;
-            triangle(b.p, i, css(c, shade(n), c[3]), c[3] === 1 ? 0 : 3);
+            triangle(b.p, i, css(c, shade(n), c[3]), c[3] === 1 ? 0 : 3, up);
           }
           for (let i = 0; i < b.e.length; i += 6) {
-            const q = [project(b.e, i), project(b.e, i + 3)];
+            const q = [project(b.e, i, up), project(b.e, i + 3, up)];
             if (q.every(Boolean)) shapes.push({ q, stroke: css(ink, 1, b.room < 0 ? 0.25 : 0.5), depth: 0, group: 1 });
           }
         }
@@ -267,6 +282,14 @@
   byId("top").addEventListener("click", () => { see.azimuth = -Math.PI / 2; see.elevation = 1.5707; fit(); repaint(); });
   byId("outdoors").addEventListener("change", repaint);
   byId("room").addEventListener("change", (event) => { see.room = Number(event.target.value); renderer.sensorsChanged(); fit(); repaint(); });
+  byId("storey")?.addEventListener("change", (event) => {
+    see.storey = Number(event.target.value);
+    byId("lift").disabled = see.storey < 0;
+    renderer.sensorsChanged();
+    fit();
+    repaint();
+  });
+  byId("lift")?.addEventListener("change", () => { renderer.sensorsChanged(); fit(); repaint(); });
   byId("layer").addEventListener("change", (event) => {
     see.layer = Number(event.target.value);
     [...byId("scales").children].forEach((box, i) => { box.hidden = i !== see.layer; });

@@ -6,11 +6,13 @@
   const cases = document.querySelector(".cases");
   const sections = [...document.querySelectorAll("section.case")];
   const dots = [...document.querySelectorAll("button.dot[data-case]")];
+  const lines = [...document.querySelectorAll("a.line[href]")];
   function show(number) {
     list.value = number;
     const chosen = new Set([number, ...besides.map((one) => one.value)].filter(Boolean));
     for (const section of sections) section.hidden = !chosen.has(section.dataset.case);
     for (const dot of dots) dot.setAttribute("aria-pressed", String(chosen.has(dot.dataset.case)));
+    for (const line of lines) line.classList.toggle("chosen", chosen.has(line.dataset.case));
     cases.classList.toggle("side", chosen.size > 1);
     cases.style.setProperty("--beside", chosen.size);
   }
@@ -19,12 +21,19 @@
     show(number);
   };
   for (const one of [list, ...besides]) one.addEventListener("change", () => show(list.value));
+  function open(number) {
+    alone(number);
+    const section = document.getElementById("case-" + number);
+    section.scrollIntoView();
+    section.focus({ preventScroll: true });
+  }
   for (const dot of dots) {
     dot.addEventListener("click", () => {
-      if (![...list.options].some((o) => o.value === dot.dataset.case)) return;
-      alone(dot.dataset.case);
-      document.getElementById("cases").scrollIntoView();
+      if ([...list.options].some((o) => o.value === dot.dataset.case)) open(dot.dataset.case);
     });
+  }
+  for (const line of lines) {
+    line.addEventListener("click", (event) => { event.preventDefault(); open(line.dataset.case); });
   }
   const step = (by) => {
     const at = sections.findIndex((s) => s.dataset.case === list.value);

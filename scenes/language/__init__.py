@@ -1,0 +1,1 @@
+"""The languages of the pages: English in the code, a catalogue for each of the others."""

@@ -1,0 +1,89 @@
+"""axe-core on every page: no serious fault, light and dark.  AXE_CORE names its axe.min.js."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from bim.shoebox import shoebox
+from scenes.comply.comply import check_rooms
+from scenes.comply.options import ComplyOptions
+from scenes.comply.page import dossier_html
+from scenes.demo import WEATHER
+from scenes.evidence.devtools import Page, chromium
+from scenes.explore.folder import write_explorer
+from scenes.page_options import PageOptions
+from scenes.report.page import report_html
+from scenes.study_report.page import study_report_html
+from tests.comply.test_outputs import RULE, files_of
+from tests.explore.synthetic import explored_run
+from tests.report.building_page import building
+from tests.report.synthetic import run_result
+from tests.report.test_study_report import study
+
+AXE = Path(os.environ.get("AXE_CORE", "none"))
+pytestmark = [
+    pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
+    pytest.mark.skipif(not AXE.is_file(), reason="no axe-core: AXE_CORE names no file"),
+]
+GRAVE = {"serious", "critical"}
+# What is not drawn yet has no colours to be judged
+DRAWN = """(() => { const style = document.createElement("style");
+  style.textContent = "section { content-visibility: visible !important; }";
+  document.head.append(style); })()"""
+FAULTS = """axe.run().then((found) => found.violations.map((fault) =>
+  [fault.impact, fault.id, fault.nodes.map((node) => node.html.slice(0, 200))]))"""
+
+
+def dossier(folder: Path) -> str:
+    """The dossier of a room, by the view and the sun alone."""
+    rule = folder / "rays.toml"
+    rule.write_text(RULE, encoding="utf-8")
+    options = ComplyOptions(None, WEATHER, standards=(str(rule),))
+    return dossier_html(check_rooms(shoebox(name="Office"), options, files_of(options)))
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("pages")
+    texts = {
+        "report": report_html(run_result(picture_size=96)),
+        "german": report_html(run_result(picture_size=96), PageOptions(language="de")),
+        "building": report_html(building(12, picture_size=48, pictures=1)),
+        "study": study_report_html(study()),
+        "dossier": dossier(folder),
+    }
+    for name, text in texts.items():
+        (folder / f"{name}.html").write_text(text, encoding="utf-8")
+    write_explorer(explored_run(), folder / "explorer")
+    files = {name: folder / f"{name}.html" for name in texts}
+    return files | {"explorer": folder / "explorer" / "index.html"}
+
+
+def faults(page: Page, file: Path) -> list:
+    """What axe-core finds on a page."""
+    page.open(file.as_uri(), ready="document.readyState === 'complete'")
+    page.value(DRAWN)
+    page.value(AXE.read_text(encoding="utf-8") + "; 0")
+    return page.value(FAULTS)
+
+
+@pytest.mark.parametrize("flags", [(), ("--force-dark-mode",)], ids=["light", "dark"])
+def test_no_page_has_a_serious_fault(pages, tmp_path, flags) -> None:
+    with Page(tmp_path, *flags) as page:
+        found = {name: faults(page, file) for name, file in pages.items()}
+    grave = {name: [f for f in some if f[0] in GRAVE] for name, some in found.items()}
+    assert not {name: some for name, some in grave.items() if some}
+
+
+def test_a_planted_fault_is_seen(pages, tmp_path) -> None:
+    text = pages["report"].read_text(encoding="utf-8")
+    file = tmp_path / "planted.html"
+    file.write_text(
+        text.replace("<main", '<button></button><p style="color:#ccc">faint words</p><main', 1)
+    )
+    with Page(tmp_path) as page:
+        found = {fault[1] for fault in faults(page, file) if fault[0] in GRAVE}
+    assert {"button-name", "color-contrast"} <= found

@@ -1,0 +1,256 @@
+"""Pages in German and French: every string shown has its translation, numbers their comma."""
+
+from __future__ import annotations
+
+import ast
+import re
+import string
+from collections.abc import Mapping
+from dataclasses import replace
+from html import unescape
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from mitsuba_cfs.errors import DataError
+from scenes.language import catalogue
+from scenes.language.catalogue import CATALOGUES, MONTHS, decimal, in_language, said, short_month
+from scenes.page_options import PageOptions, RunSection, StudySection, read_page
+from scenes.report.headline import PROTECTION
+from scenes.report.method import LIGHT, PATCHES, PICTURES, SCATTER
+from scenes.report.names import WORDS
+from scenes.report.numbers import rounded
+from scenes.report.operation_figures import RULES
+from scenes.report.page import report_html
+from tests.modules import MODULES
+from tests.report.browser import chromium, inspect
+from tests.report.building_page import building
+from tests.report.synthetic import run_result
+
+LANGUAGES = tuple(CATALOGUES)
+MARK = re.compile(r"‹[^‹›]*›")
+# What a page shows that is no text of its own: names of the run's rooms, files, systems and states,
+# symbols and units, and what the program notes in English
+DATA = (
+    r"Demo office|Open-plan office south|Meeting room west & archive|102 <corner>|\d{3}|Storey \d"
+    r"|Venetian blind <45>|open|slats|closed <70°>|view matrix|daylight matrix|annual product"
+    r"|pictures|mitsuba-cfs|mitsuba|drjit|llvm_ad_mono|variant|seed"
+    r"|[\w.]+\.(?:ifc|epw|xml)|[0-9a-f]{64}"
+    r"|°C|W/\(m²K\)|cd/m²|m²|m³|kWh|lx|DGP|Ev|UDI|EN 17037|LM-83"
+    r"|\b[hmsxyzNESW]\b"
+)
+
+
+class _Marked(Mapping):
+    """A language that says every text between marks."""
+
+    def get(self, key: str, default: str = "") -> str:
+        self.asked.add(key)
+        return f"‹{key}›"
+
+    def __init__(self) -> None:
+        self.asked: set[str] = set()
+
+    def __getitem__(self, key: str) -> str:
+        return self.get(key)
+
+    def __iter__(self):
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+@pytest.fixture(scope="module")
+def result():
+    """Two rooms, one with all there can be, on two storeys; nothing of the English notes."""
+    run = run_result(picture_size=48, pictures=2)
+    spaces = tuple(
+        replace(room, space=replace(room.space, storey=f"Storey {i}"))
+        for i, room in enumerate(run.spaces)
+    )
+    manifest = {k: v for k, v in run.manifest.items() if k != "options"}
+    manifest |= {"quick": True, "options": {"seed": 3}}
+    return replace(run, spaces=spaces, notes=(), manifest=manifest,
+                   building=replace(run.building, problems=()), problems=())  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def marked(result):
+    """Pages in the marked language, and what was asked of it."""
+    language = _Marked()
+    patch = pytest.MonkeyPatch()
+    patch.setitem(catalogue.CATALOGUES, "xx", language)
+    pages = [
+        report_html(one, PageOptions(language="xx", author="A", left_out=left_out))
+        for one, left_out in (
+            (result, ()),
+            (replace(result, method="three-phase", spaces=result.spaces[:1]), ("glossary",)),
+            (replace(result, method="point-in-time"), ("verdict",)),
+            (building(12, picture_size=300, pictures=1), ()),
+        )
+    ]
+    patch.undo()
+    return pages, language.asked
+
+
+def shown(page: str) -> list[str]:
+    """Text that a reader sees or hears: of elements, labels, titles and alternatives."""
+    page = re.sub(r"<(script|style)\b.*?</\1>", "", page, flags=re.DOTALL)
+    said = re.findall(r"""\b(?:aria-label|title|alt)="([^"]*)\"""", page)
+    said += re.findall(r">([^<]+)<", page)
+    return [unescape(text).strip() for text in said if text.strip()]
+
+
+def test_every_string_of_the_page_is_asked_of_the_catalogue(marked) -> None:
+    missing = set()
+    for text in shown(marked[0][0]):
+        rest = text
+        while MARK.search(rest):
+            rest = MARK.sub("", rest)
+        rest = re.sub(
+            DATA, "", re.sub(r"^[A-Z][a-z]{2}›$", "", rest)
+        )  # a month after its first letter
+        if re.search(r"[A-Za-z]{2}", rest):
+            missing.add(rest.strip())
+    assert not missing, "; ".join(sorted(missing))
+
+
+def _asked_in_code() -> set[str]:
+    """Literal texts of `said(...)`, of templates' `say(...)`, and of the tables of words."""
+    found: set[str] = set()
+    for path in MODULES:
+        if not path.as_posix().startswith(str(ROOT / "scenes")):
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "said" and node.args:
+                found |= set(_texts(node.args[0]))
+    for path in (ROOT / "scenes" / "report" / "templates").glob("*.j2"):
+        found |= set(re.findall(r"""\bsay\("((?:[^"\\])*)\"""", path.read_text(encoding="utf-8")))
+    for entry in (*WORDS["quantities"].values(), *WORDS["options"].values()):
+        found |= {entry["label"], entry["meaning"], *entry.get("values", ())}
+    found |= {*WORDS["glossary"], *WORDS["glossary"].values()}
+    found |= {*RULES.values(), *PICTURES.values(), PATCHES, SCATTER, *LIGHT}
+    found |= {sentence for sentences in LIGHT.values() for sentence in sentences}
+    found |= {f"{level}: at most {dgp}" for level, dgp in PROTECTION.items()}
+    found |= {*MONTHS, *(month[:3] for month in MONTHS)}
+    return found
+
+
+def _texts(node: ast.expr) -> list[str]:
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return [node.value]
+    if isinstance(node, ast.IfExp):
+        return _texts(node.body) + _texts(node.orelse)
+    return []
+
+
+ROOT = Path(catalogue.__file__).parents[2]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_string_has_its_translation(marked, language) -> None:
+    asked = {text for text in marked[1] | _asked_in_code() if re.search("[A-Za-z]{2}", text)}
+    free = {"seed"}  # options without words of their own, and states
+    assert not {text for text in asked - free if text not in CATALOGUES[language]}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_translation_has_the_fields_of_its_text(language) -> None:
+    def fields(text: str) -> set[str]:
+        return {name for _, name, _, _ in string.Formatter().parse(text) if name}
+
+    for text, translated in CATALOGUES[language].items():
+        assert fields(text) == fields(translated), text
+        assert translated.strip(), text
+
+
+def test_nothing_of_the_catalogue_is_asked_by_nobody(marked) -> None:
+    """Texts put together from parts, such as "sun ... in the north", are asked by some page."""
+    parts = re.compile(r"sun \{|^north|^south|^east$|^west$|glare$|^\{level|^With |^Within")
+    asked = marked[1] | _asked_in_code()
+    nobody = {t for t in CATALOGUES["de"] if t not in asked and not parts.search(t)}
+    assert nobody <= ALONE, nobody - ALONE
+
+
+ALONE = {  # classes, levels and counted nouns, chosen by a result
+    "imperceptible", "perceptible", "disturbing", "intolerable", "High", "Medium", "Minimum",
+    "None", "room", "rooms", "hour", "hours", "sensor", "sensors", "glare source", "glare sources",
+    "bright source", "bright sources", "acceptable (55 % or more)", "preferred (75 % or more)",
+    "below the 55 % of LM-83", "within the 10 % of LM-83", "above the 10 % of LM-83",
+    "Its thermal values", "Fenestration system", "Model file", "Weather", "Author", "S", "W",
+    "N", "E",
+    "A quick run: few rays, small pictures, one hour. For a first look; leave --quick away for "
+    "results to rely on.",
+    "in the useful range", "Option", "Input", "File",
+    "The rooms computed are balanced together: heat flows through what lies between.",
+    "SHA-256", "Where", "What", "Consequence and repair",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("language", "words"),
+    [
+        ("de", ("Tageslichtautonomie", "Blendung", "Nutzebene", "Sonnenschutz", "Leuchtdichte")),
+        ("fr", ("Autonomie lumineuse", "Éblouissement", "plan utile", "Luminance")),
+    ],
+)
+def test_the_page_is_in_the_fields_words_with_a_comma(result, language, words) -> None:
+    page = report_html(result, PageOptions(language=language))
+    assert f'<html lang="{language}">' in page
+    text = " ".join(shown(page))
+    for word in words:
+        assert word in text
+    assert not re.search(r"\b(?:of the|occupied hours|daylight autonomy|glare)\b", text)
+    # points are left in names of files and versions, and nowhere between digits of a figure
+    rest = re.sub(r"[\w.]+\.(?:ifc|epw|xml)|\d+\.\d+\.\d+", "", text)
+    assert not re.findall(r"\d\.\d", rest)
+    levels = [int(level) for level in re.findall(r"<h([1-6])", page)]
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_numbers_and_months_follow_the_language() -> None:
+    assert (rounded(1234.5, 1), decimal("0.5"), short_month(3)) == ("1\u202f234.5", "0.5", "Mar")
+    with in_language("de"):
+        assert (rounded(1234.5, 1), decimal("0.5"), short_month(3)) == (
+            "1\u202f234,5",
+            "0,5",
+            "März",
+        )
+        with pytest.raises(KeyError):
+            said("{day}. {month}", day=1)
+    with in_language("fr"):
+        assert said("Glare") == "Éblouissement"
+    assert said("Glare") == "Glare"
+
+
+def test_english_is_as_it_was(result) -> None:
+    assert report_html(result, PageOptions()) == report_html(result)
+
+
+@pytest.mark.parametrize(
+    ("text", "sections", "translated", "words"),
+    [
+        ("language = 'it'", RunSection, True, "language: expected 'en', 'de' or 'fr', got 'it'"),
+        ("language = 'de'", StudySection, False, "language: de: this page is there in English"),
+    ],
+)
+def test_another_language_is_one_line(tmp_path, text, sections, translated, words) -> None:
+    path = tmp_path / "page.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DataError) as error:
+        read_page(path, sections, translated=translated)
+    assert str(error.value).startswith(f"{path}: {words}")
+    path.write_text("language = 'de'", encoding="utf-8")
+    assert read_page(path, RunSection, translated=True).language == "de"
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("width", [1400, 375], ids=["wide", "phone"])
+def test_longer_words_fit(result, tmp_path, language, width) -> None:
+    page = report_html(result, PageOptions(language=language))
+    found = inspect(page, tmp_path, width=width, use="")
+    assert found["faults"] == [] and found["overlaps"] == [] and found["clipped"] == []
+    assert found["scroll"] <= found["width"], "the page scrolls sideways"
