@@ -105,25 +105,6 @@ def test_set_at_its_reference_condition():
     assert value[0] == pytest.approx(25.0, abs=0.4)
 
 
-@pytest.mark.parametrize(("met", "clo"), [(1.2, 0.5), (1.0, 1.0), (0.8, 0.0), (2.4, 0.2)])
-def test_pmv_and_set_are_those_of_pythermalcomfort(met, clo):
-    from pythermalcomfort.models import pmv_ppd_iso, set_tmp
-
-    rng = np.random.default_rng(11)
-    air, mrt = rng.uniform(-5, 45, (2, 400))
-    speed, humidity = rng.uniform(0, 1.5, 400), rng.uniform(0, 100, 400)
-    about = {"air_speed": speed, "humidity": humidity, "metabolic_rate": met, "clothing": clo}
-    theirs = {"tdb": air, "tr": mrt, "rh": humidity, "met": met, "clo": clo}
-    theirs |= {"limit_inputs": False, "round_output": False}
-    pmv, ppd = pmv_ppd(air, mrt, **about)
-    iso = pmv_ppd_iso(vr=speed, **theirs)
-    np.testing.assert_allclose(pmv, iso.pmv, atol=1e-9)
-    np.testing.assert_allclose(ppd, iso.ppd, atol=1e-9)
-    felt = standard_effective_temperature(air, mrt, **about)
-    # 1e-4 K: they stop their search for the temperature sooner
-    np.testing.assert_allclose(felt, set_tmp(v=speed, **theirs).set, atol=1e-4)
-
-
 @pytest.mark.parametrize("index", [pmv_ppd, standard_effective_temperature])
 def test_surroundings_are_broadcast_and_checked(index):
     def first(**changes):
