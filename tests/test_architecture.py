@@ -36,8 +36,9 @@ TRACING = (
 SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
-        "by_name", "exact_sun", "glare", "optics", "path_light", "phase_error", "phase_light",
-        "phase_scene", "reflected_sun", "straight_views", "view_cache", "window_reflection",
+        "by_name", "exact_sun", "glare", "group_light", "optics", "path_light", "phase_error",
+        "phase_light", "phase_scene", "reflected_sun", "straight_views", "view_cache",
+        "window_reflection",
     )
 )  # fmt: skip
 IFC = ("bim/ifc/", "scenes/demo/")
