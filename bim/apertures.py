@@ -40,6 +40,7 @@ class Filling:
     frame_reflectance: float | None = None
     solar_transmittance: float | None = None
     panes: int | None = None
+    is_open: bool = False  # nothing fills it: a doorway between two rooms
 
     @property
     def is_door(self) -> bool:

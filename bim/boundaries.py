@@ -117,24 +117,25 @@ def _face(
 ) -> Face:
     """One opaque face with what the file says of it, defaults where it says nothing."""
     filling = piece.attachment.aperture.filling if piece.attachment is not None else None
-    own = filling is not None and piece.role in ("frame", "door", "inner glass")
+    is_open = filling is not None and filling.is_open  # closed by a wall's face
+    own = filling is not None and not is_open and piece.role in ("frame", "door", "inner glass")
     spans = behind.spans
     record = records[spans[0].element] if spans else None
     visible, solar, gloss = finishes.of(spans[0].triangle) if spans else (-1.0, -1.0, None)
     if own:
         gloss = None
         visible = solar = -1.0 if filling.frame_reflectance is None else filling.frame_reflectance
-    if piece.role == "inner glass":
+    if piece.role == "inner glass" and not is_open:
         visible = solar = GLASS_REFLECTANCE
     if visible < 0:
-        assumed["reflectance"] += 1
+        assumed["reflectance"] += not is_open
         visible = solar = ROOM_REFLECTANCE[kind]
-    if record is None and not own:
+    if record is None and not own and not is_open:
         assumed["element"] += 1
     frame = own and kind == "window frame"
     construction = None if frame else construction_of(spans, records, piece.facet.plane.normal)
     if construction is None:
-        assumed["construction"] += not frame
+        assumed["construction"] += not (frame or is_open)
         construction = default_construction(kind, behind.adjacency)
     if behind.adjacency == "unknown":
         assumed["adjacency"] += 1
@@ -194,7 +195,7 @@ def _window(parts: Sequence[tuple[Piece, NDArray[np.float64]]]) -> Window:
     return Window(
         filling.guid, filling.name, triangles, filling.host, float(attachment.region.area),
         filling.u_value, filling.g_value, filling.visible_transmittance, filling.type_name,
-        filling.solar_transmittance, filling.panes,
+        filling.solar_transmittance, filling.panes, is_open=filling.is_open,
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from mitsuba_cfs.processes import ProcessEnded, each_apart
 
 LIMIT_S = 180.0  # for all rooms of a building, and for all its walls
 FLATTEST = 0.1  # a space that is lower has no outline to extrude [m]
+SLIT = 0.01  # air shut in between rooms that are made one: smaller ones are filled [m3]
 Body = NDArray[np.float64]  # [N, 3, 3] triangles [m]
 Packed = tuple[PackedSolid, str]  # and what had to be done to get it
 Outline = tuple[shapely.Geometry, Plane, float, float]  # of a prism: see `bim.solids.prism`
@@ -116,7 +117,12 @@ def _united(item: tuple[list[PackedSolid], list[Outline]]) -> PackedSolid | None
     solids, ways = item
     prisms = [prism(*way) for way in ways]
     body = union([*map(unpacked, solids), *(way for way in prisms if way is not None)])
-    return packed(body.as_original()) if len(body.decompose()) == 1 else None
+    parts = body.decompose()  # what is hollow inside is a part of negative volume
+    bodies = [part for part in parts if part.volume() > 0]
+    if len(bodies) != 1:
+        return None
+    hollow = sum(part.volume() for part in parts) < bodies[0].volume() - SLIT
+    return packed((body if hollow else bodies[0]).as_original())
 
 
 def _opened(item: tuple[Body, list[Outline]]) -> Body | None:

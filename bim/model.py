@@ -24,6 +24,7 @@ FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "revea
 # Sides of a box-shaped room as seen from outdoors in front of it, and the other kinds of its faces
 BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
+JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
 
@@ -94,7 +95,7 @@ class Face:
     neighbour: str | None = None  # GUID of the other space where adjacency is "space"
     element: str | None = None  # GUID of the building element
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
-    pane: Window | None = None  # the glass to the neighbour that the face is
+    pane: Window | None = None  # the glass or the opening to the neighbour that the face is
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, out of the room
     area: float = field(init=False)  # [m2]
 
@@ -135,6 +136,7 @@ class Window:
     solar_transmittance: float | None = None  # as the file states it
     panes: int | None = None  # of the glazing, as the file states it
     states: tuple[ShadingState, ...] = ()  # of a file that is no IFC: what it holds of the window
+    is_open: bool = False  # no glass: a doorway, or where two rooms touch with nothing between
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, outdoors
     area: float = field(init=False)  # of the glass [m2]
 

@@ -25,6 +25,7 @@ from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms
 from bim.ifc.joining import joined_rooms
 from bim.ifc.map_conversion import map_georeference
+from bim.ifc.passages import Passage, open_apertures
 from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
@@ -56,7 +57,8 @@ def read_ifc(
     Args:
         corrections: what to leave out and repaint; by default those of the file
             `<model>.corrections.toml` beside the model, if there is one.
-        join: rooms to make one besides, as "Hall + Living", where `corrections` are not given.
+        join: rooms to make one besides, as "Hall + Living", where `corrections` are not given;
+            "open": those that an opening larger than a door leads between.
         furniture: whether what stands in the rooms is in their light and views.
         progress: called with the stage's name and the fraction of it that is done.
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
@@ -82,7 +84,8 @@ def read_ifc(
     )
     problems += [*glass.problems, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
-    own = [[a for a in glass.attachments if a.room == r.guid] for r in records]
+    attached = [*glass.attachments, *(side for way in rooms.passages for side in way.sides)]
+    own = [[a for a in attached if a.room == r.guid] for r in records]
     boundaries = room_boundaries([(r.solid, a) for r, a in zip(records, own, strict=True)])
     spaces: list[Space] = []
     for index, boundary in enumerate(boundaries):
@@ -113,6 +116,7 @@ class _Rooms:
     read: list[SpaceRecord]  # the spaces that are rooms, before any are joined
     records: list[SpaceRecord]  # the rooms
     repeated: list[SpaceRecord]  # spaces that draw a room again
+    passages: list[Passage]  # openings between rooms that nothing fills
 
 
 def _rooms(
@@ -124,13 +128,14 @@ def _rooms(
     problems += more
     read, more = enclosed_spaces(records, mesh)
     problems += more
-    records, more = joined_rooms(source, read)
+    apertures = open_apertures(source, read, mesh.triangles)
+    records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
     problems += more
     if not records:
         read, more = found_rooms(source, tell)
         records = read
         problems += more
-    return _Rooms(read, records, repeated), problems
+    return _Rooms(read, records, repeated, ways), problems
 
 
 def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Problem]]:

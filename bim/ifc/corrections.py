@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
 LAYER = re.compile(r'(?:^|,)\s*layer\s*=\s*("[^"]*"|[^,+]+)')  # CAD layer: ours, not ifcopenshell's
 KEYS = ("leave_out", "only", "opaque", "keep", "join", "surroundings", "reflectance")
+OPEN = "open"  # asks for the rooms that are open to each other by more than a door
 PAINT_KEYS = ("select", "visible", "solar", "specular", "roughness")
 
 
@@ -64,6 +65,7 @@ class Corrections:
     file: str = ""
     keep: tuple[str, ...] = ()  # shading devices that are traced before any BSDF
     opaque: tuple[str, ...] = ()  # elements without glass, whatever they are drawn as
+    join_open: bool = False  # rooms open to each other by more than a door are one
 
     def removed(self, model: ifcopenshell.file) -> set[int]:
         """STEP ids of the products that are not to be read."""
@@ -123,17 +125,20 @@ def corrections_file(model_path: str | Path) -> Path:
 def corrections_beside(model_path: str | Path, join: Sequence[str] = ()) -> Corrections:
     """The corrections in the file beside the model, if there is one, and rooms to join besides.
 
-    Args: join: texts of room names with a plus between them, as "Hall + Living".
+    Args: join: texts of room names with a plus between them, as "Hall + Living"; or "open": all
+        rooms that an opening larger than a door leads between.
     Raises: `DataError` for a wrong entry, or a text that names one room only.
     """
     path = corrections_file(model_path)
     corrections = read_corrections(path) if path.is_file() else Corrections()
-    groups = [tuple(name.strip() for name in text.split("+") if name.strip()) for text in join]
-    for text, group in zip(join, groups, strict=True):
+    named = [text for text in join if text != OPEN]
+    groups = [tuple(name.strip() for name in text.split("+") if name.strip()) for text in named]
+    for text, group in zip(named, groups, strict=True):
         if len(group) < 2:
             message = f"expected rooms with a plus between them, as 'Hall + Living', got {text!r}"
             raise DataError(message, field="--join")
-    return replace(corrections, join=(*corrections.join, *groups))
+    joined = (*corrections.join, *groups)
+    return replace(corrections, join=joined, join_open=len(named) < len(join))
 
 
 def read_corrections(path: str | PathLike[str]) -> Corrections:

@@ -3,95 +3,99 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from bim.apertures import Filling, aperture_of
-from bim.guarded import Outline, united
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from bim.apertures import Aperture
+from bim.guarded import united
 from bim.ifc.corrections import corrections_file
+from bim.ifc.passages import LARGEST_DOOR, Passage, passages
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
-from bim.model import Problem
+from bim.model import JOINED, Problem
 from bim.names import found_by_name
-from bim.rooms import OVERLAP, Attachment, attachments_of, room_solid
+from bim.rooms import room_solid
 from bim.solids import packed, unpacked
 from mitsuba_cfs.errors import DataError, RoomError
 
-THROUGH = 0.02  # an opening that stops this near a room's face goes through the wall [m]
-
-
-@dataclass(frozen=True, slots=True)
-class Passage:
-    """An opening without door or window between two rooms."""
-
-    opening: str  # GUID
-    rooms: frozenset[str]  # GUIDs of the two
-    outline: Outline  # of what fills the opening from one room into the other
-
-
-def passages(source: Source, records: Sequence[SpaceRecord]) -> list[Passage]:
-    """The openings that nothing fills and that lead from room to room."""
-    solids = [record.solid for record in records]
-    found = []
-    for opening in source.model.by_type("IfcOpeningElement"):
-        shape = source.shapes.get(opening.id())
-        if shape is None or getattr(opening, "HasFillings", None):
-            continue
-        body = shape.triangles
-        filling = Filling(
-            shape.guid, shape.name, "IfcOpeningElement", body, shape.look < -1, opening=body
-        )
-        aperture, _ = aperture_of(filling)
-        if aperture is None:
-            continue
-        sides = attachments_of(aperture, solids)
-        for one in sides:
-            others = [a for a in sides if a.room == one.neighbour and a.neighbour == one.room]
-            passage = _passage(one, others)
-            if passage is not None and passage.rooms not in {p.rooms for p in found}:
-                found.append(passage)
-    return found
-
-
-def _passage(one: Attachment, others: list[Attachment]) -> Passage | None:
-    """The passage between a room and its neighbour if the opening goes through to both."""
-    if one.neighbour is None or not others:
-        return None
-    other, plane = others[0], one.aperture.plane
-    heights = plane.to_plane(one.aperture.filling.triangles)[..., 2]
-    # this room lies below the plane, the other one above
-    if heights.min() > one.nearest + THROUGH or heights.max() < -other.nearest - THROUGH:
-        return None
-    outline = one.region, plane, one.deepest - OVERLAP, -other.deepest + OVERLAP
-    return Passage(one.aperture.filling.guid, frozenset((one.room, other.room)), outline)
-
 
 def joined_rooms(
-    source: Source, records: Sequence[SpaceRecord]
-) -> tuple[list[SpaceRecord], list[Problem]]:
-    """Rooms with those of the corrections' `join` made one; the other open passages reported."""
-    ways = passages(source, records)
+    source: Source,
+    records: Sequence[SpaceRecord],
+    apertures: Sequence[Aperture],
+    bodies: NDArray[np.float64],
+) -> tuple[list[SpaceRecord], list[Passage], list[Problem]]:
+    """Rooms with those of the corrections' `join` made one, and the passages left between rooms.
+
+    Args: apertures, bodies: see `bim.ifc.passages`.
+    """
+    ways = passages(apertures, records, bodies)
     records, problems = list(records), []
     for names in source.corrections.join:
         parts = list({r.guid: r for r in (_named(records, n, source) for n in names)}.values())
-        why = "nothing opens between them"
-        try:
-            one = _joined(parts, ways) if len(parts) > 1 else None
-        except RoomError as error:
-            one, why = None, str(error)
+        one, why = _one_room(parts, ways)
         if one is None:
             what = f"rooms {', '.join(names)}: {why}"
             problems.append(Problem(source.corrections.file or "join", what, "not joined"))
             continue
         records = [r for r in records if r not in parts] + [one]
+        ways = passages(apertures, records, bodies)
         problems.append(Problem(one.solid.guid, f"rooms {', '.join(names)}", "joined as asked for"))
+    if source.corrections.join_open:
+        records, more = _joined_by_size(records, ways)
+        problems += more
+        ways = passages(apertures, records, bodies)
     named = {record.guid: record for record in records}
     for way in ways:
-        if all(guid in named for guid in way.rooms):
-            pair = sorted((named[guid] for guid in way.rooms), key=lambda room: room.label)
-            what = f"rooms {' and '.join(room.label for room in pair)} are open to each other"
-            how = _how_to_join(pair, records, source)
-            problems.append(Problem(way.opening, what, how, kind="open to each other"))
-    return records, problems
+        pair = sorted((named[guid] for guid in way.rooms), key=lambda room: room.label)
+        labels = " and ".join(room.label for room in pair)
+        what = f"rooms {labels} are open to each other by {way.area:.1f} m2"
+        how = _how_to_join(pair, records, source)
+        if way.is_large:
+            how += f"; --join open joins all that open by more than a door ({LARGEST_DOOR:g} m2)"
+        problems.append(Problem(way.opening, what, how, kind="open to each other"))
+    return records, ways, problems
+
+
+def _joined_by_size(
+    records: list[SpaceRecord], ways: Sequence[Passage]
+) -> tuple[list[SpaceRecord], list[Problem]]:
+    """Rooms with those made one that openings larger than a door lead between."""
+    large = [way for way in ways if way.is_large]
+    number = {record.guid: i for i, record in enumerate(records)}
+    rows, columns = np.array([[number[r] for r in way.rooms] for way in large]).reshape(-1, 2).T
+    links = coo_array((np.ones(len(large)), (rows, columns)), shape=(len(records),) * 2)
+    _, group = connected_components(links, directed=False)
+    rooms, problems = [], []
+    for members in (np.flatnonzero(group == i) for i in np.unique(group)):
+        parts = [records[i] for i in members]
+        if len(parts) == 1:
+            rooms += parts
+            continue
+        one, why = _one_room(parts, large)
+        names = ", ".join(part.label for part in parts)
+        widest = max(way.area for way in large if way.rooms <= {part.guid for part in parts})
+        what = f"Rooms {names}: open to each other by up to {widest:.1f} m2"
+        if one is None:
+            problems.append(Problem(parts[0].guid, what, f"not joined: {why}"))
+            rooms += parts
+            continue
+        rooms.append(one)
+        done = f"joined as one room: larger than a door ({LARGEST_DOOR:g} m2)"
+        problems.append(Problem(one.guid, what, done, kind=JOINED))
+    return rooms, problems
+
+
+def _one_room(parts: list[SpaceRecord], ways: Sequence[Passage]) -> tuple[SpaceRecord | None, str]:
+    """One room of several, or why there is none."""
+    try:
+        one = _joined(parts, ways) if len(parts) > 1 else None
+    except RoomError as error:
+        return None, str(error)
+    return one, "" if one is not None else "nothing opens between them"
 
 
 def _named(records: Sequence[SpaceRecord], name: str, source: Source) -> SpaceRecord:
@@ -114,9 +118,10 @@ def _how_to_join(
         good = (n for n in own if "+" not in n and _is_unique(records, n))
         names.append(next(good, room.guid))
     listed = ", ".join(f'"{name}"' for name in names)
+    file = corrections_file(source.path).name
     return (
-        f"closed by a wall face; one room with --join '{' + '.join(names)}', "
-        f"or join = [[{listed}]] in {corrections_file(source.path).name}"
+        "closed by a wall face; cfs run --inner-glass lets daylight through; one room with "
+        f"--join '{' + '.join(names)}', or join = [[{listed}]] in {file}"
     )
 
 
@@ -127,7 +132,7 @@ def _is_unique(records: Sequence[SpaceRecord], name: str) -> bool:
         return False
 
 
-def _joined(parts: list[SpaceRecord], ways: list[Passage]) -> SpaceRecord | None:
+def _joined(parts: list[SpaceRecord], ways: Sequence[Passage]) -> SpaceRecord | None:
     """One room of several; None where they stay apart."""
     guids = {part.solid.guid for part in parts}
     solids = [packed(part.solid.manifold) for part in parts]

@@ -25,7 +25,7 @@ out_folder_option = click.option(
 )
 join_option = click.option(
     "--join", multiple=True, metavar="'ROOM + ROOM'",
-    help="Rooms open to each other that are to be one.",
+    help="Rooms open to each other that are to be one; 'open' (IFC): all by more than a door.",
 )  # fmt: skip
 furniture_option = click.option(
     "--furniture", is_flag=True, help="Count the furniture that the IFC holds in light and views."

@@ -53,7 +53,8 @@ _DEFAULT = RoomOptions()
 )  # fmt: skip
 @click.option(
     "--inner-glass", is_flag=True,
-    help="Let daylight through glass between rooms; rooms lit by it alone are computed too.",
+    help="Let daylight through glass and open doorways between rooms; rooms lit by that alone are "
+    "computed too, and those open to each other by more than a door are one room.",
 )  # fmt: skip
 @click.option(
     "--no-coupled-heat", is_flag=True,

@@ -1,7 +1,8 @@
-"""Glass between rooms: window groups of a room whose outdoors is another room with windows.
+"""Glass and open doorways between rooms: window groups whose outdoors is another room with windows.
 
-A room without windows that such glass lights passes light on: each room takes light from rooms that
-are no more panes away from the nearest window than it is, and these from rooms that are fewer away.
+A doorway is a pane that passes everything.  A room without windows that such panes light passes
+light on: each room takes light from rooms that are no more panes away from the nearest window than
+it is, and these from rooms that are fewer away.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from bim.to_tracer import (
     furnished_surfaces,
     window_groups,
 )
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
@@ -45,6 +47,7 @@ class InnerGlass:
     beyond: tuple[RoomBeyond, ...]  # [I]
     names: tuple[str, ...]  # [I] labels of the rooms beyond
     area: float  # of the glass [m2]
+    open_area: float  # of the doorways [m2]
     faces: frozenset[str]  # names of the room's faces that this glass is
 
 
@@ -61,13 +64,44 @@ def lending_rooms(building: Building, space: Space) -> list[Space]:
     return list(found.values())
 
 
+def opened(building: Building) -> Building:
+    """The building with its doorways open: each reflects what comes back from the room beyond.
+
+    rho f / (1 - rho (1 - f)), rho the mean reflectance of that room, f the doorway's share of its
+    surface.
+
+    Source: Sumpner 1892 (the integrating sphere), as for light wells and cavities.
+    """
+    rooms = {space.guid: space for space in building.spaces}
+
+    def seen(face: Face) -> Face:
+        beyond = rooms.get(face.neighbour or "")
+        if face.pane is None or not face.pane.is_open or beyond is None:
+            return face
+        visible, solar = (_returned(beyond, face.area, band) for band in ("visible", "solar"))
+        return replace(face, reflectance_visible=visible, reflectance_solar=solar)
+
+    spaces = tuple(replace(space, faces=tuple(map(seen, space.faces))) for space in building.spaces)
+    return replace(building, spaces=spaces)
+
+
+def _returned(room: Space, area: float, band: str) -> float:
+    """Share of the light through an opening [m2] of a room that comes back out of it."""
+    parts = [(face.area, face.total_reflectance(band)) for face in room.faces]
+    whole = sum(size for size, _ in parts) + sum(window.area for window in room.windows)
+    mean = sum(size * reflectance for size, reflectance in parts) / whole
+    share = min(area / whole, 1.0)
+    return mean * share / (1 - mean * (1 - share))
+
+
 def inner_glass(
     building: Building, space: Space, systems: Mapping[str, States]
 ) -> InnerGlass | None:
-    """The glass of a room to rooms that daylight reaches; None where there is none.
+    """The glass and doorways of a room to rooms that daylight reaches; None where there are none.
 
     The windows there are in their first state, the glass between is a clear pane of the
-    transmittance that it states.  The wall's thickness is a tube of reveals beyond the glass.
+    transmittance that it states, a doorway passes all.  The wall's thickness is a tube of reveals
+    beyond the glass.
 
     Args: systems: of the windows of all these rooms, by their GUID.
     """
@@ -100,8 +134,9 @@ def _inner_glass(
         return None
     names = frozenset(face.name for face in used)
     rest = replace(space, faces=tuple(face for face in space.faces if face.name not in names))
-    area = sum(face.area for face in used)
-    return InnerGlass(furnished_surfaces(rest), *map(tuple, zip(*found, strict=True)), area, names)
+    areas = [sum(f.area for f in used if f.pane.is_open == is_open) for is_open in (False, True)]
+    groups = map(tuple, zip(*found, strict=True))
+    return InnerGlass(furnished_surfaces(rest), *groups, *areas, names)
 
 
 def borrowed_share(space: Space, light: PhaseLight, inner: InnerGlass | None) -> str:
@@ -115,10 +150,16 @@ def borrowed_share(space: Space, light: PhaseLight, inner: InnerGlass | None) ->
     ]
     share = float(sum(sums[first:]) / max(sum(sums), 1e-9))
     return (
-        f"Room {space.label} borrows {100 * share:.0f} % of its daylight through {inner.area:.1f} "
-        f"m2 of glass from {', '.join(dict.fromkeys(inner.names))}; the sun comes through it by "
-        "sky patches, blinds there are in their first state, the heat balance has none of it."
+        f"Room {space.label} borrows {100 * share:.0f} % of its daylight through "
+        f"{_through(inner)} from {', '.join(dict.fromkeys(inner.names))}; the sun comes through "
+        "it by sky patches, blinds there are in their first state, the heat balance has none of it."
     )
+
+
+def _through(inner: InnerGlass) -> str:
+    """What the light comes through, in words."""
+    parts = ((inner.area, "glass"), (inner.open_area, "open doorways"))
+    return " and ".join(f"{area:.1f} m2 of {what}" for area, what in parts if area > 0)
 
 
 def _panes_to_windows(building: Building) -> dict[str, int]:
@@ -176,16 +217,18 @@ def _beside(face: Face, back: Face) -> float:
     return float(np.linalg.norm(step - (step @ face.normal) * face.normal))
 
 
-def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[BsdfOptics, WindowGroup]]:
+def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, WindowGroup]]:
     """Panes of a room in groups of one orientation and one transmittance, with their optics."""
-    by_tau: dict[float, list] = {}
+    by_tau: dict[float | None, list] = {}
     for face in faces:
-        tau = face.pane.visible_transmittance or CLEAR
+        tau = None if face.pane.is_open else face.pane.visible_transmittance or CLEAR
         by_tau.setdefault(tau, []).append(face.pane)
     found = []
     for tau, panes in by_tau.items():
-        glass = glazing_system(StatedValues(tau, None, None, None, 1), "the model")
-        optics = BsdfOptics(glass.visible, glass.fine, glass.angular)
+        optics: SystemOptics = GivenOptics(np.eye(KLEMS_FULL.size))
+        if tau is not None:
+            glass = glazing_system(StatedValues(tau, None, None, None, 1), "the model")
+            optics = BsdfOptics(glass.visible, glass.fine, glass.angular)
         groups = window_groups(replace(space, windows=tuple(panes)))
         found += [(optics, group) for group in groups]
     return found
@@ -201,7 +244,11 @@ def _room_beyond(
     """The room beyond seen from the panes of another one, and T of all glass that lights it."""
     open_ = {back.name for _, back in pairs} | (set() if onward is None else onward.faces)
     kept = [face for face in room.faces if face.name not in open_]
-    glass = [_piece(face, PANE, face.triangles, GLASS_REFLECTANCE) for face, _ in pairs]
+    glass = [
+        _piece(face, PANE, face.triangles,
+               back.reflectance_visible if back.pane.is_open else GLASS_REFLECTANCE)
+        for face, back in pairs
+    ]  # fmt: skip
     reveals = [
         _piece(face, "reveal", _tube(face, _depth(face, back)), ROOM_REFLECTANCE["reveal"])
         for face, back in pairs

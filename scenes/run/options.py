@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from bim.building_file import is_ifc
+from bim.ifc.corrections import OPEN
 from scenes.room.options import RoomOptions
 
 
@@ -37,8 +39,14 @@ class JobOptions(BuildingOptions):
     """Inputs and choices of a run."""
 
     operation: Path | None = None
-    inner_glass: bool = False  # light passes glass between rooms
+    inner_glass: bool = False  # light passes glass and open doorways between rooms
     coupled_heat: bool = True  # heat flows between the rooms that are computed
     explore: bool = False  # every hour's picture in every shading state, for the explorer
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence
+
+    @property
+    def joined(self) -> tuple[str, ...]:
+        """The rooms to make one: with light between rooms, those open by more than a door too."""
+        by_size = self.inner_glass and self.building is not None and is_ifc(self.building)
+        return (*self.join, OPEN) if by_size else self.join

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from bim.account import NOT_USABLE
-from bim.model import Building, Problem, Space
+from bim.model import JOINED, Building, Problem, Space
 from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -29,7 +29,7 @@ from scenes.results import RoomYear, RunResult
 from scenes.room.drawn_shades import traced_building
 from scenes.room.equal_rooms import moved_light, moved_result
 from scenes.room.heated import DaylitRoom, coupled_years
-from scenes.room.inner_glass import lending_rooms
+from scenes.room.inner_glass import lending_rooms, opened
 from scenes.room.operation import Operation, check_states
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import skies_for
@@ -124,6 +124,7 @@ def run_inputs(
     notes = [
         *([NOTE] if options.quick else []),
         *_account_notes(building),
+        *(f"{p.what}: {p.consequence}." for p in building.problems if p.kind == JOINED),
         *source_notes(used_sources(inputs)),
         *(note for system in used for note in system.notes),
         *thermal_notes,
@@ -155,7 +156,7 @@ def read_inputs(
     steps = part(progress, 0.1, 1.0)
     building = read_building(
         options.building,
-        join=options.join,
+        join=options.joined,
         furniture=options.furniture,
         apertures=options.apertures,
         surroundings=options.surroundings,
@@ -179,6 +180,7 @@ def job_inputs(
     operation, weather = files.operation, files.weather
     beyond: dict[str, list[Space]] = {}
     if inner:
+        building = opened(building)
         beyond = {space.guid: lending_rooms(building, space) for space in building.spaces}
     spaces = chosen_spaces(
         building, names, building.file, lambda s: bool(s.windows or beyond.get(s.guid))

@@ -127,6 +127,7 @@ def test_room_whose_booleans_end_the_process_is_named_and_the_others_stay(tmp_pa
     small, _ = box_model(space=False)
     for name, y in (("A", 0.0), ("B", 3.0)):
         small.box("IfcSpace", name, (0.0, y, 0.0), (WIDTH, 3.0, HEIGHT))
+    small.box("IfcWall", "between", (0.0, 2.9, 0.0), (WIDTH, 0.2, HEIGHT))
     path = tmp_path / "model.ifc"
     small.model.write(str(path))
     building = read_ifc(path)

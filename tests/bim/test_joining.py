@@ -45,7 +45,7 @@ def test_open_rooms_are_reported_and_kept_apart(tmp_path):
     building = read_ifc(two_rooms(tmp_path))
     assert len(building.spaces) == 2
     (problem,) = [p for p in building.problems if "open to each other" in p.what]
-    assert problem.what == "rooms North and South are open to each other"
+    assert problem.what == "rooms North and South are open to each other by 2.1 m2"
     assert "--join 'North + South'" in problem.consequence
     assert 'join = [["North", "South"]] in two.corrections.toml' in problem.consequence
 

@@ -130,11 +130,23 @@ def by_phases(rooms: int, seed: int = 0, sampling: Sampling = SAMPLING) -> NDArr
 
 def by_paths(rooms: int, samples: int, seed: int = 0) -> NDArray[np.float64]:
     """The same [S] by Mitsuba's integrator `path` in all rooms, panes as masks."""
-    whole, result = _mitsuba_scene(rooms), []
+    opaque = [(triangles, rho) for i in range(rooms) for triangles, rho in room(i, rooms)]
+    panes = [(group(i, rooms).windows[0].triangles, INNER_TAU if i else TAU) for i in range(rooms)]
+    return illuminance_by_path(opaque, panes, sensors(rooms), samples, seed=seed)
+
+
+def illuminance_by_path(
+    opaque: Quads, panes: Quads, points: NDArray[np.float64], samples: int, *, seed: int
+) -> NDArray[np.float64]:
+    """Illuminance [S] of sensors that look up under the overcast sky of patches.
+
+    Args: opaque, panes: triangles with their reflectance, and with their transmittance.
+    """
+    whole, result = _mitsuba_scene(opaque, panes), []
     integrator = mi.load_dict({"type": "path", "max_depth": 64, "rr_depth": 16})
-    for number, point in enumerate(sensors(rooms)):
+    for number, point in enumerate(points):
         sampler = mi.load_dict({"type": "independent"})
-        sampler.seed(seed * len(BEHIND) + number, samples)
+        sampler.seed(seed * len(points) + number, samples)
         local = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
         ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(*map(float, point)), local))
         seen, _, _ = integrator.sample(whole, sampler, ray)
@@ -142,14 +154,15 @@ def by_paths(rooms: int, samples: int, seed: int = 0) -> NDArray[np.float64]:
     return np.array(result)
 
 
-def _mitsuba_scene(rooms: int):
-    """All rooms under the sky of patches."""
+def _mitsuba_scene(opaque: Quads, panes: Quads):
+    """Walls and panes under the sky of patches."""
 
     def shape(triangles: NDArray[np.float64], bsdf: dict):
-        mesh = mi.Mesh("quad", 6, 2)
+        count = len(triangles)
+        mesh = mi.Mesh("part", 3 * count, count)
         parameters = mi.traverse(mesh)
         parameters["vertex_positions"] = mi.Float(triangles.reshape(-1).astype(np.float32))
-        parameters["faces"] = mi.UInt32(np.arange(6, dtype=np.uint32))
+        parameters["faces"] = mi.UInt32(np.arange(3 * count, dtype=np.uint32))
         parameters.update()
         mesh.set_bsdf(mi.load_dict(bsdf))
         return mesh
@@ -159,12 +172,11 @@ def _mitsuba_scene(rooms: int):
         return {"type": "twosided", "nested": {"type": "diffuse", "reflectance": colour}}
 
     found = {}
-    for number in range(rooms):
-        tau = INNER_TAU if number else TAU
+    for i, (triangles, tau) in enumerate(panes):
         pane = {"type": "mask", "opacity": 1 - tau, "nested": grey(0.0)}
-        found[f"glass {number}"] = shape(group(number, rooms).windows[0].triangles, pane)
-        for i, (triangles, rho) in enumerate(room(number, rooms)):
-            found[f"wall {number} {i}"] = shape(triangles, grey(rho))
+        found[f"glass {i}"] = shape(triangles, pane)
+    for i, (triangles, rho) in enumerate(opaque):
+        found[f"wall {i}"] = shape(triangles, grey(rho))
     v, u = (np.arange(512) + 0.5) / 512, (np.arange(1024) + 0.5) / 1024
     theta, phi = np.meshgrid(np.pi * v, 2 * np.pi * u, indexing="ij")
     # Mitsuba's map: up is y; turned so that up is z

@@ -1,18 +1,20 @@
-"""What rooms of an IFC file borrow from each other: three phases against `rtrace` in all of them.
+"""What rooms of an IFC file borrow from each other: three phases against paths in all of them.
 
     python -m scenes.evidence.validation.inner_glass_ifc BUILDING.ifc [--space NAME ...] [--seeds N]
+        [--paths N]
 
 Every room as `cfs run --inner-glass` has it, its own windows black, with the rooms behind its
 glass, the reveals between and their windows, under an overcast sky of 20,000 lx and nothing else
-outdoors; all windows pass 0.8, all glass between rooms 0.7, at every angle.  Up to five sensors of
-its grid: means over seeds and their standard errors, and the quotient of the sensors' means.
+outdoors; all windows pass 0.8, all glass between rooms 0.7, at every angle, open doorways all.  Up
+to five sensors of its grid by Mitsuba's `path`, Radiance's `rtrace` and ours: means over seeds and
+their standard errors, and ours by each, of the sensors' means.
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.ifc.building import read_ifc
+from bim.ifc.corrections import OPEN
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
@@ -34,13 +37,14 @@ from scenes.evidence.benchmarks.radiance import polygon, write_surfaces
 from scenes.evidence.validation.inner_glass import (
     INNER_TAU,
     TAU,
+    illuminance_by_path,
     illuminance_by_rtrace,
     overcast,
     pooled,
 )
 from scenes.fenestration.systems import read_system
 from scenes.room.daylight import room_scene
-from scenes.room.inner_glass import PANE, inner_glass, lending_rooms
+from scenes.room.inner_glass import PANE, inner_glass, lending_rooms, opened
 from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 
@@ -69,33 +73,56 @@ def borrowing_scene(building: Building, space: Space) -> DaylightScene | None:
 def _plain(scene: DaylightScene) -> DaylightScene:
     """The scene with nothing outdoors, and the same glass everywhere."""
     beyond = []
-    for one in scene.beyond:
+    for one, tau in zip(scene.beyond, _inner_taus(scene), strict=True):
         behind = _plain(one.scene)
-        tau = [TAU] * len(behind.outdoor_groups) + [INNER_TAU] * len(behind.beyond)
-        passed = tuple(t * EYE for t in tau)
-        beyond.append(
-            replace(one, scene=behind, transmission=passed, beam=INNER_TAU * EYE.diagonal())
-        )
+        taus = [TAU] * len(behind.outdoor_groups) + _inner_taus(one.scene)
+        passed = tuple(t * EYE for t in taus)
+        beyond.append(replace(one, scene=behind, transmission=passed, beam=tau * EYE.diagonal()))
     return replace(scene, exterior=Surfaces.none(), beyond=tuple(beyond))
+
+
+def _inner_taus(scene: DaylightScene) -> list[float]:
+    """What each pane between rooms passes: a doorway all."""
+    return [1.0 if np.all(one.beam == 1) else INNER_TAU for one in scene.beyond]
 
 
 def by_phases(scene: DaylightScene, seed: int) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
     traced = PhaseScene(scene, replace(SAMPLING, seed=seed), five_phase=False)
-    tau = [0.0] * len(scene.outdoor_groups) + [INNER_TAU] * len(scene.beyond)
+    tau = [0.0] * len(scene.outdoor_groups) + _inner_taus(scene)
     light = PhaseSystems(traced, [[GivenOptics(t * EYE)] for t in tau])
     return light.light(overcast()).illuminance()[:, 0]
 
 
+def by_paths(scene: DaylightScene, samples: int, seed: int) -> NDArray[np.float64]:
+    """The same [S] by Mitsuba's integrator `path` in all rooms."""
+    rooms = list(_all_behind([scene]))
+    walls = [_without_panes(room, scene) for room in rooms]
+    opaque = [
+        (part.triangles[part.reflectance == rho], float(rho))
+        for part in walls for rho in np.unique(part.reflectance)
+    ]  # fmt: skip
+    panes = [(_triangles(scene.outdoor_groups), 0.0)] if scene.outdoor_groups else []
+    for room in rooms:
+        panes += [
+            (_triangles([group]), tau)
+            for group, tau in zip(_inner_groups(room), _inner_taus(room), strict=True)
+            if tau < 1
+        ]
+        if room is not scene and room.outdoor_groups:
+            panes.append((_triangles(room.outdoor_groups), TAU))
+    return illuminance_by_path(opaque, panes, scene.points, samples, seed=seed)
+
+
 def by_radiance(scene: DaylightScene, folder: Path) -> NDArray[np.float64]:
     """The same [S] by `rtrace` in all rooms."""
-    write_surfaces(scene.interior, folder / "room.rad")
-    lines = [*_black(scene.outdoor_groups), *_panes("inner", INNER_TAU, scene)]
-    rooms = {id(one.scene): one.scene for one in scene.beyond}
-    for number, room in enumerate(_all_behind(rooms.values())):
+    lines = [*_glass("black", 0.0, scene.outdoor_groups)]
+    for number, room in enumerate(_all_behind([scene])):
         write_surfaces(_without_panes(room, scene), folder / f"room{number}.rad")
-        lines += _panes(f"inner{number}", INNER_TAU, room)
-        lines += _glass(f"window{number}", TAU, room.outdoor_groups)
+        for i, (group, tau) in enumerate(zip(_inner_groups(room), _inner_taus(room), strict=True)):
+            lines += _glass(f"inner{number}_{i}", tau, [group]) if tau < 1 else []
+        if number:
+            lines += _glass(f"window{number}", TAU, room.outdoor_groups)
     (folder / "panes.rad").write_text("\n".join(lines))
     return illuminance_by_rtrace(folder, scene.points, scene.normals)
 
@@ -113,51 +140,53 @@ def _without_panes(room: DaylightScene, before: DaylightScene) -> Surfaces:
     return Surfaces(kept.triangles[~stands], kept.reflectance[~stands], kept.surface[~stands])
 
 
-def _panes(name: str, tau: float, scene: DaylightScene) -> list[str]:
-    return _glass(name, tau, scene.groups[len(scene.outdoor_groups) :])
+def _inner_groups(scene: DaylightScene) -> Sequence[WindowGroup]:
+    return scene.groups[len(scene.outdoor_groups) :]
 
 
-def _glass(name: str, tau: float, groups) -> list[str]:
+def _glass(name: str, tau: float, groups: Sequence[WindowGroup]) -> list[str]:
     """Glass that passes the same at every angle and reflects nothing."""
-    lines = [f"void trans {name}\n0\n0\n7 {tau} {tau} {tau} 0 0 1 1\n"]
-    return lines + _polygons(name, groups)
+    material = f"void trans {name}\n0\n0\n7 {tau} {tau} {tau} 0 0 1 1\n"
+    if tau == 0:
+        material = f"void plastic {name}\n0\n0\n5 0 0 0 0 0\n"
+    return [material, *(polygon(name, f"{name}_{i}", t) for i, t in enumerate(_triangles(groups)))]
 
 
-def _black(groups) -> list[str]:
-    return ["void plastic black\n0\n0\n5 0 0 0 0 0\n", *_polygons("black", groups)]
-
-
-def _polygons(material: str, groups: list[WindowGroup]) -> list[str]:
-    triangles = [t for group in groups for window in group.windows for t in window.triangles]
-    return [polygon(material, f"{material}_{i}", one) for i, one in enumerate(triangles)]
+def _triangles(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:
+    found = [window.triangles for group in groups for window in group.windows]
+    return np.concatenate(found) if found else np.empty((0, 3, 3))
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Print a line for each room that borrows light."""
+    """Print three lines for each room that borrows light."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("building", type=Path)
     parser.add_argument("--space", action="append", default=[])
     parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--paths", type=int, default=1 << 19, help="of a sensor for each seed")
     options = parser.parse_args(arguments)
-    building = read_ifc(options.building)
+    building = opened(read_ifc(options.building, join=[OPEN]))
     variants.activate()
     spaces = [building.space(name) for name in options.space] or building.spaces
-    print("| room | from | `rtrace` [lx] | three-phase [lx] | quotient of the means |")
-    print("|---|---|---|---|---|")
+    print("| room | from | | sensors [lx] | three-phase by it |\n|---|---|---|---|---|")
     for space in spaces:
         scene = borrowing_scene(building, space)
         if scene is None:
             continue
-        with tempfile.TemporaryDirectory() as name:
-            theirs = pooled([by_radiance(scene, Path(name)) for _ in range(options.seeds)])
-        ours = pooled([by_phases(scene, seed) for seed in range(options.seeds)])
+        seeds = range(options.seeds)
         lent = ", ".join(room.label for room in lending_rooms(building, space))
-        cells = [
-            ", ".join(f"{v:.1f} ({100 * e:.1f} %)" for v, e in zip(*one, strict=True))
-            for one in (theirs, ours)
-        ]
-        quotient = ours[0].mean() / theirs[0].mean()
-        print(f"| {space.label} | {lent} | {cells[0]} | {cells[1]} | {quotient:.3f} |", flush=True)
+        with tempfile.TemporaryDirectory() as name:
+            runs = {
+                "three-phase": [by_phases(scene, seed) for seed in seeds],
+                "paths": [by_paths(scene, options.paths, seed) for seed in seeds],
+                "`rtrace`": [by_radiance(scene, Path(name)) for _ in seeds],
+            }
+        ours = pooled(runs["three-phase"])[0].mean()
+        for who, values in runs.items():
+            mean, error = pooled(values)
+            cells = (f"{m:.1f} ({100 * e:.1f} %)" for m, e in zip(mean, error, strict=True))
+            ratio = f"{ours / mean.mean():.3f}"
+            print(f"| {space.label} | {lent} | {who} | {', '.join(cells)} | {ratio} |", flush=True)
 
 
 if __name__ == "__main__":
