@@ -8,6 +8,8 @@ from collections.abc import Iterable
 
 PEERS = "pip install -c constraints.txt '.[peers,distributed]' (`make test` does)"
 BRINGS_IN = [  # what a reason looks like, and what would bring its tests in
+    (r"nbclient", "pip install '.[notebooks]'"),
+    (r"axe-core", "npm install axe-core in a folder elsewhere, and AXE_CORE=.../axe.min.js"),
     (r"\.\./shared/data", "a folder ../shared/data with real IFC, EPW, BSDF and HDR files"),
     (r"\.\./shared/reference", "a folder ../shared/reference with results of EnergyPlus and "
                                "ASHRAE 140's example programs"),
@@ -16,8 +18,6 @@ BRINGS_IN = [  # what a reason looks like, and what would bring its tests in
     (r"pywincalc|the engine failed", f"{PEERS}; pywincalc has wheels for Python up to 3.12"),
     (r"pyenergyplus|EnergyPlus", PEERS),
     (r"distributed", PEERS),
-    (r"nbclient", "pip install '.[notebooks]'"),
-    (r"axe-core", "npm install axe-core in a folder elsewhere, and AXE_CORE=.../axe.min.js"),
     (r"Chromium", "a Chromium on the path (Debian: apt-get install chromium)"),
     (r"no disk can be mounted", "running as root where a small file system can be mounted"),
     (r"no LLVM 14 to 16", "an LLVM 14 to 16 beside the good one, and AVX-512"),
