@@ -6,8 +6,6 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from bim.building_file import is_ifc
-from bim.ifc.corrections import OPEN
 from scenes.room.options import RoomOptions
 
 
@@ -48,5 +46,9 @@ class JobOptions(BuildingOptions):
     @property
     def joined(self) -> tuple[str, ...]:
         """The rooms to make one: with light between rooms, those open by more than a door too."""
-        by_size = self.inner_glass and self.building is not None and is_ifc(self.building)
-        return (*self.join, OPEN) if by_size else self.join
+        from bim.building_file import is_ifc  # the help does without what readers load
+        from bim.ifc.corrections import OPEN
+
+        if not (self.inner_glass and self.building is not None and is_ifc(self.building)):
+            return self.join
+        return (*self.join, OPEN)
