@@ -1,11 +1,12 @@
-r"""CIE 171:2006, tests 5.9 to 5.13: every method against an independent quadrature.
+r"""CIE 171:2006, tests 5.9 to 5.14: every method against an independent quadrature.
 
     python -m scenes.evidence.validation.cie171 [--figures FILE.tsv] [--tests 5.9 5.11] \
         [--methods paths five-phase] [--glass klems exact] [--json FILE]
 
 A black room of 4 x 4 x 3 m under five standard skies: roof and facade openings, with and without
-a pane of 6 mm, and a facade opening under a shelf.  Judge is `cie171_quadrature`, which has neither
-patches nor paths; `--figures` gives what the report's own figures deviate from it.
+a pane of 6 mm, and a facade opening under a shelf or opposite a wall.  Judge is
+`cie171_quadrature`, which has neither patches nor paths; `--figures` gives what the report's own
+figures deviate from it.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ def summary(found: Array, grazing: Array) -> dict[str, float]:
 
 def figures_against_quadrature(file: Path) -> None:
     """Print what the report's figures deviate from the quadrature."""
-    known = {(case.name, case.shelf): case for case in cases()}
+    known = {(case.name, case.parameter): case for case in cases()}
     for name, parameter, kind, values in reported(file):
         case = known.get((name, parameter))
         if case is not None:

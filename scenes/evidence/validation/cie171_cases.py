@@ -1,4 +1,4 @@
-"""CIE 171:2006, tests 5.9 to 5.13: room, openings, sensors, and their light by quadrature."""
+"""CIE 171:2006, tests 5.9 to 5.14: room, openings, sensors, and their light by quadrature."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from scenes.evidence.validation.cie171_quadrature import (
     Array,
     Opening,
     Overhang,
+    Wall,
     horizontal_illuminance,
     pane_transmittance,
     sensor_light,
@@ -31,6 +32,8 @@ SKIES = (1, 5, 8, 12, 16)
 SUN = np.array([0.0, 0.5, np.sqrt(0.75)])  # 60 degrees high, in the plane of symmetry
 GRAZING = 75.0  # [degrees] incidence from which a sensor's light counts as grazing
 WIDE = 40.0  # [m] of what has no end; more makes the tracer's offsets from surfaces larger
+AWAY = 6.0  # [m] from the facade to the wall outdoors
+ROWS = 25  # heights of that wall with a luminance; linear between them
 LOW, HIGH = 0.25, 2.75  # [m] of the lowest and the highest sensor on a wall
 UP, DOWN, INTO = ((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 
@@ -43,13 +46,19 @@ class Case:
     opening: Opening
     glass: bool = False
     shelf: float | None = None  # [m] depth of the overhang
+    wall: float | None = None  # [m] height of the wall outdoors
     points: Array = field(default_factory=lambda: np.empty((0, 3)))  # [S, 3]
     normals: Array = field(default_factory=lambda: np.empty((0, 3)))  # [S, 3]
 
     @property
     def label(self) -> str:
         """The name, with the parameter that it has."""
-        return self.name if self.shelf is None else f"{self.name} of {self.shelf:g} m"
+        return self.name if self.parameter is None else f"{self.name} of {self.parameter:g} m"
+
+    @property
+    def parameter(self) -> float | None:
+        """What the report varies in the test [m]."""
+        return self.wall if self.shelf is None else self.shelf
 
     @property
     def overhang(self) -> Overhang | None:
@@ -64,8 +73,8 @@ class Case:
         return WindowGroup("opening", (WindowSurface("opening", triangles),))
 
     def exterior(self) -> Surfaces:
-        """The black facade and the shelf; nothing in the other tests."""
-        if self.shelf is None:
+        """The black facade with the shelf or the wall before it; nothing in the other tests."""
+        if self.parameter is None:
             return Surfaces.none()
         left, right = -WIDE, WIDE + WIDTH
         sill, top = self.opening.corner[2], self.opening.corner[2] + self.opening.up[2]
@@ -76,8 +85,12 @@ class Case:
             [(a, DEPTH, low), (b, DEPTH, low), (b, DEPTH, high), (a, DEPTH, high)]
             for a, b, low, high in walls
         ]
-        edge = DEPTH + self.shelf
-        quads.append([(x, y, HEIGHT) for x, y in _around(left, right, DEPTH, edge)])
+        if self.shelf is not None:
+            around = _around(left, right, DEPTH, DEPTH + self.shelf)
+            quads.append([(x, y, HEIGHT) for x, y in around])
+        if self.wall is not None:
+            around = _around(left, right, 0.0, self.wall)
+            quads.append([(x, DEPTH + AWAY, z) for x, z in around])
         triangles = np.array([[q[i] for i in t] for q in quads for t in ((0, 1, 2), (0, 2, 3))])
         surface = np.repeat(np.arange(len(quads)), 2)
         reflectance = np.where(surface == len(quads) - 1, GROUND, 0.0)
@@ -95,12 +108,17 @@ class Case:
         """Illuminance of the sensors [S] in per cent of that of the ground outdoors."""
         whole, shelf = ground_light(kind), self.overhang
         tau = (lambda cosine: pane_transmittance(cosine, GLASS)) if self.glass else None
+        wall = None if self.wall is None else _wall_light(kind, self.wall)
         found = []
         for point, normal in zip(self.points, self.normals, strict=True):
 
             def outdoors(way: Array, point: Array = point) -> Array:
                 sky = sky_luminance(kind, way, SUN) / whole
                 luminance = np.where(way[..., 2] > 0, sky, GROUND / np.pi)
+                if wall is not None:
+                    height = point[2] + way[..., 2] / way[..., 1] * (DEPTH + AWAY - point[1])
+                    on_it = (height >= 0) & (height <= wall[0][-1])
+                    return np.where(on_it, np.interp(height, *wall), luminance)
                 if shelf is None:
                     return luminance
                 rise = np.maximum(way[..., 2], 1e-9)
@@ -117,7 +135,7 @@ class Case:
         return np.array(o.corner), np.array(o.right), np.array(o.up)
 
     def _edges(self, point: Array) -> tuple[float, ...]:
-        """Where the horizon and the shelf's edge lie in the opening, as shares of its height."""
+        """Where horizon, shelf and wall end in the opening, as shares of its height."""
         o = self.opening
         if o.up[2] == 0:
             return ()
@@ -126,6 +144,9 @@ class Case:
             to_edge = DEPTH + self.shelf - point[1]
             rise = (DEPTH - point[1]) / to_edge * (HEIGHT - point[2])
             heights.append(point[2] + rise)
+        if self.wall is not None:
+            slope = (self.wall - point[2]) / (DEPTH + AWAY - point[1])
+            heights.append(point[2] + slope * (DEPTH - point[1]))
         return tuple(float((z - o.corner[2]) / o.up[2]) for z in heights)
 
 
@@ -134,7 +155,7 @@ def _around(left: float, right: float, low: float, high: float) -> list[tuple[fl
 
 
 def cases() -> list[Case]:
-    """Tests 5.9 to 5.13 with all their sensors."""
+    """Tests 5.9 to 5.14 with all their sensors."""
     heights, depths = np.arange(HIGH, 0, -0.5), np.arange(0.25, DEPTH, 0.5)
     wall = [((2.0, 0.0, z), INTO) for z in heights]
     floor = [((2.0, y, 0.0), UP) for y in depths]
@@ -154,6 +175,8 @@ def cases() -> list[Case]:
     hole = Opening((3, DEPTH, 1), (-2, 0, 0), (0, 0, 1))
     for depth in (0.5, 2.0):
         found.append(_case("5.13 facade 2x1, overhang", hole, floor, shelf=depth))
+    for high in (3.0, 6.0, 9.0):
+        found.append(_case("5.14 facade 2x1, wall 6 m away, height", hole, floor, wall=high))
     return sorted(found, key=lambda case: [int(n) for n in case.name.split()[0].split(".")])
 
 
@@ -163,11 +186,25 @@ def ground_light(kind: int) -> float:
     return horizontal_illuminance(kind, SUN)
 
 
+@cache
+def _wall_light(kind: int, height: float) -> tuple[Array, Array]:
+    """Heights [m] and luminances of the wall outdoors, for an illuminance of 1 on the ground."""
+    heights = np.linspace(0.0, height, ROWS)
+    wall = Wall(HEIGHT, AWAY, GROUND)
+    return heights, wall.luminance(kind, SUN, GROUND, heights)
+
+
 def _case(
-    name: str, hole: Opening, sensors: list, glass: bool = False, shelf: float | None = None
+    name: str,
+    hole: Opening,
+    sensors: list,
+    glass: bool = False,
+    *,
+    shelf: float | None = None,
+    wall: float | None = None,
 ) -> Case:
     points, normals = (np.array([s[i] for s in sensors], dtype=float) for i in (0, 1))
-    return Case(name, hole, glass, shelf, points, normals)
+    return Case(name, hole, glass, shelf, wall, points, normals)
 
 
 def cie_sky(subdivision: int) -> AnnualSky:

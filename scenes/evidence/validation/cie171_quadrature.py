@@ -19,6 +19,7 @@ GRADATION = {1: (4.0, -0.7), 5: (0.0, -1.0), 8: (0.0, -1.0), 12: (-1.0, -0.32), 
 INDICATRIX = {1: (0.0, -1.0, 0.0), 5: (0.0, -1.0, 0.0), 8: (10.0, -3.0, 0.45)}
 INDICATRIX |= {12: (10.0, -3.0, 0.45)}
 CELLS, NODES = 24, 6  # of each side of each part of an opening; Gauss' points of a cell
+WALL_NODES = 60  # Gauss' points of each angle at which a wall outdoors sees
 INDEX = 1.52  # of the glass, where only its transmittance is stated
 
 
@@ -52,6 +53,48 @@ class Overhang:
         A wall below a shelf takes away (1 - x / sqrt(x^2 + h^2)) / 2 of what lies under it.
         """
         return self.reflectance * 0.5 * (1 + out / np.hypot(out, self.height))
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """An endless wall before a black facade, both on the ground, lit by sky and ground."""
+
+    facade: float  # [m] height of the facade
+    distance: float  # [m] from the facade
+    reflectance: float
+
+    def luminance(self, kind: int, sun: Array, ground: float, heights: Array) -> Array:
+        """Luminance at heights [m] under a sky, for an illuminance of 1 on the ground.
+
+        E(z) = integral of L(p, g) cos(g)^2 cos(p) dg dp over the directions before the wall, by
+        their profile angle p and the angle g off the section, less what the facade hides.
+
+        Args: ground: reflectance of the ground, which all of the sky lights.
+        """
+        whole = horizontal_illuminance(kind, sun)
+
+        def sky(ways: Array) -> Array:
+            return sky_luminance(kind, ways, sun) / whole
+
+        lit = [self._illuminance(sky, ground / np.pi, at) for at in heights]
+        return self.reflectance / np.pi * np.array(lit)
+
+    def _illuminance(self, sky: Callable[[Array], Array], ground: float, z: float) -> float:
+        top, foot = np.arctan2(self.facade - z, self.distance), np.arctan2(-z, self.distance)
+        parts = [(-np.pi / 2, foot, False), (max(top, 0.0), np.pi / 2, True)]
+        if top < 0:
+            parts.append((top, 0.0, False))  # the ground behind what the facade hides
+        x, w = np.polynomial.legendre.leggauss(WALL_NODES)
+        side, w_side = np.pi / 2 * x, np.pi / 2 * w
+        total = 0.0
+        for low, high, is_sky in parts:
+            profile, w_profile = 0.5 * (low + high + (high - low) * x), 0.5 * (high - low) * w
+            cos_p, cos_g = np.cos(profile)[:, None], np.cos(side)
+            level = [np.broadcast_to(np.sin(side), cos_p.shape[:1] + side.shape), -cos_g * cos_p]
+            ways = np.stack([*level, cos_g * np.sin(profile)[:, None]], axis=-1)
+            seen = sky(ways) if is_sky else np.full(ways.shape[:2], ground)
+            total += float(w_profile @ (seen * cos_g**2 * cos_p) @ w_side)
+        return total
 
 
 def sky_luminance(kind: int, directions: Array, sun: Array) -> Array:
