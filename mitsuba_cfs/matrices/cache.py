@@ -10,8 +10,10 @@ import hashlib
 import logging
 import os
 import sys
+import time
 import zipfile
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 
@@ -149,6 +151,21 @@ class CacheEntry:
                 self.cache.trim(keep=self.path)
         except (OSError, DataError) as error:
             log.warning("the matrix is not kept: %s", error)
+
+
+def kept_or_found(
+    entry: CacheEntry | None, find: Callable[[], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """A matrix that is found in one go: the one that is kept, else it is found and kept."""
+    kept = None if entry is None else entry.load()
+    if kept is not None and kept.finished:
+        return kept.mean
+    start = time.monotonic()
+    found = find()
+    if entry is not None:
+        none, seconds = np.zeros_like(found), time.monotonic() - start
+        entry.save(BatchMean(1, found, none, none[..., 0], seconds, finished=True))
+    return found
 
 
 def digest(*values: object) -> str:

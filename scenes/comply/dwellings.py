@@ -37,7 +37,7 @@ def asked_of_each(
 
     def asked(number: int, verdict: RoomVerdict, dwelling: str) -> bool:
         over = verdict.criterion.over
-        if over == "room of each dwelling":
+        if over == OF_DWELLING:
             return (number, dwelling) not in having
         return over != "no building"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from bim.model import Space
 from bim.sensors import view_point
 from bim.to_thermal import ThermalRoom
-from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache
+from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.estimate import cache_entry
 from mitsuba_cfs.trace.view_factors import person_view_factors, view_factors
@@ -60,18 +59,14 @@ def _view_factors(
     inputs = (parts, place, facing, samples, seed)
     label, by = "view factors", view_factors.__module__
     entry = cache_entry(cache, label, *inputs, by=by, stopping=None)
-    kept = entry.load() if entry is not None else None
-    if kept is not None and kept.finished:
-        return kept.mean[:-1], kept.mean[-1]
-    start = time.monotonic()
-    among = view_factors(parts, samples=samples, seed=seed)
-    person = person_view_factors(parts, place, facing, samples=samples, seed=seed)
-    if entry is not None:
-        rows = np.vstack([among, person])
-        none = np.zeros_like(rows)
-        seconds = time.monotonic() - start
-        entry.save(BatchMean(1, rows, none, none[:, 0], seconds, finished=True))
-    return among, person
+
+    def traced() -> FloatArray:
+        among = view_factors(parts, samples=samples, seed=seed)
+        person = person_view_factors(parts, place, facing, samples=samples, seed=seed)
+        return np.vstack([among, person])
+
+    rows = kept_or_found(entry, traced)
+    return rows[:-1], rows[-1]
 
 
 def enclosure(space: Space, room: ThermalRoom) -> Surfaces:

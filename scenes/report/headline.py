@@ -113,18 +113,7 @@ def _spatial_autonomy(room: RoomYear) -> Card | None:
         else (POOR, "below the 55 % of LM-83")
     )
     words = said("of the work plane has 300 lx of daylight for at least half of the occupied hours")
-    meaning = quantity("sda300_50").meaning
-    return Card(
-        said("Spatial daylight autonomy"),
-        percent(value),
-        "%",
-        words,
-        said(verdict),
-        grade,
-        meaning,
-        value,
-        traced=True,
-    )
+    return _of_plane(value, said("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict))
 
 
 def _sunlight(room: RoomYear) -> Card | None:
@@ -135,17 +124,17 @@ def _sunlight(room: RoomYear) -> Card | None:
         (GOOD, "within the 10 % of LM-83") if value <= 10 else (POOR, "above the 10 % of LM-83")
     )
     words = said("of the work plane gets direct sun over 1000 lx in more than 250 hours a year")
-    meaning = quantity("ase1000_250").meaning
+    return _of_plane(
+        value, said("Annual sunlight exposure"), words, "ase1000_250", (grade, verdict)
+    )
+
+
+def _of_plane(value: float, label: str, words: str, key: str, judged: tuple[str, str]) -> Card:
+    """A share of the work plane [%], its grade and verdict; key: of its quantity."""
+    grade, verdict = judged
+    meaning = quantity(key).meaning
     return Card(
-        said("Annual sunlight exposure"),
-        percent(value),
-        "%",
-        words,
-        said(verdict),
-        grade,
-        meaning,
-        value,
-        traced=True,
+        label, percent(value), "%", words, said(verdict), grade, meaning, value, traced=True
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache
+from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 
@@ -16,19 +16,11 @@ def kept_sun(weather: Weather, model: str, cache: MatrixCache | None) -> NDArray
     The Solar Position Algorithm and the library that brings it take half a second, which a study
     whose matrices are kept would spend on little else.
     """
-    if cache is None:
-        return sun_directions(weather, model=model)
     place = (weather.latitude_deg, weather.longitude_deg, weather.timezone_h, weather.elevation_m)
     air = (weather.pressure_pa, weather.dry_bulb_c)
     times = np.asarray(weather.midpoints.asi8)
-    entry = cache.entry(
+    entry = None if cache is None else cache.entry(
         "sun directions", *place, weather.turned_deg, model, times, *air,
         by=sun_directions.__module__,
     )  # fmt: skip
-    kept = entry.load()
-    if kept is not None and kept.finished:
-        return kept.mean
-    found = sun_directions(weather, model=model)
-    none = np.zeros_like(found)
-    entry.save(BatchMean(1, found, none, none[:, 0], 0.0, finished=True))
-    return found
+    return kept_or_found(entry, lambda: sun_directions(weather, model=model))
