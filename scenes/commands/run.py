@@ -13,9 +13,11 @@ from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
     building_options,
+    height_option,
     method_option,
     named_settings,
     size_option,
+    spacing_option,
     u_option,
 )
 from scenes.room.options import RoomOptions
@@ -35,14 +37,8 @@ _DEFAULT = RoomOptions()
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
 @size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
-@click.option(
-    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.grid.spacing,
-    show_default=True, help="Sensor spacing [m].",
-)  # fmt: skip
-@click.option(
-    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.grid.height,
-    show_default=True, help="Work plane above the floor [m].",
-)  # fmt: skip
+@spacing_option
+@height_option
 @click.option(
     "--ach", "infiltration_ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
     show_default=True, help="Outdoor air changes [1/h].",
@@ -64,6 +60,10 @@ _DEFAULT = RoomOptions()
     "--explore", is_flag=True,
     help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
 )  # fmt: skip
+@click.option(
+    "--netcdf", is_flag=True,
+    help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
+)  # fmt: skip
 def command(
     building: Path,
     *,
@@ -83,6 +83,7 @@ def command(
     inner_glass: bool,
     no_coupled_heat: bool,
     explore: bool,
+    netcdf: bool,
     quick: bool,
     page: Path | None,
     settings: tuple[str, ...],
@@ -104,7 +105,7 @@ def command(
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,
-        coupled_heat=not no_coupled_heat,
+        coupled_heat=not no_coupled_heat, netcdf=netcdf,
         u_value=u_value, g_value=g_value, surroundings=surroundings,
         surroundings_offset=surroundings_offset,
     )  # fmt: skip
@@ -143,7 +144,8 @@ def run_to_folder(options: JobOptions, out: Path, page: Path | None = None) -> N
         )  # fmt: skip
         progress("results", 0.0)
         report = partial(write_report, page=page_options)
-        write_results(result, folder, report, write_explorer if options.explore else None)
+        explorer = write_explorer if options.explore else None
+        write_results(result, folder, report, explorer, netcdf=options.netcdf)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:
