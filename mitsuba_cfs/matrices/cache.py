@@ -180,7 +180,7 @@ def digest(*values: object) -> str:
     """
     state = hashlib.sha256()
     for value in values:
-        if _is_record(value):
+        if is_dataclass(value) and not isinstance(value, type):
             state.update(b"record;" + _kept_hash(value))
         else:
             _feed(state, value)
@@ -204,16 +204,12 @@ def _kept_hash(value: object) -> bytes:
 _last_hashed: OrderedDict[int, tuple[object, bytes]] = OrderedDict()
 
 
-def _is_record(value: object) -> bool:
-    return is_dataclass(value) and not isinstance(value, type)
-
-
 def _feed(state: hashlib._Hash, value: object) -> None:
     """Add a value with its type and size, so that no two different inputs look alike."""
     if isinstance(value, np.ndarray):
         state.update(f"array {value.dtype.str} {value.shape};".encode())
         state.update(np.ascontiguousarray(value).tobytes())
-    elif _is_record(value):
+    elif is_dataclass(value) and not isinstance(value, type):
         state.update(f"{type(value).__qualname__} {len(fields(value))};".encode())
         for field in fields(value):
             _feed(state, getattr(value, field.name))
