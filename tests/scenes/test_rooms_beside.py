@@ -12,13 +12,15 @@ import pytest
 from bim.model import Building, Space
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError, RoomError
+from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.room.options import RoomOptions
 from scenes.run import rooms as series
 from scenes.run.job import JobInputs
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import Workers
-from scenes.run.run import run_inputs
+from scenes.run.run import run_inputs, run_job
+from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, ROOM, SMALL
 from tests.scenes.test_equal_rooms import moved
 
@@ -103,3 +105,30 @@ def test_two_processes_give_what_one_gives(variant, weather, glass):
         np.testing.assert_array_equal(mine.heat.air_c, theirs.heat.air_c)
         (picture,), (same,) = mine.glare.pictures, theirs.glare.pictures
         np.testing.assert_array_equal(picture.luminance, same.luminance)
+
+
+@pytest.mark.slow
+def test_workers_of_a_cluster_give_what_one_process_gives(variant, tmp_path_factory):
+    """They read the files for themselves; a scheduler that is asked twice gives the same."""
+    pytest.importorskip("distributed")
+    from tests.scenes.test_study_cluster import Cluster
+
+    room = RoomOptions.of(
+        sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256,
+        picture_size=64, picture_count=1, picture_samples=1,
+    )  # fmt: skip
+    building = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
+    options = JobOptions(building, WEATHER, VENETIAN_BLIND, cache=False, room=room)
+    cluster = Cluster(tmp_path_factory.mktemp("dask"), 2)
+    try:
+        runs = [run_job(options), run_job(options, workers=Workers(1, cluster.address))]
+        reseeded = replace(options, room=room.changed(seed=1))
+        other = run_job(reseeded, workers=Workers(1, cluster.address))
+    finally:
+        cluster.stop()
+    one, two = runs
+    assert len(one.spaces) == len(two.spaces) == 2
+    for mine, theirs, seeded in zip(one.spaces, two.spaces, other.spaces, strict=True):
+        np.testing.assert_array_equal(mine.daylight.illuminance, theirs.daylight.illuminance)
+        np.testing.assert_array_equal(mine.heat.air_c, theirs.heat.air_c)
+        assert not np.array_equal(seeded.daylight.illuminance, mine.daylight.illuminance)
