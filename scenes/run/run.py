@@ -10,8 +10,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import TypeVar
 
-from bim.account import NOT_USABLE
-from bim.model import JOINED, Building, Problem, Space
+from bim.model import Building, Problem, Space
+from bim.sensors import held_grids
 from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -31,18 +31,19 @@ from scenes.room.equal_rooms import moved_light, moved_result
 from scenes.room.heated import DaylitRoom, coupled_years
 from scenes.room.inner_glass import lending_rooms, opened
 from scenes.room.operation import Operation, check_states
+from scenes.room.operation_hours import check_schedules
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import skies_for
 from scenes.room.room_year import compute_room, lit_room
+from scenes.room.stated_use import stated_note, used_operation
 from scenes.run.building import read_building
 from scenes.run.files import JobFiles, read_files
 from scenes.run.inputs import chosen_spaces, sha256
+from scenes.run.notes import model_notes, site_notes
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 
 R = TypeVar("R")
-FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
-
 
 OnLight = Callable[[DaylitRoom], None]  # called with each room's light where its heat comes later
 OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
@@ -58,6 +59,8 @@ class JobInputs:
     weather: Weather
     systems: Mapping[str, States]  # by window GUID
     operation: Operation | None
+    stated: tuple[str, ...] = ()  # what of the operation is the building's file's, in words
+    several: tuple[str, ...] = ()  # first states of windows that have more, which are not used
 
 
 def run_job(
@@ -123,8 +126,8 @@ def run_inputs(
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
         *([NOTE] if options.quick else []),
-        *_account_notes(building),
-        *(f"{p.what}: {p.consequence}." for p in building.problems if p.kind == JOINED),
+        *model_notes(building),
+        *inputs.stated,
         *source_notes(used_sources(inputs)),
         *(note for system in used for note in system.notes),
         *thermal_notes,
@@ -133,7 +136,7 @@ def run_inputs(
         *(result.borrowed for result in results if result.borrowed),
         *(f"{hole.what}: {hole.consequence}." for hole in holes),
         *weather.notes,
-        *_site_notes(building, weather),
+        *site_notes(building, weather),
     ]
     return RunResult(
         building,
@@ -190,8 +193,16 @@ def job_inputs(
     systems = fill_windows(windows, files.given, building.file)
     if operation is not None:
         check_states(operation, max(len(states) for states in systems.values()))
+    several = ()
+    if operation is None:  # the building's file says how rooms are used, not how shades move
+        several = tuple(states[0].name for states in systems.values() if len(states) > 1)
+        systems = {guid: states[:1] for guid, states in systems.items()}
+    stated = stated_note(building, "" if operation is None else operation.file.name)
+    used = used_operation(operation, building)
+    if used is not None and used is not operation:
+        check_schedules(used.tables, weather, used.file)
     building = traced_building(building, systems)
-    return JobInputs(building, spaces, weather, systems, operation)
+    return JobInputs(building, spaces, weather, systems, used, stated, several)
 
 
 def used_systems(inputs: JobInputs) -> list[FenestrationSystem]:
@@ -297,7 +308,10 @@ def _series(
         move,
         options.building,
         lambda one, other: (
-            not borrows(one, other) and _operated_alike(inputs, one, other) and alike(one, other)
+            not borrows(one, other)
+            and not any(held_grids(inputs.building, space) for space in (one, other))
+            and _operated_alike(inputs, one, other)
+            and alike(one, other)
         ),
     )
 
@@ -323,7 +337,7 @@ def _manifest(
         files["system"] = options.system
         for i, path in enumerate(files_beside(options.system)):
             files[f"system_angular_{i}" if i else "system_thermal"] = path
-    if inputs.operation is not None:
+    if inputs.operation is not None and inputs.operation.file != options.building:
         files["operation"] = inputs.operation.file
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
     files |= {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
@@ -360,33 +374,12 @@ def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
     if inputs.operation is not None and inputs.operation.systems and options.system is not None:
         file = inputs.operation.file.name
         return (f"--cfs fills the windows: [[system]] of {file} is not used.",)
-    several = [states[0].name for states in inputs.systems.values() if len(states) > 1]
-    if inputs.operation is not None or not several:
+    several = () if options.operation is not None else inputs.several
+    if not several:
         return ()
     names = ", ".join(dict.fromkeys(several))
     held_by = inputs.building.name if options.building is None else options.building.name
     return (
         f"{held_by} holds several shading states; without --operation the first of "
         f"each window ({names}) holds all year.",
-    )
-
-
-def _account_notes(building: Building) -> tuple[str, ...]:
-    """Why the model will not do, where that is so."""
-    account = building.account
-    return account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
-
-
-def _site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
-    """A sentence where building and weather lie far apart."""
-    if building.latitude_deg is None or building.longitude_deg is None:
-        return ()
-    north = building.latitude_deg - weather.latitude_deg
-    east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
-    if max(abs(north), abs(east)) <= FAR_SITE_DEG:
-        return ()
-    return (
-        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
-        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
-        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
     )
