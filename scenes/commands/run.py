@@ -190,11 +190,23 @@ class _RoomLines:
         """Print those of a room's light."""
         self._lit.add(room.space.guid)
         click.echo(f"{room.space.label}: {_light_figures(room)}")
+        _print_grids(room)
 
     def year(self, room) -> None:
         """Print those of its heat, and of its light where that was not said."""
         said = room.space.guid in self._lit
         click.echo(f"{room.space.label}: {_heat_figures(room)}" if said else summary_line(room))
+        if not said:
+            _print_grids(room)
+
+
+def _print_grids(room) -> None:
+    """A line for each sensor grid of the building's file."""
+    for grid in room.daylight.grids:
+        click.echo(
+            f"{room.space.label}: grid {grid.name}, {len(grid.sensor_metrics)} sensors: "
+            f"mean DA {grid.metrics['da300']:.0f} %, sDA {grid.metrics['sda300_50']:.0f} %"
+        )
 
 
 def summary_line(room) -> str:

@@ -14,6 +14,8 @@ from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.room.drawn_shades import traced_building
 from scenes.room.inner_glass import lending_rooms, opened
 from scenes.room.operation import Operation, check_states
+from scenes.room.operation_hours import check_schedules
+from scenes.room.stated_use import stated_note, used_operation
 from scenes.run.building import read_building
 from scenes.run.files import JobFiles, read_files
 from scenes.run.inputs import chosen_spaces
@@ -29,6 +31,8 @@ class JobInputs:
     weather: Weather
     systems: Mapping[str, States]  # by window GUID
     operation: Operation | None
+    stated: tuple[str, ...] = ()  # what of the operation is the building's file's, in words
+    several: tuple[str, ...] = ()  # first states of windows that have more, which are not used
 
 
 def read_inputs(
@@ -74,8 +78,16 @@ def job_inputs(
     systems = fill_windows(windows, files.given, building.file)
     if operation is not None:
         check_states(operation, max(len(states) for states in systems.values()))
+    several = ()
+    if operation is None:  # the building's file says how rooms are used, not how shades move
+        several = tuple(states[0].name for states in systems.values() if len(states) > 1)
+        systems = {guid: states[:1] for guid, states in systems.items()}
+    stated = stated_note(building, "" if operation is None else operation.file.name)
+    used = used_operation(operation, building)
+    if used is not None and used is not operation:
+        check_schedules(used.tables, weather, used.file)
     building = traced_building(building, systems)
-    return JobInputs(building, spaces, weather, systems, operation)
+    return JobInputs(building, spaces, weather, systems, used, stated, several)
 
 
 def balanced_together(inputs: JobInputs, options: JobOptions) -> bool:

@@ -11,8 +11,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import TypeVar
 
-from bim.account import NOT_USABLE
-from bim.model import JOINED, Building, Problem, Space
+from bim.model import Building, Problem, Space
+from bim.sensors import held_grids
 from bim.to_thermal import same_surfaces
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -20,7 +20,6 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
-from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_file import files_beside
@@ -43,13 +42,12 @@ from scenes.run.job import (
     used_sources,
     used_systems,
 )
+from scenes.run.notes import model_notes, site_notes
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import RoomWork, Workers
 
 R = TypeVar("R")
-FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
-
 
 OnLight = Callable[[DaylitRoom], None]  # called with each room's light where its heat comes later
 OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
@@ -125,8 +123,8 @@ def run_inputs(
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
         *([NOTE] if options.quick else []),
-        *_account_notes(building),
-        *(f"{p.what}: {p.consequence}." for p in building.problems if p.kind == JOINED),
+        *model_notes(building),
+        *inputs.stated,
         *source_notes(used_sources(inputs)),
         *(note for system in used for note in system.notes),
         *thermal_notes,
@@ -135,7 +133,7 @@ def run_inputs(
         *(result.borrowed for result in results if result.borrowed),
         *(f"{hole.what}: {hole.consequence}." for hole in holes),
         *weather.notes,
-        *_site_notes(building, weather),
+        *site_notes(building, weather),
     ]
     return RunResult(
         building,
@@ -219,7 +217,10 @@ def _series(
         move,
         options.building,
         lambda one, other: (
-            not borrows(one, other) and _operated_alike(inputs, one, other) and alike(one, other)
+            not borrows(one, other)
+            and not any(held_grids(inputs.building, space) for space in (one, other))
+            and _operated_alike(inputs, one, other)
+            and alike(one, other)
         ),
         beside=None if workers is None else partial(work.beside, workers=workers),
     )
@@ -246,7 +247,7 @@ def _manifest(
         files["system"] = options.system
         for i, path in enumerate(files_beside(options.system)):
             files[f"system_angular_{i}" if i else "system_thermal"] = path
-    if inputs.operation is not None:
+    if inputs.operation is not None and inputs.operation.file != options.building:
         files["operation"] = inputs.operation.file
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
     files |= {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
@@ -283,33 +284,12 @@ def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
     if inputs.operation is not None and inputs.operation.systems and options.system is not None:
         file = inputs.operation.file.name
         return (f"--cfs fills the windows: [[system]] of {file} is not used.",)
-    several = [states[0].name for states in inputs.systems.values() if len(states) > 1]
-    if inputs.operation is not None or not several:
+    several = () if options.operation is not None else inputs.several
+    if not several:
         return ()
     names = ", ".join(dict.fromkeys(several))
     held_by = inputs.building.name if options.building is None else options.building.name
     return (
         f"{held_by} holds several shading states; without --operation the first of "
         f"each window ({names}) holds all year.",
-    )
-
-
-def _account_notes(building: Building) -> tuple[str, ...]:
-    """Why the model will not do, where that is so."""
-    account = building.account
-    return account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
-
-
-def _site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
-    """A sentence where building and weather lie far apart."""
-    if building.latitude_deg is None or building.longitude_deg is None:
-        return ()
-    north = building.latitude_deg - weather.latitude_deg
-    east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
-    if max(abs(north), abs(east)) <= FAR_SITE_DEG:
-        return ()
-    return (
-        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
-        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
-        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
     )
