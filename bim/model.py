@@ -7,6 +7,7 @@ one closed surface round the room's air: the room and the recesses of its window
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,7 +18,9 @@ from bim.account import Account
 from bim.colours import GREY, Colour
 from bim.fenestration import ShadingState
 from bim.georeference import Georeference
+from bim.held_sensors import HeldGrid, HeldView
 from bim.names import found_by_name, label_of
+from bim.use import StatedUse
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import Gloss
 
@@ -26,6 +29,7 @@ FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "revea
 BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
 JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
+NOT_USED = "not used"  # kind of a problem: what the file states and no result depends on
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
 
@@ -243,6 +247,9 @@ class Building:
     account: Account | None = None  # what of the file came through; None where there is no file
     georeference: Georeference | None = None  # where it lies on a map, as its file states it
     from_model: NDArray[np.float64] | None = None  # [4, 4] of its file's own axes [m] to these
+    uses: Mapping[str, StatedUse] = field(default_factory=dict)  # of rooms, by the space's GUID
+    grids: tuple[HeldGrid, ...] = ()  # sensors that the file holds
+    views: tuple[HeldView, ...] = ()  # that the file holds
 
     @property
     def windows(self) -> tuple[Window, ...]:

@@ -23,10 +23,11 @@ from scenes.results import RoomYear, RunResult
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.run.files import JobFiles
+from scenes.run.job import job_inputs
 from scenes.run.netcdf import year_dataset
 from scenes.run.options import JobOptions
 from scenes.run.outputs import write_results
-from scenes.run.run import job_inputs, run_inputs
+from scenes.run.run import run_inputs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

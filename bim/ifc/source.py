@@ -23,12 +23,11 @@ from bim.ifc.project import (
     site_location,
 )
 from bim.ifc.quantities import QuantityScales
-from bim.ifc.shapes import Shape, read_shapes
+from bim.ifc.shapes import NO_ELEMENTS, Shape, read_shapes
 from bim.ifc.transparent import judged_transparent
 from bim.model import Problem
 
 Progress = Callable[[str, float], None]
-NO_ELEMENTS = ("IfcSpace", "IfcOpeningElement", "IfcOpeningStandardCase")
 
 
 @dataclass(frozen=True, slots=True)

@@ -199,6 +199,16 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
     return {name: getattr(found, name) for name in table}
 
 
+processes_option = click.option(
+    "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
+    help="Rooms or cases at a time on this machine; one already uses most of its cores.",
+)  # fmt: skip
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS",
+    help="Dask scheduler whose workers compute them, such as tcp://host:8786.",
+)  # fmt: skip
+
+
 def samples_option(default: int, why: str) -> Option:
     """`--samples` of pictures; `why` they are that many by default."""
     return click.option(

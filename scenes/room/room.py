@@ -38,7 +38,7 @@ from scenes.results import (
 )
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.room.control import shading_states
-from scenes.room.daylight import room_daylight, room_scene
+from scenes.room.daylight import NO_SENSORS, HeldSensors, room_daylight, room_scene
 from scenes.room.envelope import enveloped
 from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
@@ -106,15 +106,16 @@ class RoomSimulation:
         cache: MatrixCache | None = None,
         grids: Sequence[SensorGrid] = (),
         inner: bool = False,
+        held: HeldSensors = NO_SENSORS,
         progress: Progress = silent,
     ) -> None:
-        """See `lit_room`; grids: of the sensors in place of the options' one."""
+        """See `lit_room`; grids: of the sensors in place of the options' one; held: beside them."""
         if operation is not None:
             operation = operation.of_room(building, space)
         self.building, self.space, self.weather, self.options = building, space, weather, options
         self.sampling, self.outputs = options.sampling, options.outputs
         self.operation, self.cache, self.progress = operation, cache, progress
-        self.grids = tuple(grids) or (options.grid,)
+        self.grids, self.held = tuple(grids) or (options.grid,), held
         self.skies = (
             skies_for(weather, options.method, options.sampling, cache, **options.sky)
             if skies is None
@@ -140,7 +141,8 @@ class RoomSimulation:
             self.windows,
             self.grids,
             self.outputs.picture_size,
-            self.inner,
+            inner=self.inner,
+            held=self.held,
         )
 
     @cached_property
@@ -192,7 +194,9 @@ class RoomSimulation:
         """Illuminance of the work plane and its metrics."""
         self.progress("daylight", 0.0)
         steps = part(self.progress, 0.9, 1.0, "daylight")
-        found = room_daylight(self.light, self.lit_state, self.weather, self.options.method, steps)
+        found = room_daylight(
+            self.light, self.lit_state, self.weather, self.options.method, steps, held=self.held
+        )
         self.progress("daylight", 1.0)
         return found
 
@@ -227,7 +231,8 @@ class RoomSimulation:
         """Every hour in every state."""
         names = [state.name for state in max(self.windows.systems, key=len)]
         steps = part(self.progress, 0.0, 1.0, "explorer")
-        return explored_room(self.light, self.state, names, steps)
+        sensors = len(self.daylight.points)
+        return explored_room(self.light, self.state, names, steps, sensors=sensors)
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
@@ -292,7 +297,8 @@ class RoomSimulation:
         tables = self.operation
         if tables is None or not self.space.windows:
             return None
-        if tables.control.rule != "glare" and not tables.gains.lighting_w_m2:
+        dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
+        if tables.control.rule != "glare" and not dimmed:
             return None
         return self.daylight.illuminance.mean(axis=1, dtype=float)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -14,7 +14,7 @@ from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from scenes.pictures import write_falsecolour
 from scenes.result_folder import ResultFolder
-from scenes.results import RoomYear, RunResult
+from scenes.results import GridDaylight, RoomYear, RunResult
 from scenes.room.daylight import illuminance_table
 from scenes.room.glare import glare_table
 from scenes.run.csv_text import csv_text
@@ -90,6 +90,7 @@ def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
     metrics["relative_standard_error"] = room.daylight.relative_error
     _csv(metrics, place / "daylight_metrics.csv")
     _csv(pd.DataFrame([room.daylight.room_metrics]), place / "room_metrics.csv", index=False)
+    _write_grids(room.daylight.grids, place)
     _csv(glare_table(room.glare, result.times), place / "dgp.csv")
     heat = room.heat
     _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
@@ -104,6 +105,22 @@ def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
         write_hdr(place / f"{name}.hdr", picture.luminance, room.glare.view)
         title = f"{result.times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
         write_falsecolour(place / f"{name}.png", picture.luminance, title=title)
+
+
+def _write_grids(grids: Sequence[GridDaylight], place: Path) -> None:
+    """Tables of the sensor grids of the building's file: one row a grid, one row a sensor."""
+    if not grids:
+        return
+    rows = [{"grid": g.name, "sensors": len(g.sensor_metrics)} | g.metrics for g in grids]
+    _csv(pd.DataFrame(rows), place / "grids.csv", index=False)
+    tables = []
+    for grid in grids:
+        table = grid.sensor_metrics.reset_index()
+        table.insert(0, "grid", grid.name)
+        for number, axis in enumerate("xyz"):
+            table.insert(5 + number, f"direction_{axis}", grid.directions[:, number])
+        tables.append(table)
+    _csv(pd.concat(tables), place / "grid_sensors.csv", index=False)
 
 
 def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:

@@ -11,8 +11,9 @@ from mitsuba_cfs.progress import silent
 from scenes import cli
 from scenes.demo import WEATHER
 from scenes.run.files import read_files
+from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
-from scenes.run.run import _manifest, read_inputs
+from scenes.run.run import _manifest
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.year import read_year
 from tests.conftest import REPOSITORY
