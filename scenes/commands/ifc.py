@@ -227,14 +227,17 @@ def export(
 def templates(out: Path) -> None:
     """Write the property set that windows hold as definitions for other programs.
 
-    An IFC library with its IfcPropertySetTemplate, and an IDS that checks models for it.
+    An IFC library with its IfcPropertySetTemplate, buildingSMART's PSD XML, and an IDS that checks
+    models for it.
     """
     folder = ResultFolder(out, "ifc templates")
+    from bim.ifc.property_definition import write_psd
     from bim.ifc.property_templates import write_ids, write_templates
 
     with folder.replaced() as place:
         write_templates(place / "fenestration_templates.ifc")
         write_ids(place / "fenestration.ids")
+        write_psd(place / "fenestration_psd.xml")
     click.echo(out)
 
 

@@ -107,6 +107,8 @@ class StudyFile(OperationTables):
     building: Path | None = None
     spaces: tuple[str, ...] = ()
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
+    surroundings: tuple[Path, ...] = ()  # files of what stands around
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     couple: bool = False  # heat flows through the walls between the rooms
     transfer: tuple[TransferTable, ...] = ()
     design: DesignTable | None = None  # loads of design days too
@@ -159,7 +161,9 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
         s.placed(here).model_copy(update={"bsdf": s.bsdf and _there(here, s.bsdf, path)})
         for s in study.system
     )
+    around = tuple(_there(here, name, path) for name in study.surroundings)
     found = {"weather": _there(here, study.weather, path), "system": systems}
+    found["surroundings"] = around
     if quick:
         given = study.trace.model_fields_set
         found["trace"] = study.trace.model_copy(update=picks(HEAT, given))
