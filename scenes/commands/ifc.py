@@ -14,6 +14,7 @@ import click
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
+from scenes.commands.bonsai import bonsai
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.room_options import (
     furniture_option,
@@ -39,7 +40,7 @@ PATTERNS = {  # of the files that an export writes
 UNCUT = 100_000  # columns of a table that nobody sees
 
 
-@click.group()
+@click.group(commands=[bonsai])
 def command() -> None:
     """What an IFC file holds, and what is wrong with it."""
 
