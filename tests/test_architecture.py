@@ -41,7 +41,7 @@ SOLVERS = tuple(
         "window_reflection",
     )
 )  # fmt: skip
-IFC = ("bim/ifc/", "scenes/demo/")
+IFC = ("bim/ifc/", "scenes/demo/", "scenes/evidence/validation/")
 PLOTTING = ("scenes/",)
 LIMITED = {
     "mitsuba": TRACING,

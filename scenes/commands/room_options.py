@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
+from mitsuba_cfs.sky.options import GROUNDS, SUBDIVISIONS, SUN_MODELS
 from scenes.commands.parameters import BUILDING_FILE, FILE
 from scenes.commands.quick_option import quick_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.room.options import GLARE_SOURCES, GLARE_SUN
+from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
 
 if TYPE_CHECKING:
     from scenes.heat.study_file import StudyFile
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 Study = TypeVar("Study", "StudyFile", "Grid")
 Option = Callable[[Callable], Callable]
+_GRID = SensorGrid()
 
 out_folder_option = click.option(
     "--out", required=True, type=click.Path(path_type=Path), help="Folder of results."
@@ -76,6 +77,18 @@ seed_option = click.option(
     default=0,
     show_default=True,
     help="Of the random numbers.",
+)  # fmt: skip
+spacing_option = click.option(
+    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_GRID.spacing,
+    show_default=True, help="Sensor spacing [m].",
+)  # fmt: skip
+height_option = click.option(
+    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_GRID.height,
+    show_default=True, help="Work plane above the floor [m].",
+)  # fmt: skip
+subdivision_option = click.option(
+    "-m", "--subdivision", type=click.Choice([str(mf) for mf in SUBDIVISIONS]), default="1",
+    show_default=True, help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
 )  # fmt: skip
 subdivide_option = click.option(
     "--subdivide", "window_parts", type=click.IntRange(0, 64), default=0, show_default=True,
@@ -200,6 +213,16 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
             table[name] = value  # a word needs no quotes
     found = validated(OptionsTable, table, Path("--set"))
     return {name: getattr(found, name) for name in table}
+
+
+processes_option = click.option(
+    "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
+    help="Rooms or cases at a time on this machine; one already uses most of its cores.",
+)  # fmt: skip
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS",
+    help="Dask scheduler whose workers compute them, such as tcp://host:8786.",
+)  # fmt: skip
 
 
 def samples_option(default: int, why: str) -> Option:

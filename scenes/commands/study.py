@@ -14,6 +14,8 @@ from scenes.commands.room_options import (
     method_option,
     out_folder_option,
     page_option,
+    processes_option,
+    scheduler_option,
     surroundings_offset_option,
     surroundings_option,
     with_flags,
@@ -30,11 +32,8 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
-@click.option(
-    "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
-    help="Cases at a time on this machine; one already uses all cores.",
-)  # fmt: skip
-@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, such as tcp://host:8786.")
+@processes_option
+@scheduler_option
 @method_option(["auto"], "auto: by cost and error, in place of the file's")
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
@@ -136,8 +135,8 @@ def _checked(
     from mitsuba_cfs.files import check_file
     from mitsuba_cfs.matrices.cache import default_folder
     from scenes.study.files import check_files, one_building
-    from scenes.study.schedule import check_dask
     from scenes.study.store import Store
+    from scenes.workers import check_dask
 
     store = Store(out, inputs=files)
     default_folder()  # of the cache, or one line that it cannot be one

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -35,6 +35,7 @@ class Card:
     meaning: str = ""
     meter: float | None = None  # 0..100, drawn as a bar
     traced: bool = False  # its error is that of the illuminances
+    worth: float = 0.0  # orders rooms by this figure: the more the better
 
 
 def cards(result: RunResult, room: RoomYear) -> tuple[Card, ...]:
@@ -113,7 +114,8 @@ def _spatial_autonomy(room: RoomYear) -> Card | None:
         else (POOR, "below the 55 % of LM-83")
     )
     words = said("of the work plane has 300 lx of daylight for at least half of the occupied hours")
-    return _of_plane(value, said("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict))
+    card = _of_plane(value, said("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict))
+    return replace(card, worth=value)
 
 
 def _sunlight(room: RoomYear) -> Card | None:
@@ -124,9 +126,8 @@ def _sunlight(room: RoomYear) -> Card | None:
         (GOOD, "within the 10 % of LM-83") if value <= 10 else (POOR, "above the 10 % of LM-83")
     )
     words = said("of the work plane gets direct sun over 1000 lx in more than 250 hours a year")
-    return _of_plane(
-        value, said("Annual sunlight exposure"), words, "ase1000_250", (grade, verdict)
-    )
+    label = said("Annual sunlight exposure")
+    return replace(_of_plane(value, label, words, "ase1000_250", (grade, verdict)), worth=-value)
 
 
 def _of_plane(value: float, label: str, words: str, key: str, judged: tuple[str, str]) -> Card:
@@ -187,6 +188,7 @@ def _provision(room: RoomYear) -> Card | None:
         grade,
         q.meaning,
         traced=True,
+        worth=index,
     )
 
 
@@ -214,6 +216,7 @@ def _glare(result: RunResult, room: RoomYear) -> Card | None:
         grade,
         quantity("dgp").meaning,
         min(100 * dgp, 100),
+        worth=-dgp,
     )
 
 
@@ -222,17 +225,27 @@ def _protection(room: RoomYear) -> Card | None:
     if room.annual_glare is None or not occupied(room).any():
         return None
     dgp = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
-    level = protection_level(dgp)
-    grade = {"high": GOOD, "medium": GOOD, "minimum": FAIR}.get(level, POOR)
     words = said(
         "protection from glare by EN 17037: DGP is above {dgp} in no more than 5 % of the occupied "
         "hours",
         dgp=rounded(hour_not_exceeded(dgp), 2),
     )
+    return protection_card(protection_level(dgp), words, -hour_not_exceeded(dgp))
+
+
+def protection_card(level: str, words: str = "", worth: float | None = None) -> Card:
+    """EN 17037's protection from glare by its level: high, medium, minimum or none."""
+    order = ("none", "minimum", "medium", "high").index(level)
     verdict = said("above 0.45" if level == "none" else f"{level}: at most {PROTECTION[level]}")
-    meaning = quantity("dgp").meaning
     return Card(
-        said("Protection from glare"), said(level.capitalize()), "", words, verdict, grade, meaning
+        said("Protection from glare"),
+        said(level.capitalize()),
+        "",
+        words,
+        verdict,
+        (POOR, FAIR, GOOD, GOOD)[order],
+        quantity("dgp").meaning,
+        worth=float(order) if worth is None else worth,
     )
 
 

@@ -161,7 +161,8 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     rooms += said(", {count} more in the file", count=others) if others > 0 else ""
     rows.append((said("Rooms"), rooms))
     account = building.account
-    return (*rows, *(account.facts if account is not None else ()))
+    facts = account.facts if account is not None else ()
+    return (*rows, *((title, prose(text)) for title, text in facts))
 
 
 def comparison(result: RunResult, rooms) -> tables.Table | None:

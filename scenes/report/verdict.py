@@ -8,13 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.language.catalogue import decimal, month_name, said
+from scenes.language.catalogue import month_name, said
 from scenes.report.glare_figures import sun_words
 from scenes.report.headline import WARM_C, Card, heated, occupied
-from scenes.report.numbers import counted, percent, rounded, share, significant
-from scenes.report.tables import Column, Table, glare_class, spoken, step_hours
+from scenes.report.limits import LimitTables, limits, plus_minus
+from scenes.report.numbers import counted, percent, rounded, significant
+from scenes.report.tables import glare_class, spoken, step_hours
 from scenes.results import ExploredRoom, LuminancePicture, RoomYear, RunResult
 
+MOST_NAMES = 4  # of systems in the first sentence, of rooms in that on shading
 LIT_LX = 300.0  # illuminance of daylight autonomy
 # DGP is BY_LIGHT times the illuminance at the eye, a term of the sources, and NO_LIGHT
 BY_LIGHT, NO_LIGHT = 5.87e-5, 0.159
@@ -26,7 +28,7 @@ class Verdict:
 
     asked: str
     sentences: tuple[tuple[str, str], ...]  # heading, text
-    limits: Table
+    limits: LimitTables
 
 
 def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
@@ -35,14 +37,15 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
     Args: cards: the headline figures of each room.
     """
     names = [room.space.label for room in result.spaces]
-    systems = [f"“{one['system']}”" for one in result.manifest.get("fenestration", ())]
+    used = result.manifest.get("fenestration", ())
+    systems = list(dict.fromkeys(f"“{one['system']}”" for one in used))
     asked = said(
         "Daylight, glare and temperatures of {rooms} of {building} in a year of {weather}, with "
         "{systems}, by the {method} method.",
         rooms=names[0] if len(names) == 1 else counted(len(names), "room"),
         building=result.building.name or said("the building"),
         weather=result.manifest.get("site") or said("the given weather"),
-        systems=", ".join(systems)
+        systems=_systems(systems)
         or result.manifest.get("system")
         or said("what fills its windows"),
         method=said(result.method),
@@ -52,7 +55,13 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         (said("Warmth"), _warmth(result)),
         (said("Shading"), _shading(result)),
     )
-    return Verdict(asked, sentences, _limits(result, cards))
+    named = [(r.space.label, r, own) for r, own in zip(result.spaces, cards, strict=True)]
+    return Verdict(asked, sentences, limits(named, said("Room")))
+
+
+def _systems(names: Sequence[str]) -> str:
+    """All of them, or how many where they are more than a line holds."""
+    return ", ".join(names) if len(names) <= MOST_NAMES else counted(len(names), "system")
 
 
 def _glare(result: RunResult) -> str:
@@ -61,7 +70,7 @@ def _glare(result: RunResult) -> str:
     if not found:
         return said("No picture was made, so that glare is not known.")
     dgp, room, picture = max(found, key=lambda one: one[0])
-    value = rounded(dgp, 2) + _plus_minus(picture)
+    value = rounded(dgp, 2) + plus_minus(picture)
     where = f"{room.space.label}, {spoken(result.times[picture.hour])}"
     if glare_class(dgp) == "imperceptible":
         return said(
@@ -161,33 +170,52 @@ def _shading(result: RunResult) -> str:
         return said(
             "What fills the windows stays in one state all year: all figures are of that state."
         )
-    parts = []
-    for room in moved:
-        drawn = room.operation.hours["shading_state"].to_numpy() > 0
-        used = occupied(room).to_numpy() & (room.daylight.illuminance.max(axis=1) > 0)
-        part = percent(100 * float(drawn[used].mean())) if used.any() else "0"
-        facts = {"room": room.space.label, "share": part}
-        if room.explored is None:
-            parts.append(
-                said(
-                    "In {room} the shading is drawn in {share} % of the occupied daylight hours.",
-                    **facts,
-                )
-            )
-            continue
-        open_share, as_run = _autonomies(room, room.explored)
-        parts.append(
+    drawn = [_drawn(room) for room in moved]
+    cost = [None if r.explored is None else _autonomies(r, r.explored) for r in moved]
+    found = list(zip(moved, drawn, cost, strict=True))
+    if len(moved) > MOST_NAMES:
+        found.sort(key=lambda one: -one[1])
+        parts = [
             said(
-                "In {room} the shading is drawn in {share} % of the occupied daylight hours, which "
-                "lowers daylight autonomy from {most} to {least} %.",
-                **facts,
-                most=percent(open_share),
-                least=percent(as_run),
+                "In {rooms} the shading is drawn in {least} to {most} % of the occupied daylight "
+                "hours, most in {room}.",
+                rooms=counted(len(moved), "room"),
+                least=percent(min(drawn)),
+                most=percent(max(drawn)),
+                room=found[0][0].space.label,
             )
-        )
+        ]
+        found = found[:1]  # what it costs where it is drawn most
+    else:
+        parts = []
+    parts += [_shading_of(*one) for one in found if not parts or one[2] is not None]
     if not any(r.explored for r in moved):
         parts.append(said("--explore tells what that costs in daylight."))
     return " ".join(parts)
+
+
+def _drawn(room: RoomYear) -> float:
+    """Occupied hours with daylight in which the shading is not in its first state [%]."""
+    if room.operation is None:
+        return 0.0
+    states = room.operation.hours["shading_state"].to_numpy()
+    used = occupied(room).to_numpy() & (room.daylight.illuminance.max(axis=1) > 0)
+    return 100 * float((states[used] > 0).mean()) if used.any() else 0.0
+
+
+def _shading_of(room: RoomYear, drawn: float, cost: tuple[float, float] | None) -> str:
+    facts = {"room": room.space.label, "share": percent(drawn)}
+    if cost is None:
+        return said(
+            "In {room} the shading is drawn in {share} % of the occupied daylight hours.", **facts
+        )
+    return said(
+        "In {room} the shading is drawn in {share} % of the occupied daylight hours, which lowers "
+        "daylight autonomy from {most} to {least} %.",
+        **facts,
+        most=percent(cost[0]),
+        least=percent(cost[1]),
+    )
 
 
 def _autonomies(room: RoomYear, explored: ExploredRoom) -> tuple[float, float]:
@@ -199,46 +227,3 @@ def _autonomies(room: RoomYear, explored: ExploredRoom) -> tuple[float, float]:
     as_run = light[state, :, np.arange(len(state))]  # [L, S]
     found = [(one[lit] >= LIT_LX).sum(axis=0).mean() for one in (light[0].T, as_run)]
     return 100 * float(found[0]) / total, 100 * float(found[1]) / total
-
-
-def _limits(result: RunResult, cards: Sequence[Sequence[Card]]) -> Table:
-    return limits_table(
-        [(r.space.label, r, own) for r, own in zip(result.spaces, cards, strict=True)]
-    )
-
-
-def limits_table(rooms: Sequence[tuple[str, RoomYear, Sequence[Card]]], of: str = "") -> Table:
-    """The figures that a rule limits, with the error of each where it is known.
-
-    Args: rooms: name, results and headline figures; of: what the names are of; empty: rooms.
-    """
-    columns = (
-        Column(of or said("Room"), numeric=False), Column(said("Figure"), numeric=False),
-        Column(said("Value"), numeric=False, short=True),
-        Column(said("Against the limit"), numeric=False),
-        Column(said("Standard error"), numeric=False),
-    )  # fmt: skip
-    rows = []
-    for name, room, own in rooms:
-        for card in own:
-            if card.verdict:
-                value = f"{card.value} {card.unit}".strip()
-                line = (name, card.label, value, card.verdict, _error(room, card))
-                rows.append(line)
-    return Table(said("Figures against the limits of the standards"), columns, tuple(rows))
-
-
-def _error(room: RoomYear, card: Card) -> str:
-    if card.unit == "DGP":
-        worst = max(room.glare.pictures, key=lambda picture: picture.glare["dgp"])
-        return _plus_minus(worst).strip() or said("not known")
-    if card.traced:
-        light = float(np.mean(room.daylight.relative_error))
-        return said("± {share} % of each illuminance, from the tracing", share=share(light))
-    return said("not known")
-
-
-def _plus_minus(picture: LuminancePicture) -> str:
-    """The standard error of a picture's DGP; empty where it is not known."""
-    error = picture.glare.get("dgp_standard_error", float("nan"))
-    return "" if error != error else decimal(f" ± {max(error, 1e-4):.1g}")

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from mitsuba_cfs.glare.classes import CLASSES
-from scenes.report.headline import PROTECTION, WARM_C, Card, cards
+from scenes.report.headline import WARM_C, Card, cards, protection_card
+from scenes.report.limits import LimitTables, limits
 from scenes.report.numbers import counted, percent, rounded
-from scenes.report.tables import Table
-from scenes.report.verdict import Verdict, limits_table
+from scenes.report.verdict import Verdict
 from scenes.results import RunResult
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
@@ -18,7 +18,6 @@ from scenes.study_report.case_page import case_label, room_of
 from scenes.study_report.comparison import finished, glare_share, warm_share
 
 ENERGIES = ("heating_kwh", "cooling_kwh", "lighting_kwh")
-MOST_CASES = 12  # whose figures stand against the limits; all are in the table below
 
 
 def study_verdict(study: StudyResult) -> Verdict:
@@ -92,23 +91,20 @@ def _parts(study: StudyResult, label: str) -> str:
     return " + ".join(rounded(float(figures[name]), 0) for name in ENERGIES)
 
 
-def _limits(study: StudyResult) -> Table:
+def _limits(study: StudyResult) -> LimitTables:
     """The figures of the cases that a rule limits."""
     rows = []
-    for _, case, result in finished(study)[:MOST_CASES]:
+    for _, case, result in finished(study):
         building, _ = study.plan.rooms[case.scene]
         room = room_of(study, case, result)
         times = room.heat.temperatures.index
         run = RunResult(building, times, np.empty((0, 3)), (room,), (), {})
         own = (*cards(run, room), *_protection(result))
         rows.append((case_label(study, case), room, own))
-    return limits_table(rows, "Case")
+    return limits(rows, "Case")
 
 
 def _protection(result: CaseResult) -> tuple[Card, ...]:
     """EN 17037's protection from glare as a headline figure."""
     level = result.figures.get("glare_protection")
-    if level is None:
-        return ()
-    verdict = "above 0.45" if level == "none" else f"DGP at most {PROTECTION[level]}"
-    return (Card("Protection from glare", str(level).capitalize(), "", "", verdict),)
+    return () if level is None else (protection_card(str(level)),)

@@ -100,3 +100,18 @@ def test_a_print_has_every_room(browser) -> None:
     images = len(re.findall(rb"/Subtype\s*/Image", pdf))
     assert pages > 2 * ROOMS
     assert images >= browser.value("document.images.length")
+
+
+def test_the_verdict_of_many_rooms_is_one_printed_page(browser) -> None:
+    """Head and verdict end above the foot of an A4 page with margins of 13 mm."""
+    width, height = 184 / 25.4 * 96, 271 / 25.4 * 96
+    size = {"width": round(width), "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+    browser.send("Emulation.setEmulatedMedia", media="print")
+    browser.send("Emulation.setDeviceMetricsOverride", **size)
+    browser.value("scrollTo(0, 0)")
+    shown, folded = browser.value(
+        "[...document.querySelectorAll('#verdict .table-box')].map((e) => e.checkVisibility())"
+    )
+    below = browser.value("document.querySelector('#verdict').getBoundingClientRect().bottom")
+    assert shown and not folded
+    assert 300 < below < height

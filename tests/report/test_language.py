@@ -177,7 +177,8 @@ def test_nothing_of_the_catalogue_is_asked_by_nobody(marked) -> None:
 ALONE = {  # classes, levels and counted nouns, chosen by a result
     "imperceptible", "perceptible", "disturbing", "intolerable", "High", "Medium", "Minimum",
     "None", "room", "rooms", "hour", "hours", "sensor", "sensors", "glare source", "glare sources",
-    "bright source", "bright sources", "acceptable (55 % or more)", "preferred (75 % or more)",
+    "bright source", "bright sources", "system", "systems",
+    "acceptable (55 % or more)", "preferred (75 % or more)",
     "below the 55 % of LM-83", "within the 10 % of LM-83", "above the 10 % of LM-83",
     "Its thermal values", "Fenestration system", "Model file", "Weather", "Author", "S", "W",
     "N", "E",

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from scenes.report.headline import cards
+from scenes.report.numbers import percent
+from scenes.report.page import report_html
 from scenes.report.verdict import verdict
+from tests.report.building_page import building
 from tests.report.synthetic import run_result
 
 
@@ -73,8 +76,35 @@ def test_shading_says_how_often_and_at_what_cost(result) -> None:
 
 
 def test_figures_stand_against_limits_with_their_errors(result) -> None:
-    found = verdict(result, [cards(result, r) for r in result.spaces]).limits
+    limits = verdict(result, [cards(result, r) for r in result.spaces]).limits
+    found = limits.shown
+    assert limits.folded is None
     by_figure = {row[1]: row for row in found.rows}
     assert "LM-83" in by_figure["Annual sunlight exposure"][3]
     assert "% of each illuminance" in by_figure["Spatial daylight autonomy"][4]
     assert {row[0] for row in found.rows} == {room.space.label for room in result.spaces}
+
+
+def test_many_rooms_stay_on_one_page_with_the_worst_of_each_figure() -> None:
+    """82 rooms: a row a figure, every room counted once, and the worst room by its own value."""
+    run = building(82, picture_size=32, pictures=1)
+    every = [cards(run, room) for room in run.spaces]
+    found = verdict(run, every)
+    shown, folded = found.limits.shown, found.limits.folded
+    judged = [(room, card) for room, own in zip(run.spaces, every, strict=True) for card in own
+              if card.verdict]  # fmt: skip
+    assert len(folded.rows) == len(judged) > 250
+    labels = list(dict.fromkeys(card.label for _, card in judged))
+    assert [row[0] for row in shown.rows] == labels
+    for label, meets, worst, _ in shown.rows:
+        own = [(room, card) for room, card in judged if card.label == label]
+        assert sum(int(part.split(":")[0]) for part in meets.split("; ")) == len(own)
+        assert worst.count(";") == 2
+    sunlight = next(row for row in shown.rows if row[0] == "Annual sunlight exposure")
+    most = max(room.daylight.room_metrics["ase1000_250"] for room in run.spaces)
+    assert f": {percent(most)} %" in sunlight[2].split(";")[0]
+    text = dict(found.sentences)["Shading"]
+    assert text.startswith("In 41 rooms the shading is drawn in ") and len(text) < 400
+    page = report_html(run)
+    head = page[page.index('<section id="verdict">') : page.index("<details>")]
+    assert head.count("<tr>") == 1 + len(labels) and 'href="#rooms"' in head

@@ -15,8 +15,9 @@ from scenes.demo import WEATHER
 from scenes.heat import study_file as heat_file
 from scenes.heat.study import rooms_of as heat_rooms
 from scenes.run.files import read_files
+from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
-from scenes.run.run import _manifest, read_inputs
+from scenes.run.run import _manifest
 from scenes.study import one_case
 from scenes.study import study_file as grid_file
 from scenes.study.plan import plan_of
