@@ -10,6 +10,7 @@ import click
 
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
+from scenes.commands.bonsai import bonsai
 from scenes.commands.ifc_exports import (
     export_files,
     export_folders,
@@ -38,7 +39,7 @@ BANDS = ("Visible", "Solar")
 UNCUT = 100_000  # columns of a table that nobody sees
 
 
-@click.group()
+@click.group(commands=[bonsai])
 def command() -> None:
     """What an IFC file holds, and what is wrong with it."""
 
