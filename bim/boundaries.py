@@ -16,7 +16,7 @@ from bim.defaults import (
     air_layer,
     default_construction,
 )
-from bim.model import Construction, Face, MaterialLayer, Window
+from bim.model import GREY, Construction, Face, MaterialLayer, Window
 from bim.planes import area_vectors
 from bim.rooms import Piece
 from bim.shell import conforming_triangles
@@ -47,11 +47,17 @@ class Finishes:
 
     reflectance: NDArray[np.float64]  # [N, 2] visible and solar, negative where none is stated
     gloss: NDArray[np.object_]  # [N] `Gloss` or None
+    tint: NDArray[np.float64]  # [N, 3] linear sRGB over luminance
 
     def of(self, triangle: int) -> tuple[float, float, Gloss | None]:
         """Visible and solar reflectance and gloss of a triangle."""
         visible, solar = self.reflectance[triangle].tolist()
         return visible, solar, self.gloss[triangle]
+
+    def tint_of(self, triangle: int) -> tuple[float, float, float]:
+        """Colour of a triangle over its luminance."""
+        red, green, blue = self.tint[triangle].tolist()
+        return red, green, blue
 
 
 def faces_and_windows(
@@ -122,11 +128,13 @@ def _face(
     spans = behind.spans
     record = records[spans[0].element] if spans else None
     visible, solar, gloss = finishes.of(spans[0].triangle) if spans else (-1.0, -1.0, None)
+    tint = finishes.tint_of(spans[0].triangle) if spans and not own else GREY
     if own:
         gloss = None
         visible = solar = -1.0 if filling.frame_reflectance is None else filling.frame_reflectance
     if piece.role == "inner glass" and not is_open:
         visible = solar = GLASS_REFLECTANCE
+        tint = GREY
     if visible < 0:
         assumed["reflectance"] += not is_open
         visible = solar = ROOM_REFLECTANCE[kind]
@@ -144,6 +152,7 @@ def _face(
     return Face(
         name, kind, triangles, behind.adjacency, construction, visible, solar, EMISSIVITY,
         behind.neighbour, guid, gloss, _window([(piece, triangles)]) if is_pane else None,
+        tint,
     )  # fmt: skip
 
 

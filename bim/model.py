@@ -25,6 +25,8 @@ FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "revea
 BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
 JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
+COLOURS = ("red", "green", "blue")  # bands of colour pictures
+GREY = (1.0, 1.0, 1.0)  # tint of what reflects them alike
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
 
@@ -80,6 +82,14 @@ class Construction:
         return sum(layer.resistance for layer in self.layers)
 
 
+def _in_band(surface: Face | Element, band: str) -> float:
+    """Diffuse reflectance; in a band of colour no more than the gloss leaves."""
+    if band in COLOURS:
+        most = 1.0 - (0.0 if surface.gloss is None else surface.gloss.at_normal)
+        return min(surface.reflectance_visible * surface.tint[COLOURS.index(band)], most)
+    return {"visible": surface.reflectance_visible, "solar": surface.reflectance_solar}[band]
+
+
 @dataclass(frozen=True, slots=True)
 class Face:
     """A plane opaque part of a room's boundary: one element, one construction, one neighbour."""
@@ -96,6 +106,7 @@ class Face:
     element: str | None = None  # GUID of the building element
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
     pane: Window | None = None  # the glass or the opening to the neighbour that the face is
+    tint: tuple[float, float, float] = GREY  # linear sRGB of its colour over its luminance
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, out of the room
     area: float = field(init=False)  # [m2]
 
@@ -112,8 +123,8 @@ class Face:
         set_normal_and_area(self)
 
     def reflectance(self, band: str) -> float:
-        """Diffuse reflectance in the band "visible" or "solar"."""
-        return {"visible": self.reflectance_visible, "solar": self.reflectance_solar}[band]
+        """Diffuse reflectance in the band "visible", "solar", "red", "green" or "blue"."""
+        return _in_band(self, band)
 
     def total_reflectance(self, band: str) -> float:
         """Reflectance in a band at normal incidence, diffuse and like a mirror."""
@@ -219,10 +230,11 @@ class Element:
     material: str = ""
     is_kept: bool = False  # the corrections say so, whatever stands behind it
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
+    tint: tuple[float, float, float] = GREY  # linear sRGB of its colour over its luminance
 
     def reflectance(self, band: str) -> float:
-        """Diffuse reflectance in the band "visible" or "solar"."""
-        return {"visible": self.reflectance_visible, "solar": self.reflectance_solar}[band]
+        """Diffuse reflectance in the band "visible", "solar", "red", "green" or "blue"."""
+        return _in_band(self, band)
 
 
 @dataclass(frozen=True, slots=True)

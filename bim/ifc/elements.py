@@ -15,7 +15,7 @@ from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE, SITE_REFLECTANCE
 from bim.ifc.materials import MaterialReader
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
-from bim.model import Element, Problem
+from bim.model import GREY, Element, Problem
 from mitsuba_cfs.gloss import Gloss
 
 SITE = ("IfcSite", "IfcGeographicElement")
@@ -31,7 +31,7 @@ def bounding_elements(
     reader = MaterialReader(model)
     records = [_record(model.by_id(shape.step_id), reader, rotation) for shape in shapes]
     faults: dict[str, Problem] = {}
-    values, gloss = [], []
+    values, gloss, tint = [], [], []
     for shape in shapes:
         glosses = np.array([*(look.gloss for look in shape.looks), None], dtype=object)
         by_look = np.full((len(shape.looks) + 1, 2), -1.0)
@@ -45,9 +45,15 @@ def bounding_elements(
             by_look[:] = np.maximum(np.array(stated) - mirrored[:, None], 0.0)
         values.append(by_look[shape.look])
         gloss.append(glosses[shape.look])
+        tints = [GREY if look.is_glass else look.tint for look in shape.looks]
+        tint.append(np.array([*tints, GREY])[shape.look])
     problems = [*reader.problems.values(), *faults.values()]
     reflectances = np.concatenate(values or [np.empty((0, 2))])
-    return records, Finishes(reflectances, np.concatenate([np.empty(0, object), *gloss])), problems
+    glosses, tints = (
+        np.concatenate([np.empty(0, object), *gloss]),
+        np.concatenate([np.empty((0, 3)), *tint]),
+    )
+    return records, Finishes(reflectances, glosses, tints), problems
 
 
 def _record(
@@ -98,10 +104,11 @@ def outdoor_elements(
         )  # fmt: skip
         for index in np.unique(shape.look):
             visible = solar = default
-            gloss = None
+            gloss, tint = None, GREY
             if index >= 0:
                 look = shape.looks[index]
                 (visible, solar), gloss = look.reflectances, look.gloss
+                tint = GREY if look.is_glass else look.tint
                 if look.is_glass:
                     gloss = panes if gloss is None else gloss
                     # what a pane mirrors is no diffuse light
@@ -115,6 +122,7 @@ def outdoor_elements(
                     reflectance_visible=visible,
                     reflectance_solar=solar,
                     gloss=gloss,
+                    tint=tint if reflectance is None else GREY,
                 )
             )
     return result

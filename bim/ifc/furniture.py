@@ -20,7 +20,7 @@ from bim.defaults import FURNITURE_REFLECTANCE
 from bim.drawn_shades import hangs_at, is_named_shade
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source, painted
-from bim.model import Element, Problem, Space
+from bim.model import GREY, Element, Problem, Space
 from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
 
@@ -114,11 +114,17 @@ def _elements(shape: Shape) -> list[Element]:
     )  # fmt: skip
     found = []
     for index in np.unique(shape.look[~shape.transparent]):
-        visible, solar = FURNITURE_REFLECTANCE, FURNITURE_REFLECTANCE
+        visible, solar, tint = FURNITURE_REFLECTANCE, FURNITURE_REFLECTANCE, GREY
         if index >= 0:
-            visible, solar = shape.looks[index].reflectances
+            (visible, solar), tint = shape.looks[index].reflectances, shape.looks[index].tint
         part = shape.triangles[shape.look == index]
         found.append(
-            replace(base, triangles=part, reflectance_visible=visible, reflectance_solar=solar)
+            replace(
+                base,
+                triangles=part,
+                reflectance_visible=visible,
+                reflectance_solar=solar,
+                tint=tint,
+            )
         )
     return found
