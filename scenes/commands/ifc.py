@@ -10,6 +10,7 @@ import click
 
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
+from scenes.commands.bonsai import bonsai
 from scenes.commands.ifc_exports import (
     export_files,
     export_folders,
@@ -38,7 +39,7 @@ BANDS = ("Visible", "Solar")
 UNCUT = 100_000  # columns of a table that nobody sees
 
 
-@click.group()
+@click.group(commands=[bonsai])
 def command() -> None:
     """What an IFC file holds, and what is wrong with it."""
 
@@ -227,14 +228,17 @@ def export(
 def templates(out: Path) -> None:
     """Write the property set that windows hold as definitions for other programs.
 
-    An IFC library with its IfcPropertySetTemplate, and an IDS that checks models for it.
+    An IFC library with its IfcPropertySetTemplate, buildingSMART's PSD XML, and an IDS that checks
+    models for it.
     """
     folder = ResultFolder(out, "ifc templates")
+    from bim.ifc.property_definition import write_psd
     from bim.ifc.property_templates import write_ids, write_templates
 
     with folder.replaced() as place:
         write_templates(place / "fenestration_templates.ifc")
         write_ids(place / "fenestration.ids")
+        write_psd(place / "fenestration_psd.xml")
     click.echo(out)
 
 

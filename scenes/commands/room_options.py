@@ -9,6 +9,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -18,6 +19,11 @@ from scenes.commands.quick_option import quick_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
 
+if TYPE_CHECKING:
+    from scenes.heat.study_file import StudyFile
+    from scenes.study.study_file import Study as Grid
+
+Study = TypeVar("Study", "StudyFile", "Grid")
 Option = Callable[[Callable], Callable]
 _GRID = SensorGrid()
 
@@ -119,6 +125,16 @@ set_option = click.option(
 no_cache_option = click.option(
     "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."
 )
+
+
+def with_flags(
+    study: Study, surroundings: tuple[Path, ...], offset: tuple[float, float, float] | None
+) -> Study:
+    """A study with the files of `--surroundings` beside those that it names itself."""
+    update: dict[str, object] = {"surroundings": (*study.surroundings, *surroundings)}
+    if offset is not None:
+        update["surroundings_offset"] = offset
+    return study.model_copy(update=update)
 
 
 def space_option(name: str, what: str, *, several: bool = True) -> Option:

@@ -62,12 +62,12 @@ _DEFAULT = RoomOptions()
     "--explore", is_flag=True,
     help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
 )  # fmt: skip
+@processes_option
+@scheduler_option
 @click.option(
     "--netcdf", is_flag=True,
     help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
 )  # fmt: skip
-@processes_option
-@scheduler_option
 def command(
     building: Path,
     *,

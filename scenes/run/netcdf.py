@@ -105,7 +105,7 @@ def write_netcdf(result: RunResult, path: str | PathLike[str]) -> None:
 
 def attributes(key: str) -> dict[str, str]:
     """CF attributes of a quantity of the results: units, long_name, what it means."""
-    from scenes.report.names import quantity  # loads the whole page
+    from scenes.report.names import quantity  # whose package draws; `check_netcdf` does not
 
     known = quantity(key)
     unit, label = UNITS.get(known.unit, known.unit).replace("²", "2"), known.label

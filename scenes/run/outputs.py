@@ -57,7 +57,10 @@ def write_results(
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
             if write is not None:
                 faults += _faults(write, result, temporary / page)
-        text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
+        places = (name if several else "." for name in names)
+        guids = (room.space.guid for room in result.spaces)
+        folders = dict(zip(guids, places, strict=True))  # of each room's tables
+        text = json.dumps(result.manifest | {"folders": folders}, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
     if faults:
         raise faults[0] if len(faults) == 1 else ExceptionGroup("no page was written", faults)
