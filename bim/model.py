@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.account import Account
+from bim.colours import GREY, Colour
 from bim.fenestration import ShadingState
 from bim.georeference import Georeference
 from bim.held_sensors import HeldGrid, HeldView
@@ -100,6 +101,7 @@ class Face:
     element: str | None = None  # GUID of the building element
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
     pane: Window | None = None  # the glass or the opening to the neighbour that the face is
+    hue: Colour = GREY  # of what it reflects diffusely: linear sRGB of luminance 1
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, out of the room
     area: float = field(init=False)  # [m2]
 
@@ -223,6 +225,7 @@ class Element:
     material: str = ""
     is_kept: bool = False  # the corrections say so, whatever stands behind it
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
+    hue: Colour = GREY  # of what it reflects diffusely: linear sRGB of luminance 1
 
     def reflectance(self, band: str) -> float:
         """Diffuse reflectance in the band "visible" or "solar"."""

@@ -114,11 +114,12 @@ def _elements(shape: Shape) -> list[Element]:
     )  # fmt: skip
     found = []
     for index in np.unique(shape.look[~shape.transparent]):
-        visible, solar = FURNITURE_REFLECTANCE, FURNITURE_REFLECTANCE
+        piece = replace(base, triangles=shape.triangles[shape.look == index])
         if index >= 0:
-            visible, solar = shape.looks[index].reflectances
-        part = shape.triangles[shape.look == index]
-        found.append(
-            replace(base, triangles=part, reflectance_visible=visible, reflectance_solar=solar)
-        )
+            look = shape.looks[index]
+            visible, solar = look.reflectances
+            piece = replace(
+                piece, reflectance_visible=visible, reflectance_solar=solar, hue=look.hue
+            )
+        found.append(piece)
     return found

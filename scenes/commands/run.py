@@ -13,11 +13,13 @@ from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
     building_options,
+    height_option,
     method_option,
     named_settings,
     processes_option,
     scheduler_option,
     size_option,
+    spacing_option,
     u_option,
 )
 from scenes.room.options import RoomOptions
@@ -37,14 +39,8 @@ _DEFAULT = RoomOptions()
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
 @size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
-@click.option(
-    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.grid.spacing,
-    show_default=True, help="Sensor spacing [m].",
-)  # fmt: skip
-@click.option(
-    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.grid.height,
-    show_default=True, help="Work plane above the floor [m].",
-)  # fmt: skip
+@spacing_option
+@height_option
 @click.option(
     "--ach", "infiltration_ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
     show_default=True, help="Outdoor air changes [1/h].",
@@ -68,6 +64,10 @@ _DEFAULT = RoomOptions()
 )  # fmt: skip
 @processes_option
 @scheduler_option
+@click.option(
+    "--netcdf", is_flag=True,
+    help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
+)  # fmt: skip
 def command(
     building: Path,
     *,
@@ -87,6 +87,7 @@ def command(
     inner_glass: bool,
     no_coupled_heat: bool,
     explore: bool,
+    netcdf: bool,
     quick: bool,
     page: Path | None,
     settings: tuple[str, ...],
@@ -110,7 +111,7 @@ def command(
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,
-        coupled_heat=not no_coupled_heat,
+        coupled_heat=not no_coupled_heat, netcdf=netcdf,
         u_value=u_value, g_value=g_value, surroundings=surroundings,
         surroundings_offset=surroundings_offset,
     )  # fmt: skip
@@ -162,7 +163,8 @@ def run_to_folder(
         )  # fmt: skip
         progress("results", 0.0)
         report = partial(write_report, page=page_options)
-        write_results(result, folder, report, write_explorer if options.explore else None)
+        explorer = write_explorer if options.explore else None
+        write_results(result, folder, report, explorer, netcdf=options.netcdf)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:

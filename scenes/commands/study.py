@@ -16,6 +16,9 @@ from scenes.commands.room_options import (
     page_option,
     processes_option,
     scheduler_option,
+    surroundings_offset_option,
+    surroundings_option,
+    with_flags,
     write_ifc_option,
 )
 
@@ -35,6 +38,8 @@ if TYPE_CHECKING:
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
 @write_ifc_option("one for each case of a study of one file")
+@surroundings_option
+@surroundings_offset_option
 @quick_option
 @page_option
 def command(
@@ -47,6 +52,8 @@ def command(
     time_budget: str | None,
     dgp_error: str | None,
     write_ifc: Path | None,
+    surroundings: tuple[Path, ...],
+    surroundings_offset: tuple[float, float, float] | None,
     quick: bool,
     page: Path | None,
 ) -> None:
@@ -61,6 +68,7 @@ def command(
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
+    parsed = with_flags(parsed, surroundings, surroundings_offset)
     study_to_folder(study, parsed, out, processes, scheduler, write_ifc, page=page)
 
 

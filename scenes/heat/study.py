@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.building_file import ReadOptions, read_building_file
+from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
@@ -243,10 +243,12 @@ def _floor(zone: Zone) -> int:
 
 def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
     """The building of a study and the rooms asked for."""
+    around = study.surroundings, study.surroundings_offset
     if study.box is not None:
-        building = box_building(study.box)
+        building = surrounded(box_building(study.box), *around)
         return building, list(building.spaces)
-    building = read_building_file(study.building, ReadOptions(tuple(study.join)))
+    options = ReadOptions(tuple(study.join), surroundings=around[0], surroundings_offset=around[1])
+    building = read_building_file(study.building, options)
     if study.couple:
         spaces = named_spaces(building, study.spaces, study.building)
         return building, shared_constructions(spaces)

@@ -18,6 +18,8 @@ from scenes.results import GridDaylight, RoomYear, RunResult
 from scenes.room.daylight import illuminance_table
 from scenes.room.glare import glare_table
 from scenes.run.csv_text import csv_text
+from scenes.run.netcdf import NAME as NETCDF
+from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
 
 REPORT = "report.html"
@@ -25,13 +27,19 @@ EXPLORER = "explore"  # folder of the explorer, inside that of the results
 
 
 def write_results(
-    result: RunResult, folder: ResultFolder, write_report=None, write_explorer=None
+    result: RunResult,
+    folder: ResultFolder,
+    write_report=None,
+    write_explorer=None,
+    *,
+    netcdf: bool = False,
 ) -> None:
     """Write all files of a run; earlier results are replaced at the end.
 
     Args:
         write_report: `scenes.report.write_report`, or None for no report.
         write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
+        netcdf: whether all numbers are written as one netCDF file besides.
 
     A fault of the program in one of these pages is raised when all else is in place.
     """
@@ -44,10 +52,15 @@ def write_results(
             place.mkdir(exist_ok=True)
             _write_room(result, room, place)
         write_table(_problems(result), temporary / "problems.csv", index=False)
+        if netcdf:
+            write_netcdf(result, temporary / NETCDF)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
             if write is not None:
                 faults += _faults(write, result, temporary / page)
-        text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
+        places = (name if several else "." for name in names)
+        guids = (room.space.guid for room in result.spaces)
+        folders = dict(zip(guids, places, strict=True))  # of each room's tables
+        text = json.dumps(result.manifest | {"folders": folders}, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
     if faults:
         raise faults[0] if len(faults) == 1 else ExceptionGroup("no page was written", faults)

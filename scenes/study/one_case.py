@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.building_file import read_building_file
+from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -108,16 +108,25 @@ def _straight_view(room: RoomYear, systems: dict[str, States], hours: NDArray[np
     return straight_view(room.space.windows, systems, state)
 
 
+Around = tuple[tuple[InputFile, ...], tuple[float, float, float] | None]
+
+
 @lru_cache(maxsize=4)
-def _building(source: InputFile) -> Building:
-    return read_building_file(source.path)
+def _building(source: InputFile, around: Around) -> Building:
+    files, offset = around
+    options = ReadOptions(
+        surroundings=tuple(file.path for file in files), surroundings_offset=offset
+    )
+    return read_building_file(source.path, options)
 
 
 def _room(case: Case) -> tuple[Building, Space]:
+    around = case.surroundings, case.surroundings_offset
     if isinstance(case.building, InputFile):
-        building = _building(case.building)
+        building = _building(case.building, around)
     else:
-        building = box_building(case.building)
+        files = [file.path for file in around[0]]
+        building = surrounded(box_building(case.building), files, around[1])
     return building, building.space(case.space)
 
 

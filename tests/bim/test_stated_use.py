@@ -6,7 +6,7 @@ import datetime
 
 import numpy as np
 import pytest
-from bim_fuzz import odd_values
+from bim_fuzz import mutations, odd_values
 from honeybee_models import used_model, write
 from test_read_gbxml import two_rooms as gbxml_rooms
 
@@ -191,3 +191,17 @@ def test_faults_of_gbxmls_use_are_one_line(tmp_path, old, new, said):
     with pytest.raises(DataError) as caught:
         read_gbxml(path)
     assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_random_bytes_of_gbxmls_use_give_one_line(tmp_path):
+    path, refused = tmp_path / "spoilt.xml", 0
+    text = used_gbxml()
+    start = text.index("<Schedule ")
+    for tail in mutations(text[start:].encode(), 60):
+        path.write_bytes(text[:start].encode() + tail)
+        try:
+            read_gbxml(path)
+        except DataError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    assert refused > 20
