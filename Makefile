@@ -48,7 +48,7 @@ $(VENV)/.run: $(INPUTS)
 	@touch $@
 
 $(VENV)/.dev: $(INPUTS)
-	@bash .ci/set-up '.[dev,peers,distributed,georeference,docs,notebooks]'
+	@bash .ci/set-up '.[dev,peers,distributed,georeference,netcdf,docs,notebooks]'
 	@touch $@ $(VENV)/.run
 
 clean:

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bim.colours import GREY, Colour
 from bim.defaults import FRAME_FRACTION
 from bim.model import Problem
 from bim.planes import Plane, area_vectors, plane_through, polygons_of
@@ -41,6 +42,7 @@ class Filling:
     solar_transmittance: float | None = None
     panes: int | None = None
     is_open: bool = False  # nothing fills it: a doorway between two rooms
+    frame_hue: Colour = GREY
 
     @property
     def is_door(self) -> bool:

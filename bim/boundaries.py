@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.colours import GREY, Colour
 from bim.defaults import (
     EMISSIVITY,
     GLASS_REFLECTANCE,
@@ -16,7 +17,7 @@ from bim.defaults import (
     air_layer,
     default_construction,
 )
-from bim.model import GREY, Construction, Face, MaterialLayer, Window
+from bim.model import Construction, Face, MaterialLayer, Window
 from bim.planes import area_vectors
 from bim.rooms import Piece
 from bim.shell import conforming_triangles
@@ -47,17 +48,13 @@ class Finishes:
 
     reflectance: NDArray[np.float64]  # [N, 2] visible and solar, negative where none is stated
     gloss: NDArray[np.object_]  # [N] `Gloss` or None
-    tint: NDArray[np.float64]  # [N, 3] linear sRGB over luminance
+    hue: NDArray[np.float64]  # [N, 3] linear sRGB of luminance 1
 
-    def of(self, triangle: int) -> tuple[float, float, Gloss | None]:
-        """Visible and solar reflectance and gloss of a triangle."""
+    def of(self, triangle: int) -> tuple[float, float, Gloss | None, Colour]:
+        """Visible and solar reflectance, gloss and hue of a triangle."""
         visible, solar = self.reflectance[triangle].tolist()
-        return visible, solar, self.gloss[triangle]
-
-    def tint_of(self, triangle: int) -> tuple[float, float, float]:
-        """Colour of a triangle over its luminance."""
-        red, green, blue = self.tint[triangle].tolist()
-        return red, green, blue
+        red, green, blue = self.hue[triangle].tolist()
+        return visible, solar, self.gloss[triangle], (red, green, blue)
 
 
 def faces_and_windows(
@@ -127,17 +124,16 @@ def _face(
     own = filling is not None and not is_open and piece.role in ("frame", "door", "inner glass")
     spans = behind.spans
     record = records[spans[0].element] if spans else None
-    visible, solar, gloss = finishes.of(spans[0].triangle) if spans else (-1.0, -1.0, None)
-    tint = finishes.tint_of(spans[0].triangle) if spans and not own else GREY
+    nothing = (-1.0, -1.0, None, GREY)
+    visible, solar, gloss, hue = finishes.of(spans[0].triangle) if spans else nothing
     if own:
-        gloss = None
+        gloss, hue = None, filling.frame_hue
         visible = solar = -1.0 if filling.frame_reflectance is None else filling.frame_reflectance
     if piece.role == "inner glass" and not is_open:
-        visible = solar = GLASS_REFLECTANCE
-        tint = GREY
+        visible, solar, hue = GLASS_REFLECTANCE, GLASS_REFLECTANCE, GREY
     if visible < 0:
         assumed["reflectance"] += not is_open
-        visible = solar = ROOM_REFLECTANCE[kind]
+        visible, solar, hue = ROOM_REFLECTANCE[kind], ROOM_REFLECTANCE[kind], GREY
     if record is None and not own and not is_open:
         assumed["element"] += 1
     frame = own and kind == "window frame"
@@ -151,8 +147,7 @@ def _face(
     is_pane = piece.role == "inner glass" and behind.neighbour is not None
     return Face(
         name, kind, triangles, behind.adjacency, construction, visible, solar, EMISSIVITY,
-        behind.neighbour, guid, gloss, _window([(piece, triangles)]) if is_pane else None,
-        tint,
+        behind.neighbour, guid, gloss, _window([(piece, triangles)]) if is_pane else None, hue,
     )  # fmt: skip
 
 

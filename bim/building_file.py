@@ -6,7 +6,7 @@ that is no IFC lies in its `Window.states`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -61,11 +61,18 @@ def read_building_file(
         if value and field not in kind.has:
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
     building = kind.read(path, options, progress or (lambda stage, fraction: None))
-    if not options.surroundings:
+    return surrounded(building, options.surroundings, options.surroundings_offset)
+
+
+def surrounded(
+    building: Building, files: Sequence[Path], offset: tuple[float, float, float] | None
+) -> Building:
+    """The building with what files hold of its surroundings, if there are any."""
+    if not files:
         return building
     from bim.context.surroundings import with_surroundings
 
-    return with_surroundings(building, options.surroundings, options.surroundings_offset)
+    return with_surroundings(building, files, offset)
 
 
 def check_building_file(path: str | PathLike[str]) -> None:

@@ -11,7 +11,7 @@ from bim.account import Account, StoreyAccount
 from bim.coarser import coarser
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
 from bim.model import Building, Element, Problem, Space
-from bim.names import found_by_name, label_of
+from bim.names import JOINT, found_by_name, label_of
 from bim.outdoors import unblinded
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
 from bim.shell import open_edges
@@ -92,7 +92,7 @@ def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom
     volumes = [room.stated_volume for room in chosen.values()]
     one = replace(
         first,
-        name=" + ".join(label_of(r.name, r.long_name, r.guid) for r in chosen.values()),
+        name=JOINT.join(label_of(r.name, r.long_name, r.guid) for r in chosen.values()),
         long_name="",
         faces=faces,
         stated_area=None if None in areas else sum(areas),

@@ -7,6 +7,7 @@ one closed surface round the room's air: the room and the recesses of its window
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,9 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.account import Account
+from bim.colours import GREY, Colour
 from bim.fenestration import ShadingState
 from bim.georeference import Georeference
+from bim.held_sensors import HeldGrid, HeldView
 from bim.names import found_by_name, label_of
+from bim.use import StatedUse
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import Gloss
 
@@ -25,8 +29,8 @@ FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "revea
 BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
 JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
+NOT_USED = "not used"  # kind of a problem: what the file states and no result depends on
 COLOURS = ("red", "green", "blue")  # bands of colour pictures
-GREY = (1.0, 1.0, 1.0)  # tint of what reflects them alike
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
 
@@ -86,7 +90,7 @@ def _in_band(surface: Face | Element, band: str) -> float:
     """Diffuse reflectance; in a band of colour no more than the gloss leaves."""
     if band in COLOURS:
         most = 1.0 - (0.0 if surface.gloss is None else surface.gloss.at_normal)
-        return min(surface.reflectance_visible * surface.tint[COLOURS.index(band)], most)
+        return min(surface.reflectance_visible * surface.hue[COLOURS.index(band)], most)
     return {"visible": surface.reflectance_visible, "solar": surface.reflectance_solar}[band]
 
 
@@ -106,7 +110,7 @@ class Face:
     element: str | None = None  # GUID of the building element
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
     pane: Window | None = None  # the glass or the opening to the neighbour that the face is
-    tint: tuple[float, float, float] = GREY  # linear sRGB of its colour over its luminance
+    hue: Colour = GREY  # of what it reflects diffusely: linear sRGB of luminance 1
     normal: NDArray[np.float64] = field(init=False)  # [3] unit normal, out of the room
     area: float = field(init=False)  # [m2]
 
@@ -230,7 +234,7 @@ class Element:
     material: str = ""
     is_kept: bool = False  # the corrections say so, whatever stands behind it
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
-    tint: tuple[float, float, float] = GREY  # linear sRGB of its colour over its luminance
+    hue: Colour = GREY  # of what it reflects diffusely: linear sRGB of luminance 1
 
     def reflectance(self, band: str) -> float:
         """Diffuse reflectance in the band "visible", "solar", "red", "green" or "blue"."""
@@ -252,6 +256,9 @@ class Building:
     account: Account | None = None  # what of the file came through; None where there is no file
     georeference: Georeference | None = None  # where it lies on a map, as its file states it
     from_model: NDArray[np.float64] | None = None  # [4, 4] of its file's own axes [m] to these
+    uses: Mapping[str, StatedUse] = field(default_factory=dict)  # of rooms, by the space's GUID
+    grids: tuple[HeldGrid, ...] = ()  # sensors that the file holds
+    views: tuple[HeldView, ...] = ()  # that the file holds
 
     @property
     def windows(self) -> tuple[Window, ...]:

@@ -12,6 +12,7 @@ from itertools import count
 from typing import Protocol, TypeVar
 
 SHOWN = 8  # names that a message lists
+JOINT = " + "  # between the names of rooms that are one
 
 
 class Named(Protocol):
@@ -39,8 +40,13 @@ T = TypeVar("T", bound=Named)
 
 def label_of(name: str, long_name: str, guid: str) -> str:
     """Number and name of a room as people use them, each once; its GUID where it has neither."""
-    parts = [name] if long_name in ("", name) else [name, long_name]
-    return " ".join(part for part in parts if part) or guid
+    words, long_words = name.split(), long_name.split()
+    count = len(long_words)
+    if not count or words[-count:] == long_words:  # "1 - Living room" that is a "Living room"
+        return name or guid
+    if words == long_words[: len(words)]:
+        return long_name
+    return f"{name} {long_name}"
 
 
 @lru_cache(maxsize=4096)  # the same words are looked for in every material of a model
@@ -72,9 +78,10 @@ def listed(wanted: str, names: Iterable[str]) -> str:
 
 
 def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
-    """The one item of that GUID, name, long name, or name and long name.
+    """The one item of that GUID, name, long name, or name and long name; else of such a part.
 
-    Capitals and runs of spaces count only where they make the difference between two.
+    Capitals and runs of spaces count only where they make the difference between two.  Parts are
+    those of rooms that were joined.
 
     Args: kind: what a message calls an item, such as "space".
     Raises: `KeyError` where there is none, `ValueError` where there are several; their texts list
@@ -86,6 +93,7 @@ def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
     found = found or [
         item for item in items if key and key in map(_key, (item.name, item.long_name, item.label))
     ]
+    found = found or [item for item in items if key and key in map(_key, _names_of_parts(item))]
     if not found:
         there = listed(wanted, (item.label for item in items))
         raise KeyError(f"no {kind} {wanted!r}; there are: {there}")
@@ -95,6 +103,14 @@ def found_by_name(items: Sequence[T], wanted: str, kind: str) -> T:
         shown = (f"{item.label} ({item.guid})" if same else item.label for item in found)
         raise ValueError(f"{len(found)} {kind}s are named {wanted!r}: {listed(wanted, shown)}")
     return found[0]
+
+
+def _names_of_parts(item: Named) -> set[str]:
+    """Names, long names and labels of the rooms that were joined to this one."""
+    names, long_names = item.name.split(JOINT), item.long_name.split(JOINT)
+    pairs = zip(names, long_names, strict=False) if len(names) == len(long_names) else ()
+    labels = (label_of(name, long_name, "") for name, long_name in pairs)
+    return {*names, *long_names, *labels} if len(names) > 1 else set()
 
 
 def _key(name: str) -> str:

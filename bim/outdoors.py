@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from trimesh.intersections import slice_faces_plane
 
 from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
 from bim.guarded import Outline, opened
@@ -65,6 +66,32 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
                 done = "left out" if body is None else f"left out: {body}"
             problems.append(Problem(element.guid, what, done))
     return Outdoors(tuple(elements), tuple(problems))
+
+
+def before_windows(elements: Sequence[Element], windows: Sequence[Window]) -> NDArray[np.float64]:
+    """Triangles [T, 3, 3] of what stands outdoors, without what lies behind every window's plane.
+
+    A ray from a window to the sun meets these alone; stairs and slabs that reach into the room,
+    which the elements hold too, are behind.
+    """
+    planes = {tuple(np.round([*w.normal, w.normal @ w.centre], 3)): w for w in windows}
+    rest = np.concatenate([NOTHING, *(element.triangles for element in elements)])
+    found = [NOTHING]
+    for window in planes.values():
+        found.append(_beyond(rest, window.normal, window.centre))
+        rest = _beyond(rest, -window.normal, window.centre)
+    return np.concatenate(found)
+
+
+def _beyond(
+    triangles: NDArray[np.float64], normal: NDArray[np.float64], origin: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What of the triangles lies on the side of a plane that its normal points to."""
+    if not len(triangles):
+        return NOTHING
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    vertices, faces, _ = slice_faces_plane(triangles.reshape(-1, 3), faces, normal, origin)
+    return np.asarray(vertices)[faces] if len(faces) else NOTHING
 
 
 def mirrors_in_view(

@@ -8,7 +8,8 @@ import shapely.ops
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bim.model import Space
+from bim.held_sensors import HeldGrid, HeldView
+from bim.model import Building, Space
 from bim.planes import SMALLEST_AREA
 from bim.shell import welded
 from mitsuba_cfs.errors import RoomError
@@ -209,3 +210,32 @@ def view_point(
     if np.linalg.norm(direction) < 1e-6:
         direction = np.append(_along_longest_edge(section)[1][:, 0], 0.0)
     return position, direction / np.linalg.norm(direction)
+
+
+def in_room(space: Space, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of points [S, 3] lie in the air of a room [S]."""
+    found = np.zeros(len(points), dtype=bool)
+    heights = np.round(points[:, 2], 3)
+    for z in np.unique(heights):
+        own = heights == z
+        section = horizontal_section(space.shell, float(z))
+        found[own] = shapely.contains_xy(section, points[own, 0], points[own, 1])
+    return found
+
+
+def held_grids(building: Building, space: Space) -> list[HeldGrid]:
+    """The sensors of the building's file that lie in a room, by grid."""
+    found = []
+    for grid in building.grids:
+        own = in_room(space, grid.points)
+        if own.any():
+            found.append(HeldGrid(grid.name, grid.points[own], grid.directions[own]))
+    return found
+
+
+def held_views(building: Building, space: Space) -> list[HeldView]:
+    """The views of the building's file whose eye is in a room."""
+    if not building.views:
+        return []
+    eyes = np.array([held.view.position for held in building.views])
+    return [held for held, own in zip(building.views, in_room(space, eyes), strict=True) if own]

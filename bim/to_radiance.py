@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.colours import GREY, Colour, radiance_colour
 from bim.model import Building, Element, Face, Space
-from bim.radiance_script import MAKEFILE, run_script
+from bim.outdoors import before_windows
+from bim.radiance_script import LUMINANCE, makefile, run_script
 from bim.sensors import sensor_grid, view_point
 from bim.surface_sensors import surface_sensors
 from bim.to_tracer import window_groups
@@ -53,14 +55,25 @@ class FilledGroup:
     bsdf: BsdfFile | None = None  # on Klems patches: the T of the matrices
     fine: BsdfFile | None = None  # for the sun alone, such as a tensor tree; else the same
 
+    def as_solar(self) -> FilledGroup:
+        """The same with its solar band in place of the visible one."""
+        solar = [
+            None if one is None or "Solar" not in one.bands
+            else BsdfFile({"Visible": one.bands["Solar"]}, f"{one.name}, solar")
+            for one in (self.bsdf, self.fine)
+        ]  # fmt: skip
+        return FilledGroup(self.group, *solar)
+
 
 @dataclass(frozen=True, slots=True)
 class RadianceFiles:
     """What `write_radiance` wrote."""
 
-    materials: Path  # of both scenes
+    materials: Path  # of both scenes, in their colours
+    grey: Path  # the same without colours
     room: Path  # opaque boundary of the room
     outdoors: Path  # what stands outdoors
+    shades: Path  # what of it stands before the windows, black
     windows: dict[str, Path]  # group name -> glass with its rfluxmtx comment, normals into the room
     bsdfs: dict[str, Path]  # group name -> BSDF XML, the T of `dctimestep`, where it is known
     systems: Path  # the groups' materials for the sun, with their BSDFs
@@ -86,14 +99,15 @@ def write_radiance(
     """Write the room, what stands outdoors, its window groups, sensors and a view into a folder.
 
     `run.sh` there computes the sensors' illuminance with Radiance alone, by three or five phases;
-    `make` runs it again where a file is newer than its results.
+    `make` runs it again where a file is newer than its results.  A room without windows has none.
     The view matrix of a group is
     `rfluxmtx -I+ -faa - windows_<group>.rad -i room.oct < sensors.pts`, its daylight matrix
     `rfluxmtx windows_<group>.rad sky.rad -i outdoors.oct`, with room.oct made of materials and room
     and outdoors.oct of materials and outdoors.
 
     Args:
-        band: reflectances of "visible" or "solar".
+        band: "visible", or "solar": reflectances without colour, the windows' solar BSDF where
+            Radiance looks for a visible one, and irradiance.
         sky_division: Reinhart division MF of sky.rad, 1 for Tregenza's 145 patches.
         spacing, height, margin: of the sensor grid [m], see `sensor_grid`.
         filled: the window groups with their BSDFs; by default the orientations, without.
@@ -107,9 +121,14 @@ def write_radiance(
     inside += _parts(space.furniture, materials, inwards=False, name="furniture")
     room = _write(folder / "room.rad", inside)
     scene = _write(folder / "outdoors.rad", _parts(outdoors, materials, inwards=False))
-    written = _write(folder / "materials.rad", materials.lines())
+    before = before_windows(outdoors, space.windows)
+    black = (_polygon("black", f"shade.{i}", triangle) for i, triangle in enumerate(before))
+    shades = _write(folder / "shades.rad", black)
+    written = _write(folder / "materials.rad", materials.lines(coloured=band == "visible"))
+    grey = _write(folder / "grey.rad", materials.lines())
     windows, bsdfs, systems = {}, {}, []
-    for known in map(FilledGroup, window_groups(space)) if filled is None else filled:
+    for given in map(FilledGroup, window_groups(space)) if filled is None else filled:
+        known = given if band == "visible" else given.as_solar()
         name = identifier(known.group.name)
         glass = _window_group(name, [w.triangles for w in known.group.windows])
         windows[known.group.name] = _write(folder / f"windows_{name}.rad", glass)
@@ -128,12 +147,12 @@ def write_radiance(
     view = _write(folder / "view.vf", [fisheye + "\n"])
     surfaces = _write(folder / "surfaces.pts", _surface_lines(space, spacing))
     files = {identifier(name): bsdfs.get(name) for name in windows}
-    script = _write(folder / "run.sh", [run_script(files, sky_division)])
+    script = _write(folder / "run.sh", [run_script(files, sky_division, band)])
     script.chmod(0o755)
-    _write(folder / "Makefile", [MAKEFILE])
+    _write(folder / "Makefile", [makefile(band)])
     return RadianceFiles(
-        written, room, scene, windows, bsdfs, _write(folder / "systems.rad", systems), sky,
-        sensors, view, surfaces, script,
+        written, grey, room, scene, shades, windows, bsdfs,
+        _write(folder / "systems.rad", systems), sky, sensors, view, surfaces, script,
     )  # fmt: skip
 
 
@@ -165,22 +184,25 @@ def _write(path: Path, parts: Iterable[str]) -> Path:
 
 
 class _Materials:
-    """Grey materials of a band by what they reflect, diffusely and like a mirror."""
+    """Materials of a band by what they reflect, diffusely and like a mirror, and their hue."""
 
     def __init__(self, band: str) -> None:
         self._band = band
-        self._names: dict[tuple[float, Gloss | None], str] = {}
+        self._names: dict[tuple[float, Gloss | None, Colour], str] = {}
 
     def of(self, part: Face | Element) -> str:
         """Name of a part's material."""
-        key = part.reflectance(self._band), part.gloss
-        glossy = "" if part.gloss is None else f"_gloss_{len(self._names)}"
-        return self._names.setdefault(key, f"diffuse_{key[0]:.6f}{glossy}")
+        key = part.reflectance(self._band), part.gloss, part.hue
+        number = len(self._names)
+        glossy = "" if part.gloss is None else f"_gloss_{number}"
+        coloured = "" if part.hue == GREY else f"_colour_{number}"
+        return self._names.setdefault(key, f"diffuse_{key[0]:.6f}{glossy}{coloured}")
 
-    def lines(self) -> Iterable[str]:
-        """The materials that have been asked for."""
-        for (value, gloss), name in sorted(self._names.items(), key=lambda item: item[1]):
-            yield radiance_material(name, value, gloss) + "\n"
+    def lines(self, *, coloured: bool = False) -> Iterable[str]:
+        """The materials that have been asked for, in their colours or as grey as they are light."""
+        for (value, gloss, hue), name in sorted(self._names.items(), key=lambda item: item[1]):
+            colour = radiance_colour(value, hue if coloured else GREY, LUMINANCE)
+            yield radiance_material(name, colour, gloss) + "\n"
 
 
 def _parts(

@@ -134,20 +134,23 @@ def radiance_trans(values: Sequence[float]) -> tuple[NDArray[np.float64], NDArra
     return passed * share, passed * (1 - share)
 
 
-def radiance_material(name: str, reflectance: float, gloss: Gloss | None = None) -> str:
+def radiance_material(name: str, reflectance: ArrayLike, gloss: Gloss | None = None) -> str:
     """A Radiance material of a diffuse reflectance at normal incidence and a gloss.
+
+    The reflectance is one number, or [3] of red, green and blue.
 
     `mirror` for a smooth one of one reflectance, which alone sends the sun on; else `plastic`,
     whose rise with the angle is its own: of a smooth `dielectric` or `pane` it is near, not equal.
     """
-    if gloss is not None and not reflectance and not gloss.roughness and len(gloss.specular) == 1:
+    diffuse = np.broadcast_to(np.asarray(reflectance, dtype=float), 3)
+    if gloss is not None and not (diffuse.any() or gloss.roughness or len(gloss.specular) > 1):
         return f"void mirror {name}\n0\n0\n3{3 * f' {gloss.at_normal:.6g}'}\n"
     specular, roughness = (gloss.at_normal, gloss.roughness) if gloss else (0.0, 0.0)
-    colour = reflectance / (1 - specular) if specular < 1 else 0.0
+    colour = diffuse / (1 - specular) if specular < 1 else np.zeros(3)
     if gloss is not None and lacquer(specular, roughness) != mirror(specular, roughness):
         end = float(_rise(np.ones(1))[0])
         specular = max((specular - end) / (1 - end), 0.0)
-    numbers = f"{3 * f'{colour:.6g} '}{specular:.6g} {roughness:.6g}"
+    numbers = " ".join(f"{value:.6g}" for value in (*colour, specular, roughness))
     return f"void plastic {name}\n0\n0\n5 {numbers}\n"
 
 

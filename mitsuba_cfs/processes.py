@@ -32,20 +32,24 @@ class ProcessEnded(RuntimeError):
         self.last = last
 
 
-def process_pool(processes: int) -> ProcessPoolExecutor:
+def process_pool(processes: int, begin: Callable[[], object] | None = None) -> ProcessPoolExecutor:
     """A pool of fresh interpreters (Dr.Jit does not survive a fork).
 
     A worker of `concurrent.futures` waits for work for ever once its parent was killed; these end.
+
+    Args: begin: what each worker does first.
     """
     return ProcessPoolExecutor(
-        processes, mp_context=get_context("spawn"), initializer=_end_with_pool
+        processes, mp_context=get_context("spawn"), initializer=_begin, initargs=(begin,)
     )
 
 
-def _end_with_pool() -> None:
+def _begin(begin: Callable[[], object] | None) -> None:
     parent = parent_process()
     if parent is not None:
         _end_after(lambda: connection.wait([parent.sentinel]))
+    if begin is not None:
+        begin()
 
 
 def _end_after(parent_left: Callable[[], object]) -> None:

@@ -71,9 +71,13 @@ class KnownFenestration:
             found.append(FilledGroup(group, klems, tree))
         return found
 
-    def bsdfs(self) -> dict[str, BsdfFile]:
-        """The visible band of each window as finely as it is known, by GUID."""
-        return {guid: BsdfFile({"Visible": s.fine}, s.name) for guid, s in self.systems.items()}
+    def bsdfs(self, band: str = "visible") -> dict[str, BsdfFile]:
+        """The band of each window, the visible one as finely as it is known, by GUID.
+
+        Either stands as the visible one, which is what the scenes' plugins read.
+        """
+        found = {g: s.fine if band == "visible" else s.solar for g, s in self.systems.items()}
+        return {g: BsdfFile({"Visible": bsdf}, self.systems[g].name) for g, bsdf in found.items()}
 
 
 def known_fenestration(spaces: Iterable[Space], file: Path) -> KnownFenestration:

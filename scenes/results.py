@@ -27,6 +27,16 @@ class LuminancePicture:
 
 
 @dataclass(frozen=True, slots=True)
+class GridDaylight:
+    """Daylight of a sensor grid that the building's file holds."""
+
+    name: str
+    directions: NDArray[np.float64]  # [S, 3] of its sensors
+    sensor_metrics: pd.DataFrame  # as of `DaylightResult`, with relative_standard_error
+    metrics: dict[str, float]  # of the grid, by the names of a room's
+
+
+@dataclass(frozen=True, slots=True)
 class DaylightResult:
     """Work-plane illuminance of a year and the metrics drawn from it."""
 
@@ -35,6 +45,7 @@ class DaylightResult:
     relative_error: NDArray[np.float64]  # [S] standard error of the annual mean, from the tracing
     sensor_metrics: pd.DataFrame  # by sensor: x, y, z, da300, cda300, udi..., daylight_factor
     room_metrics: dict[str, float]  # sda, ase, en17037..., by name; percentages as 0..100
+    grids: tuple[GridDaylight, ...] = ()  # of the building's file, beside the work plane
 
     @property
     def sda(self) -> float:

@@ -10,10 +10,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.model import Space
-from bim.sensors import horizontal_section, sensor_grid, view_point
+from bim.model import Building, Space
+from bim.sensors import held_views, horizontal_section, sensor_grid, view_point
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.images.view import View, fisheye, parse_view
+from mitsuba_cfs.images.view import View, fisheye, fitted, parse_view
 
 MARGIN = 0.5  # of the grid of eyes from the walls [m]
 FROM_WALLS = 0.01  # least distance of an eye from what bounds the room [m]
@@ -51,6 +51,18 @@ def given_views(text: str, size: int = 800) -> list[NamedView]:
     if not found:
         raise DataError("holds no view (a line with -vta -vp ... -vd ...)", file=file)
     return found
+
+
+def held_fisheyes(building: Building, space: Space, size: int) -> list[NamedView]:
+    """The fisheye views of a room that the building's file holds, in which glare can be rated."""
+    views = [held for held in held_views(building, space) if held.is_fisheye]
+    return [NamedView(held.name, fitted(held.view, size)) for held in views]
+
+
+def held_view(building: Building, space: Space) -> NamedView | None:
+    """The first view of a room that the building's file holds and a picture can be of."""
+    views = [held for held in held_views(building, space) if held.view.kind != "parallel"]
+    return NamedView(views[0].name, views[0].view) if views else None
 
 
 def eyes_of(

@@ -23,12 +23,15 @@ from scenes.results import RoomYear, RunResult
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
 from scenes.run.files import JobFiles
+from scenes.run.job import job_inputs
+from scenes.run.netcdf import year_dataset
 from scenes.run.options import JobOptions
 from scenes.run.outputs import write_results
-from scenes.run.run import job_inputs, run_inputs
+from scenes.run.run import run_inputs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from xarray import Dataset
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +40,24 @@ class SimulatedYear(RoomYear):
 
     run: RunResult  # that it is the one room of; without it
 
-    def write(self, folder: str | PathLike[str], *, report: bool = True) -> None:
+    def write(
+        self, folder: str | PathLike[str], *, report: bool = True, netcdf: bool = False
+    ) -> None:
         """Write the files of `cfs run` in the place of its earlier ones.
 
         Raises: `DataError` where the folder holds anything else, or cannot be written to.
         """
         inputs = (Path(entry["path"]) for entry in self.run.manifest["inputs"].values())
         place = ResultFolder(Path(folder), "run", inputs=inputs, field="folder")
-        write_results(self._whole_run(), place, write_report if report else None)
+        page = write_report if report else None
+        write_results(self._whole_run(), place, page, netcdf=netcdf)
+
+    def to_xarray(self) -> Dataset:
+        """All numbers of the year with their units, see `scenes.run.netcdf`.
+
+        Raises: `DataError` where xarray is not installed.
+        """
+        return year_dataset(self._whole_run())
 
     def plot_illuminance(self, axes: Axes | None = None) -> Axes:
         """The work plane's mean illuminance by day and hour."""

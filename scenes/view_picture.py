@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Space
+from bim.model import Building, Space
 from bim.sensors import view_point
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
@@ -24,7 +24,7 @@ from mitsuba_cfs.sky.annual import annual_sky
 from scenes.picture_files import PictureFiles, read_files
 from scenes.picture_options import SUFFIXES, PictureOptions
 from scenes.pictures import write_falsecolour, write_tone_mapped
-from scenes.room_views import check_eye
+from scenes.room_views import check_eye, held_view
 from scenes.run.viewed_room import read_viewed_room
 
 
@@ -51,11 +51,12 @@ def room_picture(
     files = files or read_files(options)
     weather, hour = files.weather, files.hour
 
-    def view_of(space: Space) -> View:
-        if files.view is None:
+    def view_of(building: Building, space: Space) -> View:
+        named = files.view or held_view(building, space)
+        if named is None:
             return fisheye(*view_point(space, options.eye_height), options.size)
-        check_eye(files.view, space)
-        return fitted(files.view.view, options.size)
+        check_eye(named, space)
+        return fitted(named.view, options.size)
 
     steps = part(progress, 0.0, 0.4)
     viewed = read_viewed_room(

@@ -13,6 +13,7 @@ BRINGS_IN = [  # what a reason looks like, and what would bring its tests in
     (r"\.\./shared/data", "a folder ../shared/data with real IFC, EPW, BSDF and HDR files"),
     (r"\.\./shared/reference", "a folder ../shared/reference with results of EnergyPlus and "
                                "ASHRAE 140's example programs"),
+    (r"xarray|h5netcdf", "pip install -c constraints.txt '.[netcdf]'"),
     (r"pyproj", "pip install -c constraints.txt '.[georeference]'"),
     (r"pyradiance|Radiance|rfluxmtx|evalglare|no \w+$", PEERS),
     (r"pywincalc|the engine failed", f"{PEERS}; pywincalc has wheels for Python up to 3.12"),

@@ -42,7 +42,7 @@ SOLVERS = tuple(
         "window_reflection",
     )
 )  # fmt: skip
-IFC = ("bim/ifc/", "scenes/demo/")
+IFC = ("bim/ifc/", "scenes/demo/", "scenes/evidence/validation/")
 PLOTTING = ("scenes/",)
 LIMITED = {
     "mitsuba": TRACING,

@@ -29,7 +29,7 @@ RANKS = {
         {"demo", "figures", "plausible", "quick", "result_folder", "results", "streams",
          "toml_file", "user_errors", "pictures", "picture_options", "room_views",
          "bsdf_combination", "bsdf_generation", "bsdf_plots"},
-        {"page_options", "provision_levels"},
+        {"page_options", "provision_levels", "workers"},
         {"fenestration", "cost", "report", "plots", "photovoltaics"},
         {"room"},
         {"run", "fenestration_exports"},

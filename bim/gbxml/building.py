@@ -9,6 +9,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from bim.defaults import FACADE_REFLECTANCE
 from bim.drawn_building import DrawnModel, drawn_building
 from bim.gbxml.constructions import Constructions
 from bim.gbxml.document import Document, read_document
+from bim.gbxml.use import UseReader
 from bim.model import Building, Element, Problem
 from bim.planes import newell_normal
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, triangles_of_rings
@@ -49,7 +51,8 @@ def read_gbxml(
 ) -> Building:
     """The building of a gbXML file, in metres, turned to true north.
 
-    Read are spaces, surfaces, openings, shades, constructions with layers, window types, location.
+    Read are spaces, surfaces, openings, shades, constructions with layers, window types, location;
+    people, lamps, equipment, outdoor air and set points of spaces and zones, with their schedules.
 
     Args:
         join: rooms to make one, as "Hall + Living"; air between them goes.
@@ -59,7 +62,12 @@ def read_gbxml(
         building's `problems`.
     """
     path = Path(path)
-    return drawn_building(_Reader(read_document(path)).drawn(), join=join, furniture=furniture)
+    document = read_document(path)
+    building = drawn_building(_Reader(document).drawn(), join=join, furniture=furniture)
+    reader = UseReader(document)
+    uses = {space.guid: reader.use(space) for space in building.spaces}
+    known = {guid: use for guid, use in uses.items() if use is not None}
+    return replace(building, uses=known, problems=(*building.problems, *reader.problems))
 
 
 class _Reader:

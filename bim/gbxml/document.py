@@ -36,6 +36,12 @@ CUBIC_METRES = {
     "CubicInches": 0.0254**3,
 }  # fmt: skip
 # units of a quantity's own attribute, as factors to SI
+BTU_PER_HOUR, CFM, SQUARE_FOOT = 0.29307107, 4.71947443e-4, 0.3048**2
+WATT_PER_AREA = {"WattPerSquareMeter": 1.0, "WattPerSquareFoot": 1 / SQUARE_FOOT}
+FLOW_PER_AREA = {"LPerSecPerSquareM": 1e-3, "CFMPerSquareFoot": CFM / SQUARE_FOOT,
+                 "CubicMPerHourPerSquareM": 1 / 3600}  # fmt: skip
+FLOW = {"LPerSec": 1e-3, "CFM": CFM, "CubicMPerHr": 1 / 3600, "LPerSecPerPerson": 1e-3,
+        "CFMPerPerson": CFM}  # fmt: skip
 BTU_INCH = 0.1442279  # BTU in/(h ft2 F) in W/(m K)
 SI = {
     "U-value": {"WPerSquareMeterK": 1.0, "BtuPerHourSquareFtF": 5.678263},
@@ -45,6 +51,10 @@ SI = {
                 "LbsPerCubicFt": 16.018463},
     "SpecificHeat": {"JPerKgK": 1.0, "BTUPerLbF": 4186.8},
     "Thickness": METRES,
+    "PeopleHeatGain": {"WattPerPerson": 1.0, "BtuPerHourPerson": BTU_PER_HOUR},
+    "LightPowerPerArea": WATT_PER_AREA, "EquipPowerPerArea": WATT_PER_AREA,
+    "InfiltrationFlowPerArea": FLOW_PER_AREA, "OAFlowPerArea": FLOW_PER_AREA,
+    "OAFlowPerPerson": FLOW, "OAFlowPerSpace": FLOW, "OAFlowPerZone": FLOW,
 }  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from bim.doorways import Key, touching
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
 from bim.planes import Plane, rings_of, triangulated
@@ -25,7 +26,8 @@ def write_gbxml(
     """Write rooms, windows, constructions, reflectances and what stands outdoors as gbXML 6.01.
 
     Lost: BSDF data and shading states, gloss, furniture, what lies behind inner walls.  Polygons
-    with holes are cut into triangles, which is all that gbXML has for them.
+    with holes are cut into triangles, which is all that gbXML has for them.  An open doorway is a
+    surface of air of two spaces; the way through the wall belongs to the first of them.
 
     Args: known: U and g of windows in place of those that the building states.
     """
@@ -34,7 +36,9 @@ def write_gbxml(
         "volumeUnit": "CubicMeters", "useSIUnitsForResults": "true", "version": "6.01",
     }  # fmt: skip
     root = ElementTree.Element("gbXML", {"xmlns": SCHEMA, **units})
-    writer = _Writer(root, known or {})
+    building, sides = touching(building)
+    number_of = {space.guid: number for number, space in enumerate(building.spaces)}
+    writer = _Writer(root, known or {}, {key: number_of[other[0]] for key, other in sides.items()})
     campus = _part(root, "Campus", id="campus")
     _text(campus, "Name", building.name)
     place = _part(campus, "Location")
@@ -69,8 +73,9 @@ def write_gbxml(
 class _Writer:
     """The constructions and window types that have been asked for."""
 
-    def __init__(self, root: ElementTree.Element, known: Known) -> None:
+    def __init__(self, root: ElementTree.Element, known: Known, air: Mapping[Key, int]) -> None:
         self._root, self._known = root, known
+        self._air = air  # number of the space beyond a face of air
         self._constructions: dict[tuple, tuple[str, Construction, Face]] = {}
         self._windows: dict[tuple, tuple[str, Window]] = {}
         self._openings = 0
@@ -79,17 +84,21 @@ class _Writer:
         """The surfaces of a room, with their openings."""
         count = 0
         for part in hosted_polygons(space):
+            beyond = self._air.get((space.guid, part.face.name)) if part.face is not None else None
+            if beyond is not None and beyond < number:
+                continue  # written with the other room
             for polygon in _without_holes(part):
                 guid = f"surface-{number}-{count}"
                 count += 1
-                kind = _kind(part)
-                refers = {} if part.face is None else {
+                kind = _kind(part) if beyond is None else "Air"
+                refers = {} if part.face is None or beyond is not None else {
                     "constructionIdRef": self._construction(part.face)
                 }  # fmt: skip
                 one = _part(campus, "Surface", id=guid, surfaceType=kind, **refers)
                 name = part.panes[0][0].name if part.face is None else part.face.name
                 _text(one, "Name", f"{space.label} {name}")
-                _part(one, "AdjacentSpaceId", spaceIdRef=f"space-{number}")
+                for own in (number,) if beyond is None else (number, beyond):
+                    _part(one, "AdjacentSpaceId", spaceIdRef=f"space-{own}")
                 _loop(one, part.plane, polygon)
                 for window, pane in part.panes:
                     if polygon.contains(pane.representative_point()):

@@ -7,6 +7,7 @@ honeybee's own recipes take them; where one of the two is missing, the other sta
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -16,8 +17,7 @@ from bim.defaults import FACADE_REFLECTANCE
 from bim.drawn_building import DrawnModel, drawn_building
 from bim.fenestration import ShadingState
 from bim.honeybee.energy import EnergyLibrary, OpaqueValues
-from bim.honeybee.left_out import left_out
-from bim.honeybee.library import OUTDOORS, PARTS
+from bim.honeybee.library import OUTDOORS, PARTS, listed
 from bim.honeybee.radiance import ModifierLibrary
 from bim.honeybee.schema import (
     Condition,
@@ -30,7 +30,9 @@ from bim.honeybee.schema import (
     ShadeMesh,
     read_model,
 )
-from bim.model import Building, Element, Problem
+from bim.honeybee.sensors import SensorReader, shade_problems
+from bim.honeybee.use import UseLibrary
+from bim.model import NOT_USED, Building, Element, Problem
 from bim.planes import newell_normal
 from bim.polygon_rooms import (
     DrawnFace,
@@ -63,7 +65,20 @@ def read_honeybee(
         building's `problems`.
     """
     path = Path(path)
-    return drawn_building(_Reader(read_model(path), path).drawn(), join=join, furniture=furniture)
+    model = read_model(path)
+    building = drawn_building(_Reader(model, path).drawn(), join=join, furniture=furniture)
+    return _used(building, model, path)
+
+
+def _used(building: Building, model: HoneybeeModel, path: Path) -> Building:
+    """The building with the use of its rooms, sensor grids and views."""
+    library, sensors = UseLibrary(model.properties.energy, path), SensorReader(model, path)
+    rooms = {room.identifier: room for room in model.rooms or ()}
+    uses = {s.guid: library.use(rooms[s.guid], s) for s in building.spaces}
+    known = {guid: use for guid, use in uses.items() if use is not None}
+    grids, views = sensors.grids(), sensors.views()
+    problems = (*building.problems, *library.problems, *sensors.problems)
+    return replace(building, uses=known, grids=grids, views=views, problems=problems)
 
 
 class _Reader:
@@ -75,6 +90,7 @@ class _Reader:
         self.light = ModifierLibrary(model.properties.radiance, path)
         self.problems: list[Problem] = []
         self.rooms = {room.identifier for room in model.rooms or ()}
+        self.groups: dict[str, list[str]] = {}  # dynamic ones, with their apertures
 
     def drawn(self) -> DrawnModel:
         """The model as polygons."""
@@ -99,8 +115,11 @@ class _Reader:
         many = [room.label for room in model.rooms or () if room.multiplier > 1]
         if many:
             what = f"multipliers of {', '.join(many[:4])}"
-            self.problems.append(Problem(self.path.name, what, "each such room is counted once"))
-        self.problems += left_out(model, self.path)
+            self.problems.append(
+                Problem(self.path.name, what, "each such room is counted once", kind=NOT_USED)
+            )
+        self.problems += shade_problems(model, self.path)
+        self._group_problems()
         return DrawnModel(
             self.path, model.label, rooms, tuple(elements), furniture, tuple(self.problems)
         )
@@ -205,23 +224,38 @@ class _Reader:
     def _states(
         self, one: HoneybeeAperture, modifier: str | None, values: GlazingValues
     ) -> tuple[ShadingState, ...]:
-        """The BSDFs of an aperture: of its modifier, and of its dynamic states."""
-        found = []
-        listed = one.properties.radiance.get("states") or []
-        listed = listed if isinstance(listed, list) else []
-        names = [modifier, *(s.get("modifier") for s in listed[1:] if isinstance(s, dict))]
-        clear = 0
+        """The optics of an aperture by state: BSDFs; of a dynamic group also its panes of glass."""
+        held = one.properties.radiance.get("states") or []
+        held = [s for s in held if isinstance(s, dict)] if isinstance(held, list) else []
+        names = [modifier, *(s.get("modifier") for s in held[1:])]
+        found, missing = [], 0
         for number, name in enumerate(names):
             label = "" if number == 0 else str(name)
             state = self.light.state(name, label) if isinstance(name, str) else None
+            if state is None and isinstance(name, str) and len(names) > 1:
+                state = self.light.pane_state(name, label, values)
             if state is not None:
                 found.append(_with_values(state, values, shaded=number > 0))
             elif number:
-                clear += 1
-        if clear:
-            what = f"{one.label}: {clear} of its states have no BSDF"
-            self.problems.append(Problem(one.identifier, what, "left out; --operation gives some"))
+                missing += 1
+        group = one.properties.radiance.get("dynamic_group_identifier")
+        if found and isinstance(group, str):
+            self.groups.setdefault(group, []).append(one.label)
+        if missing:
+            what = f"{one.label}: {missing} of its states are neither a BSDF nor a pane of glass"
+            self.problems.append(
+                Problem(one.identifier, what, "left out; --operation gives some", kind=NOT_USED)
+            )
+        if any(state.get("shades") for state in held):
+            what = f"{one.label}: its states have shades of their own"
+            self.problems.append(Problem(one.identifier, what, "left out", kind=NOT_USED))
         return tuple(found) if found and found[0].name == "" else ()
+
+    def _group_problems(self) -> None:
+        if len(self.groups) > 1:
+            what = f"{len(self.groups)} dynamic groups of apertures: {listed(list(self.groups))}"
+            done = "their states change together, by number"
+            self.problems.append(Problem(self.path.name, what, done, kind=NOT_USED))
 
     def _orphan(self, face: RoomFace, kind: str) -> Iterator[Element]:
         rings = face.geometry.rings(self.scale)
@@ -276,11 +310,12 @@ def _by_construction(opaque: OpaqueValues | None) -> SurfaceFinish:
 
 
 def _with_values(state: ShadingState, values: GlazingValues, *, shaded: bool) -> ShadingState:
-    """A BSDF with U and g of the construction; those of a shaded state are not known."""
+    """A state with U and g of the construction; g of a state but the first is not known."""
     if shaded:
-        return state
-    return ShadingState(
-        state.name, state.bands, u_value=values.u_value, g_normal=values.g_value,
+        pane = state.angular is not None  # of glass: as much heat goes through it
+        return replace(state, u_value=values.u_value, shading_position="none") if pane else state
+    return replace(
+        state, u_value=values.u_value, g_normal=values.g_value,
         shading_position="none" if values.g_value is not None else None,
     )  # fmt: skip
 

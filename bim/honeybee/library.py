@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from mitsuba_cfs.errors import DataError
 OUTDOORS = ("Outdoors", "Ground")
 PARTS = {"Wall": "wall_set", "Floor": "floor_set", "RoofCeiling": "roof_ceiling_set"}
 MOST = 1e9  # a number of a file beyond this is a fault of it
+NAMED = 4  # of many things so many are named
 
 
 class NamedObjects:
@@ -79,3 +80,9 @@ class NamedObjects:
             if not isinstance(one, dict) or not isinstance(one.get("identifier"), str):
                 raise DataError("expected objects with an identifier", file=self.file, field=kind)
         return {one["identifier"]: one for one in listed}
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first few names, and how many more there are."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more

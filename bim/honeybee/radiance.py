@@ -15,10 +15,15 @@ from typing import Any
 
 from bim.fenestration import ShadingState
 from bim.honeybee.library import NamedObjects
+from bim.polygon_rooms import GlazingValues
 from bim.radiance.materials import RadianceMaterial, material_of
 from bim.radiance.primitives import VOID, Primitive
+from mitsuba_cfs.bsdf.angular import roos_table
+from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.gloss import pane_shares
 
 COLOURS = ("r", "g", "b")
 OPAQUE_FIELDS = {
@@ -75,7 +80,29 @@ class ModifierLibrary:
         if name not in self._states:
             self._states[name] = self._bsdf(modifier)
         held = self._states[name]
-        return ShadingState(name=label, bands=held.bands)
+        return ShadingState(name=label, bands=held.bands, angular=held.angular)
+
+    def pane_state(self, name: str, label: str, values: GlazingValues) -> ShadingState | None:
+        """A modifier of glass as a shading state; None where it is none.
+
+        Its sun is the construction's, as much more or less as its light (a tint of one colour).
+        """
+        material = self.material(name)
+        if material is None or material.kind != "glass":
+            return None
+        tau, rho = map(float, pane_shares(1.0, material.index, material.transmissivity))
+        ratio = 1.0
+        if values.solar is not None and values.visible:
+            ratio = values.solar / values.visible
+        through = min(tau * ratio, 1.0 - rho)
+        panes = values.panes or 2
+        clear = Glazing(name, tau, rho, rho, panes)
+        sun = Glazing(name, through, rho, rho, panes)
+        bands = {
+            "Visible": specular_klems(clear, KLEMS_FULL),
+            "Solar": specular_klems(sun, KLEMS_FULL),
+        }
+        return ShadingState(name=label, bands=bands, angular=roos_table(clear))
 
     def _bsdf(self, modifier: Mapping[str, Any]) -> ShadingState:
         name, data = modifier["identifier"], modifier.get("bsdf_data")

@@ -2,6 +2,7 @@
 
 A window's glass is an aperture of the face that it lies in: its frame, else the wall around it,
 else a face of its own that is a thousandth wider.  Reveals are walls with an adiabatic condition.
+Open doorways are air boundaries: the way through the wall belongs to the first of the two rooms.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from bim.doorways import Key, touching
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
 from bim.planes import Plane, rings_of
@@ -38,7 +40,9 @@ def write_honeybee(
     library = _Library(known or {})
     names = _Names()
     guids = {space.guid: names.of(space.label) for space in building.spaces}
-    rooms = [_room(space, guids, names, library) for space in building.spaces]
+    building, sides = touching(building)
+    air = _air_boundaries(building, sides, guids, names)
+    rooms = [_room(space, guids, names, library, air=air) for space in building.spaces]
     windows = {window.guid for window in building.windows}
     meshes = [_mesh(e, names, library) for e in building.elements if e.guid not in windows]
     model = {
@@ -144,14 +148,44 @@ class _Library:
         return {"type": "ModelRadianceProperties", "modifiers": list(self._modifiers.values())}
 
 
-def _room(space: Space, guids: Mapping[str, str], names: _Names, library: _Library) -> dict:
+def _air_boundaries(
+    building: Building, sides: Mapping[Key, Key], guids: Mapping[str, str], names: _Names
+) -> dict[Key, dict]:
+    """Identifier and condition of each face of air, by room and face."""
+    labels = {key: names.of(f"{guids[key[0]]}_{key[1]}") for key in sides}
+    return {
+        key: {
+            "identifier": labels[key], "face_type": "AirBoundary",
+            "boundary_condition": {
+                "type": "Surface", "boundary_condition_objects": [labels[other], guids[other[0]]],
+            },
+            "properties": _properties("Face"),
+        }
+        for key, other in sides.items()
+    }  # fmt: skip
+
+
+def _room(
+    space: Space,
+    guids: Mapping[str, str],
+    names: _Names,
+    library: _Library,
+    *,
+    air: Mapping[Key, dict],
+) -> dict:
     own = guids[space.guid]
-    faces = [
-        _own_face(part, own, names, library)
-        if part.face is None
-        else _face(part, part.face, own=own, names=names, library=library)
-        for part in hosted_polygons(space)
-    ]
+    faces = []
+    for part in hosted_polygons(space):
+        if part.face is None:
+            faces.append(_own_face(part, own, names, library))
+            continue
+        boundary = air.get((space.guid, part.face.name))
+        faces.append(
+            _face(part, part.face, own=own, names=names, library=library)
+            if boundary is None
+            else {"type": "Face", "display_name": part.face.name, **boundary,
+                  "geometry": _geometry(part.plane, part.polygon)}
+        )  # fmt: skip
     return {
         "type": "Room", "identifier": own, "display_name": space.label, "faces": faces,
         "story": space.storey or None, "properties": _properties("Room"),

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from bim.account import Account, StoreyAccount
+from bim.ifc.defects import DRAWN_TWICE
 from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms
 from bim.ifc.project import CUT_OFF, storey_of
 from bim.ifc.source import Source
@@ -30,7 +31,7 @@ def account_of(
     Args:
         read: the spaces that are rooms, before any were joined; found ones where there are none.
         built: the finished rooms.
-        repeated: GUIDs of spaces that draw a room again: not counted.
+        repeated: GUIDs of spaces that draw a room again: not counted, nor are such windows.
     """
     drawn = [s for s in source.model.by_type("IfcSpace") if s.GlobalId not in repeated]
     failed = {p.where for p in problems if p.lost == "room"}
@@ -41,7 +42,10 @@ def account_of(
     used: Counter[str] = Counter()
     for window in (window for space in built for window in space.windows):
         used[window.guid] += window.area
-    panes = [one for one in glass.glass if one.out > 0]
+    again = {p.where for p in problems if p.kind == DRAWN_TWICE}
+    panes = [
+        one for one in glass.glass if one.out > 0 and (used[one.guid] or one.guid not in again)
+    ]
     lost = {one.guid: one.out - one.used for one in panes if one.out - one.used > 0.01}
     low = {one.guid for one in panes if one.low is not None}
     return Account(

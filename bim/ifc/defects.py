@@ -16,6 +16,7 @@ from bim.planes import area_vectors
 from bim.solids import PackedSolid, Solid, packed
 from mitsuba_cfs.processes import ProcessEnded
 
+DRAWN_TWICE = "drawn twice"  # kind of a problem
 SAME_PLACE = 0.002  # boxes that agree to this are one element drawn twice [m]
 SAME_AREA = 0.3  # if their surfaces agree to this share: only one may have its openings cut
 FLAT, UPRIGHT = 0.5, 1.5  # a slab is lower than this, a wall higher [m]
@@ -73,7 +74,8 @@ def drawn_twice(shapes: Sequence[Shape]) -> list[Problem]:
             same = np.abs(box - theirs).max() < SAME_PLACE
             if same and abs(area - their_area) < SAME_AREA * area:
                 what = f"{shape.ifc_class} {shape.name}: lies where {other.guid} lies"
-                problems.append(Problem(shape.guid, what, "drawn twice: both are kept"))
+                done = f"{DRAWN_TWICE}: both are kept"
+                problems.append(Problem(shape.guid, what, done, kind=DRAWN_TWICE))
                 break
         bucket.append((shape, box, area))
     return problems

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.boundaries import ElementRecord, Finishes
+from bim.colours import GREY
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE, SITE_REFLECTANCE
 from bim.ifc.materials import MaterialReader
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
-from bim.model import GREY, Element, Problem
+from bim.model import Element, Problem
 from mitsuba_cfs.gloss import Gloss
 
 SITE = ("IfcSite", "IfcGeographicElement")
@@ -31,10 +32,11 @@ def bounding_elements(
     reader = MaterialReader(model)
     records = [_record(model.by_id(shape.step_id), reader, rotation) for shape in shapes]
     faults: dict[str, Problem] = {}
-    values, gloss, tint = [], [], []
+    values, gloss, hues = [], [], []
     for shape in shapes:
         glosses = np.array([*(look.gloss for look in shape.looks), None], dtype=object)
         by_look = np.full((len(shape.looks) + 1, 2), -1.0)
+        hue = np.array([*(GREY if look.is_glass else look.hue for look in shape.looks), GREY])
         for i, look in enumerate(shape.looks):
             by_look[i] = GLASS_REFLECTANCE if look.is_glass else look.reflectances
             if look.fault and not look.is_glass:
@@ -45,15 +47,14 @@ def bounding_elements(
             by_look[:] = np.maximum(np.array(stated) - mirrored[:, None], 0.0)
         values.append(by_look[shape.look])
         gloss.append(glosses[shape.look])
-        tints = [GREY if look.is_glass else look.tint for look in shape.looks]
-        tint.append(np.array([*tints, GREY])[shape.look])
+        hues.append(hue[shape.look])
     problems = [*reader.problems.values(), *faults.values()]
-    reflectances = np.concatenate(values or [np.empty((0, 2))])
-    glosses, tints = (
+    finishes = Finishes(
+        np.concatenate(values or [np.empty((0, 2))]),
         np.concatenate([np.empty(0, object), *gloss]),
-        np.concatenate([np.empty((0, 3)), *tint]),
+        np.concatenate(hues or [np.empty((0, 3))]),
     )
-    return records, Finishes(reflectances, glosses, tints), problems
+    return records, finishes, problems
 
 
 def _record(
@@ -104,17 +105,17 @@ def outdoor_elements(
         )  # fmt: skip
         for index in np.unique(shape.look):
             visible = solar = default
-            gloss, tint = None, GREY
+            gloss, hue = None, GREY
             if index >= 0:
                 look = shape.looks[index]
-                (visible, solar), gloss = look.reflectances, look.gloss
-                tint = GREY if look.is_glass else look.tint
+                (visible, solar), gloss, hue = look.reflectances, look.gloss, look.hue
                 if look.is_glass:
                     gloss = panes if gloss is None else gloss
                     # what a pane mirrors is no diffuse light
                     visible = solar = GLASS_REFLECTANCE if gloss is None else 0.0
+                    hue = GREY
             if reflectance is not None:
-                visible, solar, gloss = reflectance, reflectance, None
+                visible, solar, gloss, hue = reflectance, reflectance, None, GREY
             result.append(
                 replace(
                     base,
@@ -122,7 +123,7 @@ def outdoor_elements(
                     reflectance_visible=visible,
                     reflectance_solar=solar,
                     gloss=gloss,
-                    tint=tint if reflectance is None else GREY,
+                    hue=hue,
                 )
             )
     return result

@@ -10,6 +10,7 @@ import ifcopenshell.util.unit
 import numpy as np
 
 from bim.apertures import Filling
+from bim.colours import GREY
 from bim.ifc.project import definitions_of, psets_of
 from bim.ifc.shapes import Shape
 from bim.model import Problem
@@ -112,6 +113,7 @@ def _filling(element, shape: Shape, body: Shape | None, host, scale: float) -> F
         frame_reflectance=opaque[0].reflectance if opaque else None,
         solar_transmittance=_number(psets, "SolarTransmittance"),
         panes=None if panes is None else round(panes),
+        frame_hue=opaque[0].hue if opaque else GREY,
     )
 
 

@@ -20,7 +20,7 @@ from bim.defaults import FURNITURE_REFLECTANCE
 from bim.drawn_shades import hangs_at, is_named_shade
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source, painted
-from bim.model import GREY, Element, Problem, Space
+from bim.model import Element, Problem, Space
 from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
 
@@ -114,17 +114,12 @@ def _elements(shape: Shape) -> list[Element]:
     )  # fmt: skip
     found = []
     for index in np.unique(shape.look[~shape.transparent]):
-        visible, solar, tint = FURNITURE_REFLECTANCE, FURNITURE_REFLECTANCE, GREY
+        piece = replace(base, triangles=shape.triangles[shape.look == index])
         if index >= 0:
-            (visible, solar), tint = shape.looks[index].reflectances, shape.looks[index].tint
-        part = shape.triangles[shape.look == index]
-        found.append(
-            replace(
-                base,
-                triangles=part,
-                reflectance_visible=visible,
-                reflectance_solar=solar,
-                tint=tint,
+            look = shape.looks[index]
+            visible, solar = look.reflectances
+            piece = replace(
+                piece, reflectance_visible=visible, reflectance_solar=solar, hue=look.hue
             )
-        )
+        found.append(piece)
     return found

@@ -16,7 +16,7 @@ from bim.ifc.passages import LARGEST_DOOR, Passage, passages
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.model import JOINED, Problem
-from bim.names import found_by_name
+from bim.names import JOINT, found_by_name
 from bim.rooms import room_solid
 from bim.solids import packed, unpacked
 from mitsuba_cfs.errors import DataError, RoomError
@@ -48,16 +48,28 @@ def joined_rooms(
         records, more = _joined_by_size(records, ways)
         problems += more
         ways = passages(apertures, records, bodies)
-    named = {record.guid: record for record in records}
+    return records, ways, [*problems, *_open_pairs(records, ways, source)]
+
+
+def _open_pairs(
+    records: Sequence[SpaceRecord], ways: Sequence[Passage], source: Source
+) -> list[Problem]:
+    """What there is to say of each pair of rooms that stay open to each other, once."""
+    by_pair: dict[frozenset[str], list[Passage]] = {}
     for way in ways:
-        pair = sorted((named[guid] for guid in way.rooms), key=lambda room: room.label)
+        by_pair.setdefault(way.rooms, []).append(way)
+    named = {record.guid: record for record in records}
+    problems = []
+    for rooms, own in by_pair.items():
+        pair = sorted((named[guid] for guid in rooms), key=lambda room: room.label)
         labels = " and ".join(room.label for room in pair)
-        what = f"rooms {labels} are open to each other by {way.area:.1f} m2"
+        what = f"rooms {labels} are open to each other by {sum(way.area for way in own):.1f} m2"
+        what += f" in {len(own)} openings" if len(own) > 1 else ""
         how = _how_to_join(pair, records, source)
-        if way.is_large:
+        if any(way.is_large for way in own):
             how += f"; --join open joins all that open by more than a door ({LARGEST_DOOR:g} m2)"
-        problems.append(Problem(way.opening, what, how, kind="open to each other"))
-    return records, ways, problems
+        problems.append(Problem(own[0].opening, what, how, kind="open to each other"))
+    return problems
 
 
 def _joined_by_size(
@@ -141,11 +153,11 @@ def _joined(parts: list[SpaceRecord], ways: Sequence[Passage]) -> SpaceRecord | 
         return None
     body = unpacked(found)
     first = parts[0]
-    name = " + ".join(part.name for part in parts)
+    name = JOINT.join(part.name for part in parts)
     areas, volumes = ([getattr(p, key) for p in parts] for key in ("stated_area", "stated_volume"))
     return SpaceRecord(
         room_solid(first.solid.guid, name, body), name,
-        " + ".join(part.long_name for part in parts if part.long_name), first.storey,
+        JOINT.join(part.long_name for part in parts if part.long_name), first.storey,
         body.volume(), None if None in areas else sum(areas),
         None if None in volumes else sum(volumes),
         first.type_name if len({part.type_name for part in parts}) == 1 else "",

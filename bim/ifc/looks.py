@@ -8,15 +8,13 @@ from dataclasses import dataclass
 
 import ifcopenshell
 
+from bim.colours import GREY, Colour, hue_of, linear_of_display, luminance
 from bim.defaults import HIGHEST_REFLECTANCE, LOWEST_REFLECTANCE
-from bim.model import GREY
 from mitsuba_cfs.gloss import ROUGHEST, Gloss, dielectric, mirror, pane
 
 CLEAR = 0.25  # transparency from which a surface is glass
 SATIN = 0.1  # alpha of metal and plastic whose style states no highlight
 GLASS_INDEX = 1.52
-Colour = tuple[float, float, float]
-BLACK: Colour = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +27,7 @@ class Look:
     fault: str = ""  # what is wrong with the file's value, "" if nothing
     solar: float | None = None  # diffuse, solar; None: as visible
     gloss: Gloss | None = None  # what it reflects like a mirror besides
-    tint: Colour = GREY  # linear sRGB over its luminance
+    hue: Colour = GREY  # of the diffuse part: linear sRGB of luminance 1
 
     @property
     def reflectances(self) -> tuple[float, float]:
@@ -57,19 +55,19 @@ def look_of(
     with contextlib.suppress(Exception):  # names of other kinds, or ids that do not exist
         shading = model.by_id(int(name.rsplit("-", 1)[1]))
     label = name
-    shown = _linear(_bounded(colour))
+    linear = linear_of_display(_bounded(colour))
     if shading is not None and shading.is_a("IfcSurfaceStyleShading"):
         style = _style_of(model, shading)
         label = (style.Name if style is not None else None) or name
-        shown = _reflected(shading, style)
+        linear = _reflected(shading, style)
         given = getattr(shading, "Transparency", None)
         transparency = transparency if given is None else float(given)
-    value = _luminance(shown)
+    value = luminance(linear)
     bounded = min(max(value, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE)
     fault = "" if bounded == value else f"reflects {value:.2f}: taken as {bounded:.2f}"
     transparency = min(max(float(transparency), 0.0), 1.0)
     diffuse, gloss = _gloss(shading, bounded, transparency > CLEAR)
-    return Look(label, diffuse, transparency, fault, None, gloss, _tint(shown))
+    return Look(label, diffuse, transparency, fault, None, gloss, hue_of(linear))
 
 
 def _gloss(shading, reflectance: float, clear: bool) -> tuple[float, Gloss | None]:
@@ -88,7 +86,7 @@ def _gloss(shading, reflectance: float, clear: bool) -> tuple[float, Gloss | Non
     if method in ("MIRROR", "METAL"):
         specular = getattr(shading, "SpecularColour", None)
         if specular is not None and specular.is_a("IfcColourRgb"):
-            reflectance = _luminance(_rgb(specular))
+            reflectance = luminance(_rgb(specular))
         return 0.0, mirror(min(reflectance, 1.0), alpha)
     gloss = dielectric(GLASS_INDEX, alpha)
     return reflectance * (1 - gloss.at_normal), gloss
@@ -117,7 +115,7 @@ def _style_of(model: ifcopenshell.file, shading: ifcopenshell.entity_instance):
 
 
 def _reflected(shading: ifcopenshell.entity_instance, style) -> Colour:
-    """Diffuse reflectance of a shading in three bands, from the most physical of its entries."""
+    """Diffuse reflectance of a shading in linear sRGB, from the most physical of its entries."""
     for other in style.Styles if style is not None else ():
         if other.is_a("IfcSurfaceStyleLighting"):
             return _rgb(other.DiffuseReflectionColour)
@@ -125,7 +123,7 @@ def _reflected(shading: ifcopenshell.entity_instance, style) -> Colour:
     if diffuse is not None and diffuse.is_a("IfcColourRgb"):
         return _rgb(diffuse)
     factor = 1.0 if diffuse is None else float(diffuse.wrappedValue)
-    red, green, blue = _linear(_rgb(shading.SurfaceColour))
+    red, green, blue = linear_of_display(_rgb(shading.SurfaceColour))
     return factor * red, factor * green, factor * blue
 
 
@@ -135,24 +133,4 @@ def _rgb(colour: ifcopenshell.entity_instance) -> Colour:
 
 def _bounded(values: Sequence[float]) -> Colour:
     red, green, blue = (min(max(float(v), 0.0), 1.0) if v == v else 0.0 for v in values)
-    return red, green, blue
-
-
-def _luminance(linear: Colour) -> float:
-    """Luminance weights of IEC 61966-2-1:1999 on linear red, green, blue; grey keeps its value."""
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-
-def _tint(linear: Colour) -> Colour:
-    """A colour over its luminance; black is grey."""
-    luminance = _luminance(linear)
-    if luminance <= 0:
-        return GREY
-    red, green, blue = (c / luminance for c in linear)
-    return red, green, blue
-
-
-def _linear(colour: Colour) -> Colour:
-    """Linear light of a colour given as display values (IEC 61966-2-1:1999, sRGB)."""
-    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)
     return red, green, blue

@@ -20,6 +20,7 @@ LOG = logging.getLogger(__name__)
 # exact polyhedra first, OpenCASCADE for curved bodies: half the time of OpenCASCADE alone on the
 # files tried, and one of them (247 walls, 5 MB zipped) was not finished by it in five minutes
 KERNEL = "hybrid-cgal-simple-opencascade"
+NO_ELEMENTS = ("IfcSpace", "IfcOpeningElement", "IfcOpeningStandardCase")
 SKIPPED = (  # classes that neither bound a room nor shade a window: they are not meshed at all
     "IfcAnnotation",
     "IfcGrid",

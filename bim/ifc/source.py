@@ -9,6 +9,7 @@ from pathlib import Path
 import ifcopenshell
 import numpy as np
 
+from bim.colours import GREY
 from bim.ifc.corrections import Corrections, Paint
 from bim.ifc.looks import Look
 from bim.ifc.placing import Placed, ground_level, in_world
@@ -22,12 +23,11 @@ from bim.ifc.project import (
     site_location,
 )
 from bim.ifc.quantities import QuantityScales
-from bim.ifc.shapes import Shape, read_shapes
+from bim.ifc.shapes import NO_ELEMENTS, Shape, read_shapes
 from bim.ifc.transparent import judged_transparent
 from bim.model import Problem
 
 Progress = Callable[[str, float], None]
-NO_ELEMENTS = ("IfcSpace", "IfcOpeningElement", "IfcOpeningStandardCase")
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,8 @@ def opaque(shape: Shape) -> Shape:
 
 def painted(shape: Shape, paint: Paint) -> Shape:
     """The shape with all that is not glass in one paint; of glass a gloss alone is taken."""
-    values = {"reflectance": paint.visible, "solar": paint.solar, "fault": "", "gloss": paint.gloss}
+    values = {"reflectance": paint.visible, "solar": paint.solar, "fault": "", "hue": GREY}
+    values["gloss"] = paint.gloss
     looks = tuple(
         (replace(look, gloss=paint.gloss) if paint.gloss else look)
         if look.is_glass

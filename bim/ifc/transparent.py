@@ -13,6 +13,11 @@ order:
 4. What a material names otherwise is opaque.
 5. What has no material, or one that says nothing, is glass where it is as thin as a pane (60 mm)
    and lets half of the light of the screen through; opaque else.
+6. A sheet of these that lies on something else, as a banner on a wall or a film on a pane, is left
+   out.
+
+A transparent member is opaque where it is a bar, no wider than 0.2 m: the style of the panes is
+often that of the whole curtain wall.
 
 What faces down from a room is never glass (`is_phantom`), and between two rooms none of them is.
 The thicknesses are our own judgement.
@@ -22,24 +27,29 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import ifcopenshell
 import ifcopenshell.util.element
 import numpy as np
 
-from bim.apertures import main_direction
+from bim.apertures import FLAT, main_direction
 from bim.defaults import UNKNOWN_MATERIAL
 from bim.ifc.materials import default_material
-from bim.ifc.shapes import Shape
+from bim.ifc.shapes import NO_ELEMENTS, Shape
 from bim.model import Problem
 from bim.names import plain_text
 from bim.planes import area_vectors
+from bim.rays import RayMesh, ray_mesh
 
 JUDGED = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering", "IfcBuildingElementProxy")
 THINNEST, THICKEST = 0.001, 0.06  # of a pane with its spacers [m]
 PHANTOM = "no glass"  # kinds of problems that begin so are of transparent surfaces without glass
-HALF = 0.5  # display transparency of a pane that nothing else names
+BAR = 0.2  # width up to which a member is no pane [m]
+LIES_ON = 0.03  # from a sheet to what it lies on [m]
+WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / [[3], [6], [6], [6]]  # triangles
+HALF = 0.5  # display transparency of a pane that nothing else names; share of a sheet's area
 DOWN = -0.5  # z of an outward normal from which a face looks down: 30 degrees below the horizon
 AIR = re.compile(r"(?<![^\W_])(air|luft|aire|aria|lucht|ilma)(?![^\W_])|空気|воздух")
 SEPARATION = re.compile(
@@ -63,11 +73,19 @@ def judged_transparent(
     """
     kept: dict[int, Shape] = {}
     problems = []
+    judgements = {
+        key: _judged(model.by_id(key), shape)
+        for key, shape in shapes.items()
+        if shape.ifc_class.startswith((*JUDGED, "IfcMember")) and shape.transparent.any()
+    }
+    sheets = {key for key, (judged, _) in judgements.items() if judged is shapes[key]}
+    lying = _lying(shapes, sheets, set(judgements))
     for key, shape in shapes.items():
-        if not shape.ifc_class.startswith(JUDGED) or not shape.transparent.any():
+        if key not in judgements:
             kept[key] = shape
             continue
-        judged, why = _judged(model.by_id(key), shape)
+        on_another = None, "which lies on something else"
+        judged, why = on_another if key in lying else judgements[key]
         if judged is not None:
             kept[key] = judged
         if judged is not shape:
@@ -94,6 +112,11 @@ def transparent_area(shape: Shape) -> float:
 
 def _judged(element: ifcopenshell.entity_instance, shape: Shape) -> tuple[Shape | None, str]:
     """The shape as it is, opaque, or None where it is no body, and why."""
+    if shape.ifc_class.startswith("IfcMember"):
+        if not _is_bar(shape):
+            return shape, ""
+        solid = tuple(replace(look, transparency=0.0) for look in shape.looks)
+        return replace(shape, looks=solid), "a bar of a frame"
     materials = _material_texts(element)
     own = plain_text(f"{element.Name or ''} {getattr(element, 'ObjectType', None) or ''}")
     thickness = _thickness(shape)
@@ -111,6 +134,43 @@ def _judged(element: ifcopenshell.entity_instance, shape: Shape) -> tuple[Shape 
     if any(_names_a_body(text) for text in materials):
         return replace(shape, looks=looks), "of a material that is no glass"
     return replace(shape, looks=looks), "which nothing calls glass"
+
+
+def _lying(
+    shapes: Mapping[int, Shape], sheets: Collection[int], judged: Collection[int]
+) -> set[int]:
+    """STEP ids of those sheets that lie on another body, or another window.
+
+    Args: judged: transparent elements, on which no other one lies.
+    """
+    if not sheets:
+        return set()
+    bodies = [
+        shape.triangles for key, shape in shapes.items()
+        if key not in judged and shape.ifc_class not in NO_ELEMENTS
+        and not shape.ifc_class.startswith("IfcSite")
+    ]  # fmt: skip
+    mesh = ray_mesh(np.concatenate(bodies or [np.empty((0, 3, 3))]))
+    return {key for key in sheets if _lies_on(shapes[key], mesh)}
+
+
+def _lies_on(shape: Shape, bodies: RayMesh) -> bool:
+    """Whether something stands at most of a sheet's area, on either side."""
+    clear = shape.triangles[shape.transparent]
+    direction = main_direction(clear)
+    if direction is None:
+        return False
+    vectors = area_vectors(clear)
+    flat = np.abs(vectors @ direction) > FLAT * np.linalg.norm(vectors, axis=1)
+    heights = clear[flat] @ direction
+    middle, thickness = 0.5 * (heights.max() + heights.min()), float(np.ptp(heights))
+    points = np.einsum("pk,tkd->tpd", WITHIN, clear[flat])
+    points += (middle - points @ direction)[..., None] * direction
+    origins = np.repeat(points.reshape(-1, 3), 2, axis=0)
+    sides = np.tile([direction, -direction], (len(origins) // 2, 1))
+    _, hit = bodies.first_hits(origins, sides, 0.5 * thickness + LIES_ON)
+    stands = (hit >= 0).reshape(-1, len(WITHIN), 2).any(axis=2).mean(axis=1)
+    return bool(np.average(stands, weights=np.linalg.norm(vectors[flat], axis=1)) > HALF)
 
 
 def _is_pane(look, materials: list[str], thickness: float) -> bool:
@@ -141,6 +201,13 @@ def _material_texts(element: ifcopenshell.entity_instance) -> list[str]:
             for one in ifcopenshell.util.element.get_materials(element)
         ]
     return []
+
+
+def _is_bar(shape: Shape) -> bool:
+    """Whether the body is narrow in two of its three directions."""
+    corners = np.unique(shape.triangles.reshape(-1, 3).round(6), axis=0)
+    _, _, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
+    return bool(np.sort(np.ptp(corners @ axes.T, axis=0))[-2] <= BAR)
 
 
 def _thickness(shape: Shape) -> float:

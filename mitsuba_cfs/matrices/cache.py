@@ -13,6 +13,7 @@ import sys
 import time
 import zipfile
 import zlib
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -26,6 +27,8 @@ from mitsuba_cfs.source_code import code_version
 
 VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
+KEPT_HASHES = 32  # of dataclasses
+PLAIN = {type(None), bool, int, float, str, bytes}  # whose `repr` tells values apart
 UNREADABLE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
 
 log = logging.getLogger(__name__)
@@ -169,11 +172,36 @@ def kept_or_found(
 
 
 def digest(*values: object) -> str:
-    """A hash of numbers, texts, arrays, dataclasses and sequences of them, by value."""
+    """A hash of numbers, texts, arrays, dataclasses and sequences of them, by value.
+
+    Dataclasses are not written to once they were hashed: of the last ones the hash is kept. A
+    room's matrices have the same surfaces in their keys some fifteen times, those of a whole
+    building among them.
+    """
     state = hashlib.sha256()
     for value in values:
-        _feed(state, value)
+        if is_dataclass(value) and not isinstance(value, type):
+            state.update(b"record;" + _kept_hash(value))
+        else:
+            _feed(state, value)
     return state.hexdigest()
+
+
+def _kept_hash(value: object) -> bytes:
+    """The hash of a dataclass, found again while it is among the last that were hashed."""
+    kept = _last_hashed.pop(id(value), None)
+    if kept is None:
+        state = hashlib.sha256()
+        _feed(state, value)
+        kept = value, state.digest()
+    _last_hashed[id(value)] = kept
+    while len(_last_hashed) > KEPT_HASHES:
+        _last_hashed.popitem(last=False)
+    return kept[1]
+
+
+# with the objects whose ids are the keys, which so stay theirs
+_last_hashed: OrderedDict[int, tuple[object, bytes]] = OrderedDict()
 
 
 def _feed(state: hashlib._Hash, value: object) -> None:
@@ -186,9 +214,13 @@ def _feed(state: hashlib._Hash, value: object) -> None:
         for field in fields(value):
             _feed(state, getattr(value, field.name))
     elif isinstance(value, (list, tuple)):
-        state.update(f"sequence {len(value)};".encode())
-        for item in value:
-            _feed(state, item)
+        plain = set(map(type, value)) <= PLAIN
+        state.update(f"{'plain ' if plain else ''}sequence {len(value)};".encode())
+        if plain:
+            _feed(state, repr(tuple(value)))
+        else:
+            for item in value:
+                _feed(state, item)
     elif value is None or isinstance(value, (bool, int, float, str, bytes, np.generic)):
         text = repr(value).encode()
         state.update(f"{type(value).__name__} {len(text)};".encode() + text)

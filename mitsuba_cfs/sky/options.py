@@ -5,6 +5,7 @@ Apart from what computes them, so that a command's options are known before anyt
 
 from __future__ import annotations
 
+SUBDIVISIONS = (1, 2, 4, 6)  # Reinhart's MF of the sky's patches
 SUN_MODELS = ("spa", "radiance")
 GROUNDS = ("reflected", "gendaylit")  # see `mitsuba_cfs.sky.ground`
 LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.sky.options import SUBDIVISIONS
+
 TREGENZA_ROWS = (30, 30, 24, 24, 18, 12, 6)  # patches in the rows of MF:1, horizon first
-SUBDIVISIONS = (1, 2, 4, 6)
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ ANGLES = (Number(), Number())
 LENGTH, SHARE = Number(min=0, min_open=True), Number(0, 1)
 PERIOD = (LENGTH, LENGTH)
 BAND_OPTION = click.option(
-    "--band", default="Visible", show_default=True, help="Of the file: Visible or Solar."
+    "--band", default="Visible", show_default=True, help="Visible or Solar; of the file."
 )
 
 

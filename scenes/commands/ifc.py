@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
+from scenes.commands.bonsai import bonsai
+from scenes.commands.ifc_exports import (
+    export_files,
+    export_folders,
+    result_folders,
+    room_writers,
+)
 from scenes.commands.parameters import FILE, IFC_FILE
 from scenes.commands.room_options import (
     furniture_option,
+    height_option,
     join_option,
     out_folder_option,
     space_option,
+    spacing_option,
+    subdivision_option,
     u_option,
 )
 from scenes.result_folder import ResultFolder
@@ -27,19 +33,13 @@ from scenes.result_folder import ResultFolder
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from bim.model import Building, Space
-    from scenes.fenestration_exports import KnownFenestration
+    from bim.model import Building
 
-PATTERNS = {  # of the files that an export writes
-    "--radiance": ("*.rad", "*.pts", "*.vf", "windows_*.xml", "run.sh", "Makefile"),
-    "--mitsuba": ("scene.xml", "glass_*.xml", "*.ply"),
-}
-
-
+BANDS = ("Visible", "Solar")
 UNCUT = 100_000  # columns of a table that nobody sees
 
 
-@click.group()
+@click.group(commands=[bonsai])
 def command() -> None:
     """What an IFC file holds, and what is wrong with it."""
 
@@ -150,7 +150,7 @@ def attach(
 @furniture_option
 @click.option(
     "--radiance", type=click.Path(file_okay=False, path_type=Path),
-    help="Folder of Radiance scenes; one folder inside for each room with a window.",
+    help="Folder of Radiance scenes; one folder inside for each room.",
 )  # fmt: skip
 @click.option(
     "--mitsuba", type=click.Path(file_okay=False, path_type=Path),
@@ -160,6 +160,13 @@ def attach(
 @click.option("--gltf", type=click.Path(path_type=Path), help="Binary glTF file (.glb).")
 @click.option("--honeybee", type=click.Path(path_type=Path), help="honeybee model (.hbjson).")
 @click.option("--gbxml", type=click.Path(path_type=Path), help="gbXML file (.gbxml).")
+@click.option(
+    "--band", type=click.Choice(BANDS, case_sensitive=False), default="Visible", show_default=True,
+    help="Visible or Solar; of the Radiance and Mitsuba scenes.",
+)  # fmt: skip
+@spacing_option
+@height_option
+@subdivision_option
 def export(
     building: Path,
     *,
@@ -172,6 +179,10 @@ def export(
     gltf: Path | None,
     honeybee: Path | None,
     gbxml: Path | None,
+    band: str,
+    sensor_spacing: float,
+    sensor_height: float,
+    subdivision: str,
 ) -> None:
     """Write the rooms for Radiance, Mitsuba or EnergyPlus, or for viewing.
 
@@ -185,7 +196,7 @@ def export(
     for field, path in files.items():
         if path is not None:
             check_file(path, field=field, inputs=[building])
-    folders = _folders({"--radiance": radiance, "--mitsuba": mitsuba})
+    folders = result_folders({"--radiance": radiance, "--mitsuba": mitsuba})
     from bim.ifc.building import read_ifc
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
@@ -195,9 +206,13 @@ def export(
         read = read_ifc(building, join=join, furniture=furniture, progress=progress)
     chosen = named_spaces(read, spaces, building)
     known = known_fenestration(chosen, building)
-    _export_folders(read, chosen, known, folders)
+    writers = room_writers(
+        known, band.lower(), spacing=sensor_spacing, height=sensor_height,
+        sky_division=int(subdivision),
+    )  # fmt: skip
+    export_folders(read, chosen, writers, folders)
     exported = replace(read, spaces=tuple(chosen))
-    assumed = _export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)
+    assumed = export_files(exported, known, epjson=epjson, honeybee=honeybee, gbxml=gbxml)
     if gltf is not None:
         from bim.to_gltf import write_gltf
 
@@ -208,101 +223,22 @@ def export(
         click.echo(f"note: {note}")
 
 
-def _folders(asked: Mapping[str, Path | None]) -> dict[Path, tuple[ResultFolder, list[str]]]:
-    """The folders to write, each with the options that name it: formats may share one."""
-    formats: dict[Path, list[str]] = {}
-    for option, parent in asked.items():
-        if parent is not None:
-            formats.setdefault(parent, []).append(option)
-    return {
-        parent: (ResultFolder(parent, "ifc export", adding=True, field=options[0]), options)
-        for parent, options in formats.items()
-    }
-
-
-def _export_folders(
-    read: Building,
-    chosen: Sequence[Space],
-    known: KnownFenestration,
-    folders: Mapping[Path, tuple[ResultFolder, list[str]]],
-) -> None:
-    """Write a folder for each room with a window into each folder of results."""
-    from bim.to_mitsuba import write_mitsuba
-    from bim.to_radiance import write_radiance
-
-    def radiance_room(space: Space, building: Building, folder: Path) -> None:
-        write_radiance(space, building, folder, filled=known.groups(space))
-
-    def mitsuba_room(space: Space, building: Building, folder: Path) -> None:
-        write_mitsuba(space, building, folder, bsdfs=known.bsdfs())
-
-    writers = {"--radiance": radiance_room, "--mitsuba": mitsuba_room}
-    for parent, (folder, options) in folders.items():
-        written: list[str] = []
-        kinds = {pattern for option in options for pattern in PATTERNS[option]}
-
-        def of_these(name: str, written=written, kinds=kinds) -> bool:
-            file = Path(name).name
-            return name.partition("/")[0] in written and any(fnmatch(file, k) for k in kinds)
-
-        with folder.replaced(gone=of_these) as place:
-            written += _export_rooms(read, chosen, place, [writers[one] for one in options])
-        for name in written:
-            click.echo(parent / name)
-
-
-def _export_files(
-    building: Building, known: KnownFenestration, **files: Path | None
-) -> tuple[str, ...]:
-    """Write the models that state U and g of windows, by format; what of these is assumed."""
-    from bim.gbxml.write import write_gbxml
-    from bim.honeybee.write import write_honeybee
-    from bim.to_energyplus import write_epjson
-
-    if not any(files.values()):
-        return ()
-    writers = {"honeybee": write_honeybee, "gbxml": write_gbxml, "epjson": write_epjson}
-    u_and_g, assumed = known.u_and_g()
-    for name, write in writers.items():
-        path = files[name]
-        if path is not None:
-            write(building, path, known=u_and_g)
-            click.echo(path)
-    return assumed
-
-
-def _export_rooms(
-    building: Building, spaces: Sequence[Space], place: Path, writers: Sequence[Callable]
-) -> list[str]:
-    """Write a folder for each room with a window; their names."""
-    from bim.names import folder_names
-
-    written = []
-    for space, name in zip(spaces, folder_names(spaces), strict=True):
-        try:
-            for write in writers if space.windows else ():
-                write(space, building, place / name)
-        except RoomError as error:  # a void too low for a work plane or an eye
-            click.echo(f"{space.label}: left out: {error}", err=True)
-            shutil.rmtree(place / name, ignore_errors=True)
-            continue
-        written += [name] if space.windows else []
-    return written
-
-
 @command.command()
 @out_folder_option
 def templates(out: Path) -> None:
     """Write the property set that windows hold as definitions for other programs.
 
-    An IFC library with its IfcPropertySetTemplate, and an IDS that checks models for it.
+    An IFC library with its IfcPropertySetTemplate, buildingSMART's PSD XML, and an IDS that checks
+    models for it.
     """
     folder = ResultFolder(out, "ifc templates")
+    from bim.ifc.property_definition import write_psd
     from bim.ifc.property_templates import write_ids, write_templates
 
     with folder.replaced() as place:
         write_templates(place / "fenestration_templates.ifc")
         write_ids(place / "fenestration.ids")
+        write_psd(place / "fenestration_psd.xml")
     click.echo(out)
 
 

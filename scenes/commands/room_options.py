@@ -9,16 +9,23 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
+from mitsuba_cfs.sky.options import GROUNDS, SUBDIVISIONS, SUN_MODELS
 from scenes.commands.parameters import BUILDING_FILE, FILE
 from scenes.commands.quick_option import quick_option
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.room.options import GLARE_SOURCES, GLARE_SUN
+from scenes.room.options import GLARE_SOURCES, GLARE_SUN, SensorGrid
 
+if TYPE_CHECKING:
+    from scenes.heat.study_file import StudyFile
+    from scenes.study.study_file import Study as Grid
+
+Study = TypeVar("Study", "StudyFile", "Grid")
 Option = Callable[[Callable], Callable]
+_GRID = SensorGrid()
 
 out_folder_option = click.option(
     "--out", required=True, type=click.Path(path_type=Path), help="Folder of results."
@@ -71,6 +78,18 @@ seed_option = click.option(
     show_default=True,
     help="Of the random numbers.",
 )  # fmt: skip
+spacing_option = click.option(
+    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_GRID.spacing,
+    show_default=True, help="Sensor spacing [m].",
+)  # fmt: skip
+height_option = click.option(
+    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_GRID.height,
+    show_default=True, help="Work plane above the floor [m].",
+)  # fmt: skip
+subdivision_option = click.option(
+    "-m", "--subdivision", type=click.Choice([str(mf) for mf in SUBDIVISIONS]), default="1",
+    show_default=True, help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
+)  # fmt: skip
 subdivide_option = click.option(
     "--subdivide", "window_parts", type=click.IntRange(0, 64), default=0, show_default=True,
     help="Parts of each window group; 0: as many as what stands outdoors asks for.",
@@ -106,6 +125,16 @@ set_option = click.option(
 no_cache_option = click.option(
     "--no-cache", is_flag=True, help="Trace everything anew; keep nothing."
 )
+
+
+def with_flags(
+    study: Study, surroundings: tuple[Path, ...], offset: tuple[float, float, float] | None
+) -> Study:
+    """A study with the files of `--surroundings` beside those that it names itself."""
+    update: dict[str, object] = {"surroundings": (*study.surroundings, *surroundings)}
+    if offset is not None:
+        update["surroundings_offset"] = offset
+    return study.model_copy(update=update)
 
 
 def space_option(name: str, what: str, *, several: bool = True) -> Option:
@@ -184,6 +213,16 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
             table[name] = value  # a word needs no quotes
     found = validated(OptionsTable, table, Path("--set"))
     return {name: getattr(found, name) for name in table}
+
+
+processes_option = click.option(
+    "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
+    help="Rooms or cases at a time on this machine; one already uses most of its cores.",
+)  # fmt: skip
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS",
+    help="Dask scheduler whose workers compute them, such as tcp://host:8786.",
+)  # fmt: skip
 
 
 def samples_option(default: int, why: str) -> Option:

@@ -13,9 +13,13 @@ from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
     building_options,
+    height_option,
     method_option,
     named_settings,
+    processes_option,
+    scheduler_option,
     size_option,
+    spacing_option,
     u_option,
 )
 from scenes.room.options import RoomOptions
@@ -35,14 +39,8 @@ _DEFAULT = RoomOptions()
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
 @size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
-@click.option(
-    "--spacing", "sensor_spacing", type=click.FloatRange(0.05, 10), default=_DEFAULT.grid.spacing,
-    show_default=True, help="Sensor spacing [m].",
-)  # fmt: skip
-@click.option(
-    "--height", "sensor_height", type=click.FloatRange(0, 5), default=_DEFAULT.grid.height,
-    show_default=True, help="Work plane above the floor [m].",
-)  # fmt: skip
+@spacing_option
+@height_option
 @click.option(
     "--ach", "infiltration_ach", type=click.FloatRange(0, 50), default=_DEFAULT.infiltration_ach,
     show_default=True, help="Outdoor air changes [1/h].",
@@ -64,6 +62,12 @@ _DEFAULT = RoomOptions()
     "--explore", is_flag=True,
     help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
 )  # fmt: skip
+@processes_option
+@scheduler_option
+@click.option(
+    "--netcdf", is_flag=True,
+    help="Write all numbers of all rooms as results.nc besides, for xarray; see docs/formats.md.",
+)  # fmt: skip
 def command(
     building: Path,
     *,
@@ -83,9 +87,12 @@ def command(
     inner_glass: bool,
     no_coupled_heat: bool,
     explore: bool,
+    netcdf: bool,
     quick: bool,
     page: Path | None,
     settings: tuple[str, ...],
+    processes: int,
+    scheduler: str | None,
     **chosen,
 ) -> None:
     """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
@@ -104,20 +111,30 @@ def command(
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,
-        coupled_heat=not no_coupled_heat,
+        coupled_heat=not no_coupled_heat, netcdf=netcdf,
         u_value=u_value, g_value=g_value, surroundings=surroundings,
         surroundings_offset=surroundings_offset,
     )  # fmt: skip
-    run_to_folder(options, out, page)
+    run_to_folder(options, out, page, processes=processes, scheduler=scheduler)
 
 
-def run_to_folder(options: JobOptions, out: Path, page: Path | None = None) -> None:
+def run_to_folder(
+    options: JobOptions,
+    out: Path,
+    page: Path | None = None,
+    *,
+    processes: int = 1,
+    scheduler: str | None = None,
+) -> None:
     """Run the job with a progress bar, say what comes out room by room, and write its files."""
     from mitsuba_cfs.matrices.cache import default_folder
     from scenes.page_options import RunSection, read_page
     from scenes.result_folder import ResultFolder
     from scenes.run.files import read_files
+    from scenes.workers import check_dask
 
+    if scheduler is not None:
+        check_dask()
     page_options = read_page(page, RunSection, translated=True)
     inputs = (options.building, options.weather, options.system, options.operation)
     inputs += (*options.surroundings, *page_options.inputs)
@@ -131,8 +148,10 @@ def run_to_folder(options: JobOptions, out: Path, page: Path | None = None) -> N
     from scenes.report import write_report
     from scenes.report.numbers import counted
     from scenes.run.outputs import EXPLORER, write_results
+    from scenes.run.rooms_apart import Workers
     from scenes.run.run import run_job
 
+    beside = processes > 1 or scheduler is not None
     if options.quick:
         click.echo(quick_run.NOTE)
     lines = _RoomLines()
@@ -140,10 +159,12 @@ def run_to_folder(options: JobOptions, out: Path, page: Path | None = None) -> N
         result = run_job(
             options, progress, files,
             on_room=lines.year, on_light=lines.light, on_building=_print_account,
+            workers=Workers(processes, scheduler) if beside else None,
         )  # fmt: skip
         progress("results", 0.0)
         report = partial(write_report, page=page_options)
-        write_results(result, folder, report, write_explorer if options.explore else None)
+        explorer = write_explorer if options.explore else None
+        write_results(result, folder, report, explorer, netcdf=options.netcdf)
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:
@@ -171,11 +192,23 @@ class _RoomLines:
         """Print those of a room's light."""
         self._lit.add(room.space.guid)
         click.echo(f"{room.space.label}: {_light_figures(room)}")
+        _print_grids(room)
 
     def year(self, room) -> None:
         """Print those of its heat, and of its light where that was not said."""
         said = room.space.guid in self._lit
         click.echo(f"{room.space.label}: {_heat_figures(room)}" if said else summary_line(room))
+        if not said:
+            _print_grids(room)
+
+
+def _print_grids(room) -> None:
+    """A line for each sensor grid of the building's file."""
+    for grid in room.daylight.grids:
+        click.echo(
+            f"{room.space.label}: grid {grid.name}, {len(grid.sensor_metrics)} sensors: "
+            f"mean DA {grid.metrics['da300']:.0f} %, sDA {grid.metrics['sda300_50']:.0f} %"
+        )
 
 
 def summary_line(room) -> str:

@@ -15,8 +15,7 @@ from mitsuba_cfs.files import check_file, write_table
 from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
 from mitsuba_cfs.sky.cie import KINDS
 from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_PATCHES
-from mitsuba_cfs.sky.patches import SUBDIVISIONS
-from scenes.commands.room_options import sun_option
+from scenes.commands.room_options import subdivision_option, sun_option
 
 if TYPE_CHECKING:
     from mitsuba_cfs.sky.weather import Weather
@@ -25,10 +24,6 @@ EFFICACY = 179.0  # [lm/W] luminance over the radiance that Radiance's visible f
 OUTPUTS = {"0": "visible", "1": "solar"}
 weather_argument = click.argument("weather", type=click.Path(path_type=Path))
 out_argument = click.argument("out", type=click.Path(path_type=Path, dir_okay=False))
-subdivision_option = click.option(
-    "-m", "--subdivision", type=click.Choice([str(mf) for mf in SUBDIVISIONS]), default="1",
-    show_default=True, help="Reinhart subdivision MF: 145, 577, 2305 or 5185 patches.",
-)  # fmt: skip
 format_option = click.option(
     "-f", "--format", "kind", type=click.Choice(list(FORMATS)), default="float",
     show_default=True, help="How the numbers are written.",

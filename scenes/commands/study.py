@@ -14,6 +14,11 @@ from scenes.commands.room_options import (
     method_option,
     out_folder_option,
     page_option,
+    processes_option,
+    scheduler_option,
+    surroundings_offset_option,
+    surroundings_option,
+    with_flags,
     write_ifc_option,
 )
 
@@ -27,15 +32,14 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
-@click.option(
-    "--processes", type=click.IntRange(1, 64), default=1, show_default=True,
-    help="Cases at a time on this machine; one already uses all cores.",
-)  # fmt: skip
-@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler, such as tcp://host:8786.")
+@processes_option
+@scheduler_option
 @method_option(["auto"], "auto: by cost and error, in place of the file's")
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
 @write_ifc_option("one for each case of a study of one file")
+@surroundings_option
+@surroundings_offset_option
 @quick_option
 @page_option
 def command(
@@ -48,6 +52,8 @@ def command(
     time_budget: str | None,
     dgp_error: str | None,
     write_ifc: Path | None,
+    surroundings: tuple[Path, ...],
+    surroundings_offset: tuple[float, float, float] | None,
     quick: bool,
     page: Path | None,
 ) -> None:
@@ -62,6 +68,7 @@ def command(
     asked = {"time_budget": time_budget, "dgp_error": dgp_error}
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
+    parsed = with_flags(parsed, surroundings, surroundings_offset)
     study_to_folder(study, parsed, out, processes, scheduler, write_ifc, page=page)
 
 
@@ -128,8 +135,8 @@ def _checked(
     from mitsuba_cfs.files import check_file
     from mitsuba_cfs.matrices.cache import default_folder
     from scenes.study.files import check_files, one_building
-    from scenes.study.schedule import check_dask
     from scenes.study.store import Store
+    from scenes.workers import check_dask
 
     store = Store(out, inputs=files)
     default_folder()  # of the cache, or one line that it cannot be one

@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
 from scenes import quick as quick_run
 from scenes.commands.quick_option import quick_option
-from scenes.commands.room_options import out_folder_option
+from scenes.commands.room_options import (
+    out_folder_option,
+    surroundings_offset_option,
+    surroundings_option,
+    with_flags,
+)
 
 
 @click.command()
@@ -30,8 +35,19 @@ from scenes.commands.room_options import out_folder_option
     "--energyplus", is_flag=True,
     help="The same rooms as an input of EnergyPlus too (model.epJSON, schedules.csv).",
 )  # fmt: skip
+@surroundings_option
+@surroundings_offset_option
 @quick_option
-def command(study: Path, out: Path, figures: bool, energyplus: bool, quick: bool) -> None:
+def command(
+    study: Path,
+    out: Path,
+    *,
+    figures: bool,
+    energyplus: bool,
+    surroundings: tuple[Path, ...],
+    surroundings_offset: tuple[float, float, float] | None,
+    quick: bool,
+) -> None:
     """Gains, temperatures, loads and comfort of rooms, hour by hour.
 
     The study file names the weather, the rooms (an IFC file or a box), the shading states (BSDF
@@ -42,11 +58,13 @@ def command(study: Path, out: Path, figures: bool, energyplus: bool, quick: bool
     from scenes.result_folder import ResultFolder
 
     parsed = read_study(study, quick=quick)
+    parsed = with_flags(parsed, surroundings, surroundings_offset)
     inputs = (
         study,
         parsed.weather,
         parsed.building,
         *(one.bsdf for one in parsed.system if one.bsdf),
+        *parsed.surroundings,
     )
     folder = ResultFolder(out, "thermal", inputs=inputs)
     files = read_files(parsed, study)  # before anything heavy is loaded

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.building_file import ReadOptions, read_building_file
+from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
@@ -29,10 +29,12 @@ from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.room.drawn_shades import traced_building
 from scenes.room.energy import energy_by_month, energy_summary, room_powers
 from scenes.room.humidity import felt_by, room_humidity
-from scenes.room.operation_hours import OperationHours
+from scenes.room.operation_hours import OperationHours, check_schedules
 from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.stated_use import stated_note, with_stated_uses
 from scenes.room.zone import RoomZone, balances, coupled
 from scenes.run.inputs import chosen_spaces, named_spaces
+from scenes.run.notes import model_notes
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity
 from thermal.ventilation import AirTransfer
@@ -85,12 +87,16 @@ def run_study(
     files = files or read_files(study)
     weather = files.weather
     building, spaces = rooms_of(study)
+    said = (*model_notes(building), *stated_note(building, "the study"))
+    if building.uses:
+        study = with_stated_uses(study, building)
+        check_schedules(study, weather, study.building)
     windows = [window for space in spaces for window in space.windows]
     in_windows = fill_windows(windows, files.given, study.building)
     _check_states(study, in_windows)
     building = traced_building(building, in_windows)
     systems = list({id(s): s for states in in_windows.values() for s in states}.values())
-    notes = dict.fromkeys(source_notes(window_sources(windows, in_windows)))
+    notes = dict.fromkeys([*said, *source_notes(window_sources(windows, in_windows))])
     heats = [thermal_system(system) for system in systems]
     noted = (weather, *systems, *heats)
     notes |= dict.fromkeys(note for t in noted for note in t.notes)
@@ -237,10 +243,12 @@ def _floor(zone: Zone) -> int:
 
 def rooms_of(study: StudyFile) -> tuple[Building, list[Space]]:
     """The building of a study and the rooms asked for."""
+    around = study.surroundings, study.surroundings_offset
     if study.box is not None:
-        building = box_building(study.box)
+        building = surrounded(box_building(study.box), *around)
         return building, list(building.spaces)
-    building = read_building_file(study.building, ReadOptions(tuple(study.join)))
+    options = ReadOptions(tuple(study.join), surroundings=around[0], surroundings_offset=around[1])
+    building = read_building_file(study.building, options)
     if study.couple:
         spaces = named_spaces(building, study.spaces, study.building)
         return building, shared_constructions(spaces)

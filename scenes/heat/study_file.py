@@ -48,6 +48,16 @@ class WindowTable(TomlTable):
     frame: Annotated[float, Field(ge=0)] = 0.0
 
 
+class PlateTable(TomlTable):
+    """An overhang or a fin: a plate out of a line on a side of the box, as of `bim.shoebox`."""
+
+    start: tuple[float, float]  # x to the right seen from outdoors, y above the floor [m]
+    end: tuple[float, float]
+    depth: Length  # from the plane of the glass [m]
+    side: Literal["front", "right", "back", "left", "ceiling"] = "front"
+    reflectance: Share = 0.2
+
+
 class BoxTable(TomlTable):
     """A box-shaped room in place of a building file."""
 
@@ -57,6 +67,7 @@ class BoxTable(TomlTable):
     facing_deg: float = 180.0
     recess: Annotated[float, Field(ge=0)] = 0.0
     window: tuple[WindowTable, ...]
+    plate: tuple[PlateTable, ...] = ()
     reflectance: dict[Part, Share] = Field(default_factory=dict)
     specular: dict[Part, Share] = Field(default_factory=dict)  # of a lacquer at normal incidence
     roughness: dict[Part, Annotated[float, Field(ge=0, le=ROUGHEST)]] = Field(default_factory=dict)
@@ -107,6 +118,8 @@ class StudyFile(OperationTables):
     building: Path | None = None
     spaces: tuple[str, ...] = ()
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"
+    surroundings: tuple[Path, ...] = ()  # files of what stands around
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     couple: bool = False  # heat flows through the walls between the rooms
     transfer: tuple[TransferTable, ...] = ()
     design: DesignTable | None = None  # loads of design days too
@@ -159,7 +172,9 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
         s.placed(here).model_copy(update={"bsdf": s.bsdf and _there(here, s.bsdf, path)})
         for s in study.system
     )
+    around = tuple(_there(here, name, path) for name in study.surroundings)
     found = {"weather": _there(here, study.weather, path), "system": systems}
+    found["surroundings"] = around
     if quick:
         given = study.trace.model_fields_set
         found["trace"] = study.trace.model_copy(update=picks(HEAT, given))

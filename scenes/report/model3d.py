@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Space
+from bim.model import Building, Space
 from bim.to_tracer import element_surfaces
 from scenes.figures.plan import sensor_cells
 from scenes.figures.scale import ColourScale
@@ -26,6 +26,9 @@ KIND_OF_FACE = {
     "window frame": "frame", "reveal": "wall",
 }  # fmt: skip
 ON_TOP = 0.1  # what stands outdoors and begins so far below a storey's end lies on it [m]
+TERRAIN = ("IfcSite", "IfcGeographic")
+BESIDE = 1.0  # what stands this near belongs to the building [m]
+STOREYS_ABOVE = 3  # without rooms, the roof with them
 STEPS = 32000  # of the 16-bit coordinates over the model's half size
 
 
@@ -44,6 +47,7 @@ class Model3D:
     """What the page's viewer needs; positions are 16-bit integers, base64."""
 
     centre: tuple[float, float, float]  # [m]
+    whole: tuple[tuple[float, ...], ...]  # lowest and highest corner of the building from there [m]
     unit: float  # metres per integer step
     batches: tuple[dict, ...]  # room index (-1 outdoors), storey, kind, triangles, edges
     sensors: dict  # room and storey of each, corners
@@ -56,6 +60,7 @@ class Model3D:
         """The parts that go into the page as JSON."""
         return {
             "unit": self.unit,
+            "whole": self.whole,
             "batches": self.batches,
             "sensors": self.sensors,
             "rooms": self.rooms,
@@ -107,9 +112,29 @@ def model3d(result: RunResult) -> Model3D:
         "corners": packed(np.concatenate(cells)),
     }  # fmt: skip
     labels = tuple(space.label for space in spaces)
+    whole = tuple(map(tuple, (building_box(result.building) - centre).round(3).tolist()))
     return Model3D(
-        tuple(centre), unit, tuple(batches), sensors, layers(result), labels, names, left_out
+        tuple(centre), whole, unit, tuple(batches), sensors, layers(result), labels, names, left_out
     )
+
+
+def building_box(building: Building) -> NDArray[np.float64]:
+    """Corners [2, 3] of the box round all rooms of a building and what touches them, its roof [m].
+
+    Terrain is left out, and so is what stands more than a metre away.
+    """
+    shells = [space.shell for space in building.spaces]
+    parts = [e.triangles for e in building.elements if not e.ifc_class.startswith(TERRAIN)]
+    boxes = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for t in parts if len(t)])
+    boxes = boxes.reshape(-1, 2, 3)
+    corners = np.concatenate(shells).reshape(-1, 3)
+    box = np.array([corners.min(axis=0), corners.max(axis=0)])
+    for _ in range(STOREYS_ABOVE):
+        touch = np.all((boxes[:, 0] < box[1] + BESIDE) & (boxes[:, 1] > box[0] - BESIDE), axis=1)
+        near = boxes[touch]
+        box[0] = np.minimum(box[0], near[:, 0].min(axis=0, initial=np.inf))
+        box[1] = np.maximum(box[1], near[:, 1].max(axis=0, initial=-np.inf))
+    return box
 
 
 def storey_levels(

@@ -164,7 +164,7 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     rows.append((said("Rooms"), rooms))
     account = building.account
     read = () if account is None else account.facts
-    return (*rows, *((said(title), heard_list(text, ", ")) for title, text in read))
+    return (*rows, *((said(title), prose(heard_list(text, ", "))) for title, text in read))
 
 
 def notes(result: RunResult) -> tuple[tuple[str, bool], ...]:

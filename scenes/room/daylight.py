@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.held_sensors import HeldGrid
 from bim.model import Building, Space
-from bim.sensors import sensor_grid, view_point
+from bim.sensors import held_grids, held_views, sensor_grid, view_point
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
-from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.images.view import View, fisheye, fitted
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene
@@ -20,11 +22,28 @@ from mitsuba_cfs.progress import Progress
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.weather import Weather
-from scenes.results import DaylightResult
+from scenes.results import DaylightResult, GridDaylight
 from scenes.room.inner_glass import InnerGlass
 from scenes.room.metrics import daylight_metrics
 from scenes.room.options import SensorGrid
 from scenes.room.windows import RoomWindows
+
+
+@dataclass(frozen=True, slots=True)
+class HeldSensors:
+    """What the building's file holds for a room: sensor grids, and the view for glare."""
+
+    grids: tuple[HeldGrid, ...] = ()
+    view: View | None = None  # the first fisheye of the whole hemisphere
+
+    @classmethod
+    def of(cls, building: Building, space: Space) -> HeldSensors:
+        """Those of a room."""
+        fisheyes = [one.view for one in held_views(building, space) if one.is_fisheye]
+        return cls(tuple(held_grids(building, space)), fisheyes[0] if fisheyes else None)
+
+
+NO_SENSORS = HeldSensors()
 
 
 def room_scene(
@@ -33,7 +52,9 @@ def room_scene(
     windows: RoomWindows,
     grids: Sequence[SensorGrid],
     picture_size: int,
+    *,
     inner: InnerGlass | None = None,
+    held: HeldSensors = NO_SENSORS,
 ) -> DaylightScene:
     """Triangles, window groups, sensors and view of a room in the visible band.
 
@@ -41,16 +62,21 @@ def room_scene(
         grids: of the sensors, one after the other.
         picture_size: pixels of a side of the view.
         inner: the glass to other rooms that gives light; without it that is opaque.
+        held: of the building's file: sensors after those of the grids, and the view.
     """
     points = np.concatenate([grid_points(space, grid) for grid in grids])
+    upwards = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     position, direction = view_point(space)
+    view = fisheye(position, direction, picture_size)
+    if held.view is not None:
+        view = fitted(held.view, picture_size)
     return DaylightScene(
         furnished_surfaces(space, "visible") if inner is None else inner.interior,
         exterior_surfaces(building, space, "visible"),
         [*windows.groups, *(() if inner is None else inner.groups)],
-        points,
-        np.tile([0.0, 0.0, 1.0], (len(points), 1)),
-        fisheye(position, direction, picture_size),
+        np.concatenate([points, *(grid.points for grid in held.grids)]),
+        np.concatenate([upwards, *(grid.directions for grid in held.grids)]),
+        view,
         () if inner is None else inner.beyond,
     )
 
@@ -66,10 +92,14 @@ def room_daylight(
     weather: Weather,
     method: str,
     progress: Progress,
+    *,
+    held: HeldSensors = NO_SENSORS,
 ) -> DaylightResult:
     """Illuminance of the year with the state of each hour, and its metrics.
 
-    Args: state: [L] which one holds in each lit hour.
+    Args:
+        state: [L] which one holds in each lit hour.
+        held: whose grids' sensors come last in the scene.
     """
     sky, traced = light.sky, light.filled.traced
     scene, sampling = traced.scene, traced.sampling
@@ -83,8 +113,22 @@ def room_daylight(
     direct = light.direct_sun()
     direct = None if direct is None else sky.whole_year(direct.astype(np.float32)).T
     factor = overcast_factor(light)
-    table, of_room = daylight_metrics(scene.points, illuminance, factor, weather, direct)
-    return DaylightResult(scene.points, illuminance, error, table, of_room)
+
+    def metrics_of(own: slice) -> tuple[pd.DataFrame, dict[str, float]]:
+        sun = None if direct is None else direct[:, own]
+        return daylight_metrics(scene.points[own], illuminance[:, own], factor[own], weather, sun)
+
+    counts = [len(grid.points) for grid in held.grids]
+    plane = slice(0, len(scene.points) - sum(counts))
+    ends = np.cumsum([plane.stop, *counts])
+    grids = []
+    for grid, first, last in zip(held.grids, ends[:-1], ends[1:], strict=True):
+        table, of_grid = metrics_of(slice(first, last))
+        table["relative_standard_error"] = error[first:last]
+        grids.append(GridDaylight(grid.name, grid.directions, table, of_grid))
+    return DaylightResult(
+        scene.points[plane], illuminance[:, plane], error[plane], *metrics_of(plane), tuple(grids)
+    )
 
 
 def overcast_factor(light: PhaseLight) -> NDArray[np.float64]:

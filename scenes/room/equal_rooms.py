@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -22,6 +23,7 @@ from scenes.room.heated import DaylitRoom
 from scenes.room.holes import moved_problem
 
 R = TypeVar("R", RoomYear, DaylitRoom)
+BANDS = ("visible", "solar")
 SAME_LIGHT = 0.005  # share of the light from anywhere that may come another way
 NEAR = 0.01  # [m] between the places of windows in their rooms
 
@@ -40,21 +42,41 @@ def same_systems(a: Space, b: Space, systems: Mapping[str, States]) -> bool:
     return True
 
 
-def same_light(
-    building: Building, a: Space, b: Space, sampling: Sampling, cache: MatrixCache | None
-) -> bool:
-    """Whether two equal rooms see the same outdoors, by their daylight matrices in both bands.
+class OutdoorLight:
+    """The daylight matrices of a room's windows in both bands: what it sees of the outdoors.
 
-    The matrices are traced with the same random numbers: where the same things stand outdoors they
-    differ by rounding only.
+    They are traced with the same random numbers for all rooms: where the same things stand outdoors
+    those of equal rooms differ by rounding only.  Sums over rows and columns alone are kept.
     """
-    for band in ("visible", "solar"):
-        one, other = (_daylight(building, s, band, sampling, cache) for s in (a, b))
-        if one.shape != other.shape:
-            return False
-        if np.abs(one - other).sum() > SAME_LIGHT * one.sum():
-            return False
-    return True
+
+    def __init__(
+        self, building: Building, space: Space, sampling: Sampling, cache: MatrixCache | None
+    ) -> None:
+        """Nothing is traced before it is asked for."""
+        self.building, self.space, self.sampling, self.cache = building, space, sampling, cache
+
+    def same(self, other: OutdoorLight) -> bool:
+        """Whether an equal room sees the same outdoors."""
+        # sums differ by no more than what they are of: most rooms are told apart by them
+        return all(
+            alike(one, theirs) for one, theirs in zip(self._sums, other._sums, strict=True)
+        ) and all(alike(self._daylight(band), other._daylight(band)) for band in BANDS)
+
+    @cached_property
+    def _sums(self) -> list[NDArray[np.float64]]:
+        return [self._daylight(band).sum(axis=axis) for band in BANDS for axis in (-1, -2)]
+
+    def _daylight(self, band: str) -> NDArray[np.float64]:
+        exterior = exterior_surfaces(self.building, self.space, band)
+        scene = DaylightScene(Surfaces.none(), exterior, window_groups(self.space))
+        return PhaseScene(scene, self.sampling, cache=self.cache).daylight.values
+
+
+def alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether no more than `SAME_LIGHT` of the light comes another way."""
+    if one.shape != other.shape:
+        return False
+    return bool(np.abs(one - other).sum() <= SAME_LIGHT * one.sum())
 
 
 def moved_light(room: DaylitRoom, space: Space) -> DaylitRoom:
@@ -88,12 +110,3 @@ def moved_result(result: R, space: Space) -> R:
 def corner(space: Space) -> NDArray[np.float64]:
     """The lowest corner [3] of a room."""
     return space.shell.reshape(-1, 3).min(axis=0)
-
-
-def _daylight(
-    building: Building, space: Space, band: str, sampling: Sampling, cache: MatrixCache | None
-) -> NDArray[np.float64]:
-    scene = DaylightScene(
-        Surfaces.none(), exterior_surfaces(building, space, band), window_groups(space)
-    )
-    return PhaseScene(scene, sampling, cache=cache).daylight.values

@@ -19,11 +19,19 @@ LARGEST = 400  # pixels of a side of its pictures
 
 
 def explored_room(
-    light: PhaseLight, operated: NDArray[np.int64], names: Sequence[str], progress: Progress
+    light: PhaseLight,
+    operated: NDArray[np.int64],
+    names: Sequence[str],
+    progress: Progress,
+    *,
+    sensors: int,
 ) -> ExploredRoom:
     """Pictures, illuminances and the sun's beam of all lit hours in all states.
 
-    Args: operated: [H] the state that holds in each hour; names: [J] of the states.
+    Args:
+        operated: [H] the state that holds in each hour.
+        names: [J] of the states.
+        sensors: of the work plane, the first of the scene's.
     """
     sky, scene = light.sky, light.filled.traced.scene
     L, J = len(sky.lit), light.filled.states
@@ -43,7 +51,7 @@ def explored_room(
         operated,
         sky.lit,
         tuple(pictures),
-        tuple(light.illuminance(j * ones).astype(np.float32) for j in range(J)),
+        tuple(light.illuminance(j * ones)[:sensors].astype(np.float32) for j in range(J)),
         np.stack([light.eye(j * ones) for j in range(J)]).astype(np.float32),
         np.stack(through).astype(np.float32),
         np.maximum(sky.illuminance, 0).astype(np.float32),

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
-from bim.model import Building, Element, Face, Space, centroid
+from bim.doorways import THINNEST, panes_between, reveals_between, wall_depth
+from bim.model import Building, Element, Face, Space
 from bim.to_tracer import (
     element_surfaces,
     exterior_surfaces,
@@ -32,9 +33,7 @@ from scenes.fenestration.systems import States
 from scenes.room.windows import room_windows
 
 CLEAR = 0.88  # visible transmittance of glass that states none: a float pane of 6 mm, EN 410
-SAME_SIZE = 0.05  # share by which the pane may differ as the two rooms have it
 PANE = "glass between rooms"  # name of a pane as the room beyond has it: opaque
-THINNEST = 1e-3  # walls up to this have no reveal [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +119,7 @@ def _inner_glass(
     found, used = [], []
     dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun comes by patches
     for other in _lenders(building, space, away, below):
-        pairs = _panes(building, space)[other.guid]
+        pairs = panes_between(building, space)[other.guid]
         onward = _inner_glass(building, other, systems, away, away[other.guid])
         scene, transmission = _room_beyond(building, other, pairs, systems, onward)
         used += [face for face, _ in pairs]
@@ -168,7 +167,9 @@ def _panes_to_windows(building: Building) -> dict[str, int]:
     found = {space.guid: 0 for space in building.spaces if space.windows}
     newest = list(found)
     while newest:
-        reached = {guid for one in newest for guid in _panes(building, rooms[one])} - found.keys()
+        reached = {
+            guid for one in newest for guid in panes_between(building, rooms[one])
+        } - found.keys()
         found |= dict.fromkeys(reached, found[newest[0]] + 1)
         newest = sorted(reached)
     return found
@@ -176,45 +177,11 @@ def _panes_to_windows(building: Building) -> dict[str, int]:
 
 def _lenders(building: Building, space: Space, away: Mapping[str, int], below: int) -> list[Space]:
     """The rooms behind a room's panes that are fewer than so many panes away from a window."""
-    pairs = _panes(building, space)
+    pairs = panes_between(building, space)
     return [
         other for other in building.spaces
         if other.guid in pairs and away.get(other.guid, below) < below
     ]  # fmt: skip
-
-
-def _panes(building: Building, space: Space) -> dict[str, list[tuple[Face, Face]]]:
-    """Panes of a room and the same as the room beyond has them, by the GUID of that room."""
-    rooms = {other.guid: other for other in building.spaces}
-    found: dict[str, list[tuple[Face, Face]]] = {}
-    for face in space.faces:
-        other = rooms.get(face.neighbour or "")
-        if face.pane is None or other is None or other.guid == space.guid:
-            continue
-        for back in other.faces:
-            if back.pane is None or back.neighbour != space.guid:
-                continue
-            away = _depth(face, back)
-            if (
-                back.pane.guid == face.pane.guid
-                and back.normal @ face.normal < -0.999
-                and abs(back.area - face.area) < SAME_SIZE * face.area
-                and away > -THINNEST
-                and _beside(face, back) < 0.5 * np.sqrt(face.area)
-            ):
-                found.setdefault(other.guid, []).append((face, back))
-    return found
-
-
-def _depth(face: Face, back: Face) -> float:
-    """How far the pane of the room beyond lies behind that of the room [m]."""
-    return float((centroid(back.triangles) - centroid(face.triangles)) @ face.normal)
-
-
-def _beside(face: Face, back: Face) -> float:
-    """How far the panes' middles lie apart along the wall [m]."""
-    step = centroid(back.triangles) - centroid(face.triangles)
-    return float(np.linalg.norm(step - (step @ face.normal) * face.normal))
 
 
 def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, WindowGroup]]:
@@ -250,9 +217,14 @@ def _room_beyond(
         for face, back in pairs
     ]  # fmt: skip
     reveals = [
-        _piece(face, "reveal", _tube(face, _depth(face, back)), ROOM_REFLECTANCE["reveal"])
+        _piece(
+            face,
+            "reveal",
+            reveals_between(face, wall_depth(face, back)).reshape(-1, 3, 3),
+            ROOM_REFLECTANCE["reveal"],
+        )
         for face, back in pairs
-        if _depth(face, back) > THINNEST
+        if wall_depth(face, back) > THINNEST
     ]
     windows = room_windows(room, systems)
     scene = DaylightScene(
@@ -268,18 +240,3 @@ def _room_beyond(
 def _piece(face: Face, name: str, triangles: NDArray[np.float64], reflectance: float) -> Element:
     """Something of the pane of a face that the room beyond has."""
     return Element(face.pane.guid, name, "IfcWindow", triangles, reflectance, reflectance)
-
-
-def _tube(face: Face, depth: float) -> NDArray[np.float64]:
-    """The reveals [T, 3, 3] from a pane's outline through the wall to the room beyond."""
-    corners, number = np.unique(
-        np.round(face.triangles.reshape(-1, 3), 6), axis=0, return_inverse=True
-    )
-    triangles = number.reshape(-1, 3)
-    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    _, first, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    a, b = corners[edges[first[count == 1]]].transpose(1, 0, 2)
-    step = depth * face.normal
-    return np.concatenate([np.stack([a, b, b + step], 1), np.stack([a, b + step, a + step], 1)])

@@ -71,6 +71,7 @@ class GainsTable(TomlTable):
     lighting_target_lx: Annotated[Positive, plausible.TARGET] = (
         500.0  # of the mean on the work plane; daylight dims
     )
+    lighting_dimmed: bool = True  # False: daylight does not dim the lamps
     radiant_share: Share = 0.5
     # clock hours of every day, or a schedule of the share that is there: numbers above hold then
     occupied: Annotated[tuple[int, int] | str, OrSchedule(plausible.SHARE, clock_or_name)] = (8, 18)
@@ -171,7 +172,12 @@ class OperationTables(TomlTable):
 
         Raises: `DataError` for a room or a type that the building does not have.
         """
-        chosen = self
+        chosen = self.entry_of(building, space)
+        return self if chosen is None else self.with_rooms(chosen)
+
+    def entry_of(self, building: Building, space: Space) -> RoomsTable | None:
+        """The first entry of `rooms` that names a room; None without one. Raises: as `of_room`."""
+        chosen = None
         for number, rooms in reversed(tuple(enumerate(self.rooms))):
             guids = {building.room(name).space.guid for name in rooms.spaces}
             kinds = {one.type_name for one in building.spaces}
@@ -181,5 +187,5 @@ class OperationTables(TomlTable):
                     message = f"no space is of type {name!r}; there are: {there}"
                     raise DataError(message, file=building.file, field=f"rooms.{number}.types")
             if space.guid in guids or space.type_name in rooms.types:
-                chosen = self.with_rooms(rooms)
+                chosen = rooms
         return chosen

@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
+from bim.outer_faces import OuterFaces, outer_faces
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.glare.annual import AnnualGlare
@@ -38,7 +39,7 @@ from scenes.results import (
 )
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
 from scenes.room.control import shading_states
-from scenes.room.daylight import room_daylight, room_scene
+from scenes.room.daylight import NO_SENSORS, HeldSensors, room_daylight, room_scene
 from scenes.room.envelope import enveloped
 from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
@@ -49,6 +50,7 @@ from scenes.room.kept_sun import kept_sun
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
+from scenes.room.sky_seen import under_the_sky
 from scenes.room.solar import RoomSun
 from scenes.room.thermal import fenestration_table
 from scenes.room.windows import room_windows
@@ -106,15 +108,16 @@ class RoomSimulation:
         cache: MatrixCache | None = None,
         grids: Sequence[SensorGrid] = (),
         inner: bool = False,
+        held: HeldSensors = NO_SENSORS,
         progress: Progress = silent,
     ) -> None:
-        """See `lit_room`; grids: of the sensors in place of the options' one."""
+        """See `lit_room`; grids: of the sensors in place of the options' one; held: beside them."""
         if operation is not None:
             operation = operation.of_room(building, space)
         self.building, self.space, self.weather, self.options = building, space, weather, options
         self.sampling, self.outputs = options.sampling, options.outputs
         self.operation, self.cache, self.progress = operation, cache, progress
-        self.grids = tuple(grids) or (options.grid,)
+        self.grids, self.held = tuple(grids) or (options.grid,), held
         self.skies = (
             skies_for(weather, options.method, options.sampling, cache, **options.sky)
             if skies is None
@@ -140,7 +143,8 @@ class RoomSimulation:
             self.windows,
             self.grids,
             self.outputs.picture_size,
-            self.inner,
+            inner=self.inner,
+            held=self.held,
         )
 
     @cached_property
@@ -192,7 +196,9 @@ class RoomSimulation:
         """Illuminance of the work plane and its metrics."""
         self.progress("daylight", 0.0)
         steps = part(self.progress, 0.9, 1.0, "daylight")
-        found = room_daylight(self.light, self.lit_state, self.weather, self.options.method, steps)
+        found = room_daylight(
+            self.light, self.lit_state, self.weather, self.options.method, steps, held=self.held
+        )
         self.progress("daylight", 1.0)
         return found
 
@@ -227,7 +233,8 @@ class RoomSimulation:
         """Every hour in every state."""
         names = [state.name for state in max(self.windows.systems, key=len)]
         steps = part(self.progress, 0.0, 1.0, "explorer")
-        return explored_room(self.light, self.state, names, steps)
+        sensors = len(self.daylight.points)
+        return explored_room(self.light, self.state, names, steps, sensors=sensors)
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
@@ -261,11 +268,16 @@ class RoomSimulation:
         return found
 
     @cached_property
+    def outer(self) -> OuterFaces:
+        """Places before the outer faces of the room's walls and windows."""
+        return outer_faces(self.building, self.space, self.surfaces)
+
+    @cached_property
     def sun(self) -> RoomSun:
         """The sun outside and what the room does with it."""
         steps = part(self.progress, 0.0, 0.8, "heat")
         interior = interior_surfaces(self.space, "solar")
-        return RoomSun(self.outdoors, interior, self.surfaces, self.skies, steps)
+        return RoomSun(self.outdoors, interior, self.surfaces, self.outer, self.skies, steps)
 
     @cached_property
     def thermals(self) -> list[list[ThermalSystem]]:
@@ -292,7 +304,8 @@ class RoomSimulation:
         tables = self.operation
         if tables is None or not self.space.windows:
             return None
-        if tables.control.rule != "glare" and not tables.gains.lighting_w_m2:
+        dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
+        if tables.control.rule != "glare" and not dimmed:
             return None
         return self.daylight.illuminance.mean(axis=1, dtype=float)
 
@@ -311,6 +324,8 @@ class RoomSimulation:
             services = services_of(self.operation, area, self.weather)
         else:
             services = plain_services(self.space, self.occupied, self.options.occupancy)
+        exterior, seed = self.outdoors.scene.exterior, self.sampling.seed
+        room = under_the_sky(room, self.outer, exterior, seed=seed, cache=self.cache)
         solar, gains = sun.switched(self.windows, self.thermals, state)
         return RoomZone(
             self.space, room, solar, gains, state, lamps, self.occupied, plane, services

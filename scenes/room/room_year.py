@@ -24,6 +24,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import States
 from scenes.results import GlareResults, RoomYear
+from scenes.room.daylight import HeldSensors
 from scenes.room.glare import rating_of
 from scenes.room.heated import DaylitRoom, heat_alone
 from scenes.room.inner_glass import borrowed_share
@@ -109,7 +110,8 @@ def lit_room(
     room = RoomSimulation(
         building, space, systems, weather, options,
         operation=None if operation is None else operation.tables,
-        skies=skies, cache=cache, inner=inner, progress=progress,
+        skies=skies, cache=cache, inner=inner, held=HeldSensors.of(building, space),
+        progress=progress,
     )  # fmt: skip
     outputs, skies = options.outputs, room.skies
     hours = wanted_hours(outputs.picture_hours, weather.midpoints, skies.lit)

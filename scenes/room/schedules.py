@@ -11,10 +11,18 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    GetCoreSchemaHandler,
+    PrivateAttr,
+    model_validator,
+)
 from pydantic_core import CoreSchema, core_schema
 
+from bim.use import KINDS, YearSchedule, day_of_year
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.weather import Weather
@@ -107,6 +115,7 @@ class ScheduleTable(DaysTable):
     season: tuple[SeasonTable, ...] = ()  # the first that holds goes before the days above
     csv: Path | None = None  # a row an hour, with a header
     column: str = ""
+    _year: YearSchedule | None = PrivateAttr(None)  # of a building's file, in place of the days
 
     @model_validator(mode="after")
     def _has_its_days(self) -> ScheduleTable:
@@ -116,9 +125,18 @@ class ScheduleTable(DaysTable):
             raise ValueError("season: a season needs its own `weekday`")
         return self
 
+    @classmethod
+    def held(cls, year: YearSchedule, peak: float = 1.0) -> ScheduleTable:
+        """The table of a schedule that a building's file holds."""
+        table = cls(weekday=0.0, peak=peak)
+        table._year = year
+        return table
+
     @property
     def stated(self) -> tuple[float, ...]:
         """Every value that the table itself states."""
+        if self._year is not None:
+            return tuple(float(value) for value in np.unique(self.peak * self._year.values))
         days = (self, *self.season)
         profiles = (getattr(one, key) for one in days for key in DaysTable.model_fields)
         values = [one.value for profile in profiles if profile is not None for one in profile]
@@ -135,6 +153,8 @@ class ScheduleTable(DaysTable):
         kinds = np.where(weather.weekday == SATURDAY, "saturday", "weekday")
         kinds = np.where(weather.weekday == SUNDAY, "sunday", kinds)
         kinds = np.where(free, "holiday", kinds)
+        if self._year is not None:
+            return self.peak * self._of_year(days, weather.weekday, free)
         values, open_ = np.full(len(date), self.otherwise), np.ones(len(date), dtype=bool)
         for part in (*self.season, self):
             inside = open_.copy()
@@ -149,6 +169,16 @@ class ScheduleTable(DaysTable):
                         one.value
                     )
         return self.peak * values
+
+    def _of_year(
+        self, days: pd.DatetimeIndex, weekday: NDArray[np.int64], free: NDArray[np.bool_]
+    ) -> FloatArray:
+        """The held values [H] of the days of a weather."""
+        date = 100 * days.month.to_numpy() + days.day.to_numpy()
+        numbers = [day_of_year(int(one) // 100, int(one) % 100) for one in np.unique(date)]
+        day = np.asarray(numbers)[np.unique(date, return_inverse=True)[1]]
+        kind = np.where(free, KINDS.index("holiday"), weekday)
+        return self._year.values[day, kind, days.hour.to_numpy()]
 
 
 class CalendarTable(TomlTable):

@@ -190,7 +190,7 @@ def operated(
     """
     hours, gains = OperationHours(tables, weather), tables.gains
     lamps = hours.lamps(floor_area)
-    if daylight is not None:
+    if daylight is not None and gains.lighting_dimmed:
         lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
     found = replace(
         zone,

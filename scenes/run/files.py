@@ -18,6 +18,7 @@ from scenes.room.operation import Operation, check_states, check_systems, read_o
 from scenes.room.operation_hours import check_schedules
 from scenes.room.picture_hours import check_hours, wanted_hours
 from scenes.run.inputs import read_weather
+from scenes.run.netcdf import check_netcdf
 from scenes.run.options import JobOptions
 
 
@@ -36,6 +37,8 @@ def read_files(options: JobOptions) -> JobFiles:
 
     Raises: `DataError` for a file that cannot be used, `PictureHourError` for a wrong hour.
     """
+    if options.netcdf:
+        check_netcdf()
     check_building_file(options.building)
     check_names(options.spaces)
     hours = options.room.outputs.picture_hours

@@ -40,6 +40,7 @@ class JobOptions(BuildingOptions):
     inner_glass: bool = False  # light passes glass and open doorways between rooms
     coupled_heat: bool = True  # heat flows between the rooms that are computed
     explore: bool = False  # every hour's picture in every shading state, for the explorer
+    netcdf: bool = False  # all numbers of the run as one netCDF file besides
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule
     g_value: float | None = None  # at normal incidence
 

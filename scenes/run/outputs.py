@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -14,10 +14,12 @@ from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from scenes.pictures import write_falsecolour
 from scenes.result_folder import ResultFolder
-from scenes.results import RoomYear, RunResult
+from scenes.results import GridDaylight, RoomYear, RunResult
 from scenes.room.daylight import illuminance_table
 from scenes.room.glare import glare_table
 from scenes.run.csv_text import csv_text
+from scenes.run.netcdf import NAME as NETCDF
+from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
 
 REPORT = "report.html"
@@ -25,13 +27,19 @@ EXPLORER = "explore"  # folder of the explorer, inside that of the results
 
 
 def write_results(
-    result: RunResult, folder: ResultFolder, write_report=None, write_explorer=None
+    result: RunResult,
+    folder: ResultFolder,
+    write_report=None,
+    write_explorer=None,
+    *,
+    netcdf: bool = False,
 ) -> None:
     """Write all files of a run; earlier results are replaced at the end.
 
     Args:
         write_report: `scenes.report.write_report`, or None for no report.
         write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
+        netcdf: whether all numbers are written as one netCDF file besides.
 
     A fault of the program in one of these pages is raised when all else is in place.
     """
@@ -44,10 +52,15 @@ def write_results(
             place.mkdir(exist_ok=True)
             _write_room(result, room, place)
         write_table(_problems(result), temporary / "problems.csv", index=False)
+        if netcdf:
+            write_netcdf(result, temporary / NETCDF)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
             if write is not None:
                 faults += _faults(write, result, temporary / page)
-        text = json.dumps(result.manifest, indent=2, ensure_ascii=False)
+        places = (name if several else "." for name in names)
+        guids = (room.space.guid for room in result.spaces)
+        folders = dict(zip(guids, places, strict=True))  # of each room's tables
+        text = json.dumps(result.manifest | {"folders": folders}, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
     if faults:
         raise faults[0] if len(faults) == 1 else ExceptionGroup("no page was written", faults)
@@ -80,6 +93,7 @@ def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
     metrics["relative_standard_error"] = room.daylight.relative_error
     _csv(metrics, place / "daylight_metrics.csv")
     _csv(pd.DataFrame([room.daylight.room_metrics]), place / "room_metrics.csv", index=False)
+    _write_grids(room.daylight.grids, place)
     _csv(glare_table(room.glare, result.times), place / "dgp.csv")
     heat = room.heat
     _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
@@ -94,6 +108,22 @@ def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
         write_hdr(place / f"{name}.hdr", picture.luminance, room.glare.view)
         title = f"{result.times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
         write_falsecolour(place / f"{name}.png", picture.luminance, title=title)
+
+
+def _write_grids(grids: Sequence[GridDaylight], place: Path) -> None:
+    """Tables of the sensor grids of the building's file: one row a grid, one row a sensor."""
+    if not grids:
+        return
+    rows = [{"grid": g.name, "sensors": len(g.sensor_metrics)} | g.metrics for g in grids]
+    _csv(pd.DataFrame(rows), place / "grids.csv", index=False)
+    tables = []
+    for grid in grids:
+        table = grid.sensor_metrics.reset_index()
+        table.insert(0, "grid", grid.name)
+        for number, axis in enumerate("xyz"):
+            table.insert(5 + number, f"direction_{axis}", grid.directions[:, number])
+        tables.append(table)
+    _csv(pd.concat(tables), place / "grid_sensors.csv", index=False)
 
 
 def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:

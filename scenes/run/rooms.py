@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -12,11 +12,13 @@ from bim.templates import template_rooms
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.progress import Progress, item, silent
+from mitsuba_cfs.progress import Progress, Stage, item, silent
 from scenes.fenestration.systems import States
-from scenes.room.equal_rooms import same_light, same_systems
+from scenes.room.equal_rooms import OutdoorLight, same_systems
 
 R = TypeVar("R")
+# Some rooms to what comes of each, in any order: its result or why it has none
+Beside = Callable[[Sequence[Space]], Iterator[tuple[Space, R | BaseException]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,28 +36,36 @@ class RoomSeries(Generic[R]):
     alike: Callable[[Space, Space], bool] = lambda one, other: True  # beside shape and light
     on_room: Callable[[R], None] = lambda result: None  # called with each result in turn
     given: str = "results are"  # what an equal room has of the one that was computed
+    beside: Beside[R] | None = None  # computes rooms beside each other in place of `compute`
 
     def results(self, progress: Progress = silent) -> tuple[list[R], list[Problem], list[str]]:
         """The results in the rooms' order, what was left out, and what was given twice.
 
         Raises: `DataError` where the only room cannot be computed.
         """
-        computed: dict[str, R] = {}
         found, problems, notes = [], [], []
-        equal = {s.guid: group for group in template_rooms(self.spaces) for s in group}
+        templates = _Templates(self)
+        ahead = self._ahead(templates, progress)
+        computed: dict[str, R | BaseException] = {}
         for number, space in enumerate(self.spaces, 1):
             steps = item(progress, "room", number, len(self.spaces), space.label)
             try:
-                twin = self._twin(space, equal[space.guid], computed)
+                twin = templates.of(space)
+                wanted = (twin or space).guid
+                while wanted not in computed:
+                    guid, result = next(ahead, (space.guid, None))
+                    computed[guid] = self.compute(space, steps) if result is None else result
+                result = computed[wanted]
+                if isinstance(result, BaseException):
+                    raise result
                 if twin is not None:
-                    result = self.move(computed[twin.guid], space)
+                    result = self.move(result, space)
                     notes.append(
                         f"Room {space.label} is like {twin.label} in shape, orientation, "
                         f"materials, windows and in what shades it: its {self.given} those."
                     )
-                else:
-                    result = computed[space.guid] = self.compute(space, steps)
             except RoomError as error:
+                templates.drop(space)
                 if len(self.spaces) == 1:
                     where = f"space {space.label}"
                     raise DataError(str(error), file=self.file, element=where) from error
@@ -65,18 +75,54 @@ class RoomSeries(Generic[R]):
             self.on_room(result)
         return found, problems, notes
 
-    def _twin(
-        self, space: Space, equal: Sequence[Space], computed: Mapping[str, R]
-    ) -> Space | None:
-        """A computed room that is equal and gets the same light."""
-        return next(
-            (
-                other
-                for other in equal
-                if other.guid in computed
-                and same_systems(other, space, self.systems)
-                and self.alike(other, space)
-                and same_light(self.building, other, space, self.sampling, self.cache)
-            ),
-            None,
-        )
+    def _ahead(
+        self, templates: _Templates, progress: Progress
+    ) -> Iterator[tuple[str, R | BaseException]]:
+        """The rooms that are computed beside each other, as they are ready."""
+        if self.beside is None:
+            return
+        rooms = []
+        for number, space in enumerate(self.spaces, 1):
+            if templates.of(space) is None:
+                rooms.append(space)
+            progress("equal rooms", number / len(self.spaces))
+        progress(Stage("", "room", 1, len(rooms)), 0.0)
+        for done, (space, result) in enumerate(self.beside(rooms), 1):
+            yield space.guid, result
+            progress(Stage("", "room", min(done + 1, len(rooms)), len(rooms)), 0.0)
+
+
+class _Templates:
+    """Of which earlier room each is a copy, in shape and in light."""
+
+    def __init__(self, series: RoomSeries[R]) -> None:
+        self._series = series
+        self._group: dict[str, list[OutdoorLight]] = {}  # by room; of those that stand for others
+        for group in template_rooms(series.spaces):
+            stand: list[OutdoorLight] = []
+            self._group |= dict.fromkeys((space.guid for space in group), stand)
+        self._found: dict[str, Space | None] = {}
+
+    def of(self, space: Space) -> Space | None:
+        """An earlier room that is equal and gets the same light; None: the room stands itself."""
+        if space.guid not in self._found:
+            series, group = self._series, self._group[space.guid]
+            light = OutdoorLight(series.building, space, series.sampling, series.cache)
+            twin = next((one.space for one in group if self._same(one, light)), None)
+            if twin is None:
+                group.append(light)
+            self._found[space.guid] = twin
+        return self._found[space.guid]
+
+    def _same(self, one: OutdoorLight, other: OutdoorLight) -> bool:
+        series, rooms = self._series, (one.space, other.space)
+        return same_systems(*rooms, series.systems) and series.alike(*rooms) and one.same(other)
+
+    def drop(self, space: Space) -> None:
+        """Let no room be a copy of this one, which could not be computed."""
+        group = self._group[space.guid]
+        group[:] = [light for light in group if light.space.guid != space.guid]
+        self._found = {
+            guid: twin for guid, twin in self._found.items()
+            if twin is None or twin.guid != space.guid
+        }  # fmt: skip

@@ -4,60 +4,54 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import TypeVar
 
-from bim.account import NOT_USABLE
-from bim.model import JOINED, Building, Problem, Space
-from bim.to_thermal import same_surfaces, shared_constructions
+from bim.model import Building, Problem, Space
+from bim.sensors import held_grids
+from bim.to_thermal import same_surfaces
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
-from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
-from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.resolver import source_notes
+from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_file import files_beside
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
-from scenes.room.drawn_shades import traced_building
 from scenes.room.equal_rooms import moved_light, moved_result
 from scenes.room.heated import DaylitRoom, coupled_years
-from scenes.room.inner_glass import lending_rooms, opened
-from scenes.room.operation import Operation, check_states
+from scenes.room.inner_glass import lending_rooms
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import skies_for
 from scenes.room.room_year import compute_room, lit_room
-from scenes.run.building import read_building
-from scenes.run.files import JobFiles, read_files
-from scenes.run.inputs import chosen_spaces, sha256
+from scenes.run.files import JobFiles
+from scenes.run.inputs import sha256
+from scenes.run.job import (
+    JobInputs,
+    balanced_together,
+    read_inputs,
+    run_spaces,
+    used_sources,
+    used_systems,
+)
+from scenes.run.notes import model_notes, site_notes
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
+from scenes.run.rooms_apart import RoomWork, Workers
 
 R = TypeVar("R")
-FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
-
 
 OnLight = Callable[[DaylitRoom], None]  # called with each room's light where its heat comes later
 OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
 OnBuilding = Callable[[Building], None]  # called with the building as soon as it is read
-
-
-@dataclass(frozen=True, slots=True)
-class JobInputs:
-    """What the files of a run hold."""
-
-    building: Building
-    spaces: list[Space]
-    weather: Weather
-    systems: Mapping[str, States]  # by window GUID
-    operation: Operation | None
 
 
 def run_job(
@@ -68,6 +62,7 @@ def run_job(
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
     on_building: OnBuilding | None = None,
+    workers: Workers | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the chosen rooms.
 
@@ -77,6 +72,7 @@ def run_job(
         on_light: called with the light of each room as soon as that is there, where rooms'
             heat is balanced together.
         on_building: called with the building before anything is traced.
+        workers: that the rooms' light comes from; None: this process, room by room.
 
     Raises: `DataError` for a file that cannot be used, before anything is traced.
     """
@@ -84,7 +80,10 @@ def run_job(
     inputs = read_inputs(options, progress, files)
     if on_building is not None:
         on_building(inputs.building)
-    return run_inputs(inputs, options, progress, on_room=on_room, on_light=on_light, start=start)
+    return run_inputs(
+        inputs, options, progress,
+        on_room=on_room, on_light=on_light, workers=workers, start=start,
+    )  # fmt: skip
 
 
 def run_inputs(
@@ -94,6 +93,7 @@ def run_inputs(
     *,
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
+    workers: Workers | None = None,
     start: float | None = None,
 ) -> RunResult:
     """Daylight, glare, temperatures and comfort of the rooms of `inputs`.
@@ -114,7 +114,7 @@ def run_inputs(
     room = options.room
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     progress("sky", 1.0)
-    heard = {"on_room": on_room, "on_light": on_light}
+    heard = {"on_room": on_room, "on_light": on_light, "workers": workers}
     results, problems, notes = _rooms(inputs, skies, options, progress, **heard)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
@@ -123,8 +123,8 @@ def run_inputs(
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
         *([NOTE] if options.quick else []),
-        *_account_notes(building),
-        *(f"{p.what}: {p.consequence}." for p in building.problems if p.kind == JOINED),
+        *model_notes(building),
+        *inputs.stated,
         *source_notes(used_sources(inputs)),
         *(note for system in used for note in system.notes),
         *thermal_notes,
@@ -133,7 +133,7 @@ def run_inputs(
         *(result.borrowed for result in results if result.borrowed),
         *(f"{hole.what}: {hole.consequence}." for hole in holes),
         *weather.notes,
-        *_site_notes(building, weather),
+        *site_notes(building, weather),
     ]
     return RunResult(
         building,
@@ -147,70 +147,6 @@ def run_inputs(
     )
 
 
-def read_inputs(
-    options: JobOptions, progress: Progress, files: JobFiles | None = None
-) -> JobInputs:
-    """The inputs, the building last."""
-    files = files or read_files(options)
-    progress("inputs", 0.1)
-    steps = part(progress, 0.1, 1.0)
-    building = read_building(
-        options.building,
-        join=options.joined,
-        furniture=options.furniture,
-        apertures=options.apertures,
-        surroundings=options.surroundings,
-        surroundings_offset=options.surroundings_offset,
-        progress=steps,
-    )
-    inputs = job_inputs(building, options.spaces, files, inner=options.inner_glass)
-    progress("inputs", 1.0)
-    return inputs
-
-
-def job_inputs(
-    building: Building, names: Sequence[str], files: JobFiles, *, inner: bool = False
-) -> JobInputs:
-    """A building's rooms of those names with what fills their windows.
-
-    Args: inner: light passes glass between rooms; rooms lit by that alone are among them.
-
-    Raises: `DataError` for a room that is not there, a window without a system.
-    """
-    operation, weather = files.operation, files.weather
-    beyond: dict[str, list[Space]] = {}
-    if inner:
-        building = opened(building)
-        beyond = {space.guid: lending_rooms(building, space) for space in building.spaces}
-    spaces = chosen_spaces(
-        building, names, building.file, lambda s: bool(s.windows or beyond.get(s.guid))
-    )
-    traced = {s.guid: s for space in spaces for s in (space, *beyond.get(space.guid, ()))}
-    windows = [window for space in traced.values() for window in space.windows]
-    systems = fill_windows(windows, files.given, building.file)
-    if operation is not None:
-        check_states(operation, max(len(states) for states in systems.values()))
-    building = traced_building(building, systems)
-    return JobInputs(building, spaces, weather, systems, operation)
-
-
-def used_systems(inputs: JobInputs) -> list[FenestrationSystem]:
-    """Every system that the run may use, once."""
-    states = _used_states(inputs).values()
-    return list({id(system): system for some in states for system in some}.values())
-
-
-def used_sources(inputs: JobInputs) -> list[dict]:
-    """Name and source of every system that the run may use, and its windows."""
-    windows = [window for space in inputs.spaces for window in space.windows]
-    return window_sources(windows, _used_states(inputs))
-
-
-def _used_states(inputs: JobInputs) -> dict[str, States]:
-    several = inputs.operation is not None
-    return {guid: s if several else s[:1] for guid, s in inputs.systems.items()}
-
-
 def _rooms(
     inputs: JobInputs,
     skies: AnnualSky,
@@ -219,11 +155,12 @@ def _rooms(
     *,
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
+    workers: Workers | None = None,
 ) -> tuple[list[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
-    if not options.coupled_heat or len(inputs.spaces) == 1:
-        compute = _computed(compute_room, inputs, skies, options)
-        series = _series(inputs, inputs.spaces, options, compute, moved_result)
+    if not balanced_together(inputs, options):
+        alone = RoomWork(compute_room, inputs, skies, options)
+        series = _series(alone, workers, alone, moved_result)
         return replace(series, on_room=on_room or (lambda room: None)).results(progress)
 
     def compute_light(space: Space, steps: Progress) -> DaylitRoom:
@@ -231,9 +168,8 @@ def _rooms(
         steps("heat", 1.0)
         return found
 
-    light = _computed(lit_room, inputs, skies, options)
-    spaces = shared_constructions(inputs.spaces)
-    together = _series(inputs, spaces, options, compute_light, moved_light, same_surfaces)
+    light = RoomWork(lit_room, inputs, skies, options)
+    together = _series(light, workers, compute_light, moved_light, same_surfaces)
     heard = on_light or (lambda room: None)
     together = replace(together, on_room=heard, given="daylight, glare and sun are")
     found, problems, notes = together.results(progress)
@@ -255,31 +191,15 @@ def _coupled(
     return years, (said,) if len(years) > 1 else ()
 
 
-def _computed(
-    compute: Callable[..., R], inputs: JobInputs, skies: AnnualSky, options: JobOptions
-) -> Callable[[Space, Progress], R]:
-    """What computes a room of the run: `compute_room` or `lit_room`."""
-    cache = MatrixCache.of_user() if options.cache else None
-
-    def computed(space: Space, steps: Progress) -> R:
-        return compute(
-            inputs.building, space, inputs.systems, inputs.weather, options.room,
-            operation=inputs.operation, skies=skies, cache=cache, explore=options.explore,
-            inner=options.inner_glass, progress=steps,
-        )  # fmt: skip
-
-    return computed
-
-
 def _series(
-    inputs: JobInputs,
-    spaces: Sequence[Space],
-    options: JobOptions,
+    work: RoomWork[R],
+    workers: Workers | None,
     compute: Callable[[Space, Progress], R],
     move: Callable[[R, Space], R],
     alike: Callable[[Space, Space], bool] = lambda one, other: True,
 ) -> RoomSeries[R]:
     """The rooms of a run; alike: whether one of two equal rooms may stand for the other."""
+    inputs, options = work.inputs, work.options
 
     def borrows(*spaces: Space) -> bool:
         """Whether what a room gets depends on a neighbour: then none stands for another."""
@@ -289,7 +209,7 @@ def _series(
 
     return RoomSeries(
         inputs.building,
-        spaces,
+        run_spaces(inputs, options),
         inputs.systems,
         options.room.sampling,
         MatrixCache.of_user() if options.cache else None,
@@ -297,8 +217,12 @@ def _series(
         move,
         options.building,
         lambda one, other: (
-            not borrows(one, other) and _operated_alike(inputs, one, other) and alike(one, other)
+            not borrows(one, other)
+            and not any(held_grids(inputs.building, space) for space in (one, other))
+            and _operated_alike(inputs, one, other)
+            and alike(one, other)
         ),
+        beside=None if workers is None else partial(work.beside, workers=workers),
     )
 
 
@@ -323,7 +247,7 @@ def _manifest(
         files["system"] = options.system
         for i, path in enumerate(files_beside(options.system)):
             files[f"system_angular_{i}" if i else "system_thermal"] = path
-    if inputs.operation is not None:
+    if inputs.operation is not None and inputs.operation.file != options.building:
         files["operation"] = inputs.operation.file
         files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
     files |= {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
@@ -360,33 +284,12 @@ def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
     if inputs.operation is not None and inputs.operation.systems and options.system is not None:
         file = inputs.operation.file.name
         return (f"--cfs fills the windows: [[system]] of {file} is not used.",)
-    several = [states[0].name for states in inputs.systems.values() if len(states) > 1]
-    if inputs.operation is not None or not several:
+    several = () if options.operation is not None else inputs.several
+    if not several:
         return ()
     names = ", ".join(dict.fromkeys(several))
     held_by = inputs.building.name if options.building is None else options.building.name
     return (
         f"{held_by} holds several shading states; without --operation the first of "
         f"each window ({names}) holds all year.",
-    )
-
-
-def _account_notes(building: Building) -> tuple[str, ...]:
-    """Why the model will not do, where that is so."""
-    account = building.account
-    return account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
-
-
-def _site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
-    """A sentence where building and weather lie far apart."""
-    if building.latitude_deg is None or building.longitude_deg is None:
-        return ()
-    north = building.latitude_deg - weather.latitude_deg
-    east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
-    if max(abs(north), abs(east)) <= FAR_SITE_DEG:
-        return ()
-    return (
-        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
-        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
-        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
     )

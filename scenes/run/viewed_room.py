@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bim.model import COLOURS, Space
+from bim.model import COLOURS, Building, Space
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -45,7 +45,7 @@ def read_viewed_room(
     space: str | None,
     join: Sequence[str],
     given: Given,
-    view_of: Callable[[Space], View],
+    view_of: Callable[[Building, Space], View],
     progress: Progress,
     *,
     furniture: bool = False,
@@ -59,7 +59,7 @@ def read_viewed_room(
     Args:
         space: its name; None: the first with a window.
         given: what the user gives for all windows.
-        view_of: the view of a room; it refuses one that is not in it.
+        view_of: the view of a building's room; it refuses one that is not in it.
         furniture: whether what stands in the room is seen.
         apertures: materials of a Radiance scene's windows.
         surroundings, surroundings_offset: as of `read_building`.
@@ -75,7 +75,7 @@ def read_viewed_room(
         progress=progress,
     )
     room = chosen_spaces(building, () if space is None else (space,), file)[0]
-    view = view_of(room)
+    view = view_of(building, room)
     filled = {guid: states[:1] for guid, states in fill_windows(room.windows, given, file).items()}
     windows = room_windows(room, filled)
     building = traced_building(building, filled)

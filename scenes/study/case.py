@@ -54,6 +54,8 @@ class Case:
     glare: str  # DGP, eDGP, sDGP or none
     chosen: str = ""  # why this method, where `auto` chose it
     referenced: tuple[InputFile, ...] = ()  # BSDF files that the building's names, and those beside
+    surroundings: tuple[InputFile, ...] = ()  # of what stands around the building
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
 
     @property
     def key(self) -> str:
@@ -75,7 +77,7 @@ class Case:
     def files(self) -> tuple[InputFile | BoxTable | None, ...]:
         """What it is read from; the building last."""
         own = (self.bsdf, self.thermal, self.weather, self.operation)
-        return (*own, *self.referenced, self.building)
+        return (*own, *self.referenced, *self.surroundings, self.building)
 
     @property
     def place(self) -> str:
@@ -87,7 +89,9 @@ class Case:
         """A hash of the room alone: cases that have it share traced matrices."""
         building = self.building
         source = building.sha256 if isinstance(building, InputFile) else building.model_dump_json()
-        return digest(source, self.space)[:32]
+        around = [file.sha256 for file in self.surroundings]
+        offset = self.surroundings_offset and list(self.surroundings_offset)
+        return digest(source, self.space, around, offset)[:32]
 
 
 def _plain(table: dict) -> list:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.building_file import read_building_file
+from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -32,6 +32,7 @@ from scenes.room.operation import Operation, check_states, read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room import skies_for
 from scenes.room.room_year import compute_room
+from scenes.room.stated_use import used_operation
 from scenes.run.inputs import read_weather
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
@@ -72,7 +73,10 @@ def _computed(case: Case) -> CaseResult:
     cache = MatrixCache.of_user()
     if operation is not None:
         check_states(operation, max(map(len, systems.values())))
+    else:
+        systems = {guid: states[:1] for guid, states in systems.items()}
     hours = _rated_hours(weather, case.options)
+    operation = used_operation(operation, building)
     room = compute_room(
         building, space, systems, weather, case.options,
         operation=operation,
@@ -80,6 +84,7 @@ def _computed(case: Case) -> CaseResult:
         rate=None if case.glare == "none" else (case.glare, hours),
     )  # fmt: skip
     figures, arrays = room_figures(room)
+    figures |= {f"da300 {grid.name}": grid.metrics["da300"] for grid in room.daylight.grids}
     figures["straight_view_percent"] = _straight_view(room, systems, hours)
     if room.dgp is not None:
         figures |= glare_figures(room.dgp.dgp, weather, case.options.occupancy.hours)
@@ -87,8 +92,7 @@ def _computed(case: Case) -> CaseResult:
         arrays["dgp"] = np.full(len(weather.times), np.nan, dtype=np.float32)
         arrays["dgp"][hours] = room.dgp.dgp
     if case.bsdf is None:  # else the table says it: names are no part of a case's key
-        used = systems if operation is not None else {guid: s[:1] for guid, s in systems.items()}
-        figures["fenestration"] = " ".join(source_notes(window_sources(space.windows, used)))
+        figures["fenestration"] = " ".join(source_notes(window_sources(space.windows, systems)))
     used = [state for states in systems.values() for state in states]
     heats = {id(system): thermal_system(system).named_model for system in used}
     figures["window_model"] = " ".join(dict.fromkeys(heats.values()))
@@ -104,16 +108,25 @@ def _straight_view(room: RoomYear, systems: dict[str, States], hours: NDArray[np
     return straight_view(room.space.windows, systems, state)
 
 
+Around = tuple[tuple[InputFile, ...], tuple[float, float, float] | None]
+
+
 @lru_cache(maxsize=4)
-def _building(source: InputFile) -> Building:
-    return read_building_file(source.path)
+def _building(source: InputFile, around: Around) -> Building:
+    files, offset = around
+    options = ReadOptions(
+        surroundings=tuple(file.path for file in files), surroundings_offset=offset
+    )
+    return read_building_file(source.path, options)
 
 
 def _room(case: Case) -> tuple[Building, Space]:
+    around = case.surroundings, case.surroundings_offset
     if isinstance(case.building, InputFile):
-        building = _building(case.building)
+        building = _building(case.building, around)
     else:
-        building = box_building(case.building)
+        files = [file.path for file in around[0]]
+        building = surrounded(box_building(case.building), files, around[1])
     return building, building.space(case.space)
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from bim.building_file import held_states, read_building_file
+from bim.building_file import ReadOptions, held_states, read_building_file, surrounded
 from bim.model import Building, Space
+from mitsuba_cfs.errors import DataError
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import box_building
 from scenes.room.operation import read_operation
@@ -37,8 +39,10 @@ def plan_of(study: Study) -> StudyPlan:
     climates = [{"climate": c.name, "weather": InputFile.of(c.weather)} for c in study.climate]
     found: list[Case] = []
     rooms = {}
+    _check_turning(study)
+    around = tuple(map(InputFile.of, study.surroundings))
     for room in study.room:
-        building, spaces = rooms_of(room)
+        building, spaces = rooms_of(room, study.surroundings, study.surroundings_offset)
         source = room.box if room.box is not None else InputFile.of(room.building)
         held_files = () if study.system else _referenced(building)
         for space in spaces:
@@ -48,12 +52,21 @@ def plan_of(study: Study) -> StudyPlan:
                 "space_name": room.name if room.box else space.label,
                 "building": source,
                 "specular": room.specular,
+                "surroundings": around,
+                "surroundings_offset": study.surroundings_offset,
             }
             mine = [one | {"referenced": (*held_files, *one["referenced"])} for one in systems]
             of_space = list(_of_space(study, about, mine, climates))
             rooms[of_space[0].scene] = building, space
             found += of_space
     return StudyPlan(tuple(found), rooms)
+
+
+def _check_turning(study: Study) -> None:
+    """Raise `DataError` for surroundings of a model that is turned: they would turn with it."""
+    if study.surroundings and any(angle % 360.0 for angle in study.orientations_deg):
+        message = "surroundings stand still: expected [0.0] where there are some"
+        raise DataError(message, field="orientations_deg")
 
 
 def _of_system(study: Study, system: SystemTable) -> dict:
@@ -105,10 +118,18 @@ def _referenced(building: Building) -> tuple[InputFile, ...]:
     return tuple(InputFile.of(file) for file in (*sorted(named), *beside) if file.is_file())
 
 
-def rooms_of(room: RoomTable) -> tuple[Building, list[Space]]:
-    """The building of an entry and the rooms asked for."""
+def rooms_of(
+    room: RoomTable,
+    surroundings: Sequence[Path] = (),
+    offset: tuple[float, float, float] | None = None,
+) -> tuple[Building, list[Space]]:
+    """The building of an entry and the rooms asked for.
+
+    Args: surroundings, offset: what stands around, as of `read_building`.
+    """
     if room.box is not None:
-        building = box_building(room.box)
+        building = surrounded(box_building(room.box), surroundings, offset)
         return building, list(building.spaces)
-    building = read_building_file(room.building)
+    options = ReadOptions(surroundings=tuple(surroundings), surroundings_offset=offset)
+    building = read_building_file(room.building, options)
     return building, chosen_spaces(building, room.spaces, room.building)

@@ -118,6 +118,8 @@ class Study(_Table):
     ] = (RoomOptions().method,)
     glare: Literal["DGP", "eDGP", "sDGP", "none"] = "DGP"  # of every occupied hour with sun
     operation: Path | None = None  # control, gains, air, set points: as for `cfs run`
+    surroundings: tuple[Path, ...] = ()  # files of what stands around every building
+    surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
     auto: AutoTable = AutoTable()
     options: OptionsTable = OptionsTable()
     quick: bool = False  # a first look: what the options do not say is chosen by `scenes.quick`
@@ -139,6 +141,7 @@ class Study(_Table):
         named = [room.building for room in self.room] + [system.bsdf for system in self.system]
         named += [system.operation for system in self.system]
         named += [climate.weather for climate in self.climate] + [self.operation]
+        named += self.surroundings
         return tuple(path for path in named if path is not None)
 
 
@@ -209,6 +212,7 @@ def _with_places(study: Study, path: Path) -> Study:
             entries.append(entry.model_copy(update=update))
         found[key] = tuple(entries)
     found["operation"] = there(study.operation, "operation")
+    found["surroundings"] = tuple(there(name, "surroundings") for name in study.surroundings)
     _check_systems(found["operation"], states=False)
     for system in found["system"]:
         _check_systems(system.operation, states=system.bsdf is None)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from bim.model import Space
+from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
-from scenes.room_views import NamedView, check_eye, eyes_of, given_views
+from scenes.room_views import NamedView, check_eye, eyes_of, given_views, held_fisheyes
 from scenes.year_of_glare.options import YearOptions
 
 
-def chosen_views(space: Space, options: YearOptions) -> list[NamedView]:
-    """Every view of the options; without any the room's middle towards its biggest window."""
-    found = rated_views(options) or eyes_of(
+def chosen_views(building: Building, space: Space, options: YearOptions) -> list[NamedView]:
+    """Every view of the options; without any those that the building's file holds for the room.
+
+    Where it holds none, the room's middle towards its biggest window.
+    """
+    found = rated_views(options)
+    if not found and options.grid is None and options.directions == 1:
+        found = held_fisheyes(building, space, options.size)
+    found = found or eyes_of(
         space, options.grid, options.directions, options.eye_height, options.size
     )
     for each in found:

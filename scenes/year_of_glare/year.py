@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.building_file import files_beside
-from bim.model import Space
+from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
@@ -82,8 +82,8 @@ def read_year(
     progress("inputs", 0.1)
     views: list[NamedView] = []
 
-    def view_of(space: Space) -> View:
-        views.extend(chosen_views(space, options))
+    def view_of(building: Building, space: Space) -> View:
+        views.extend(chosen_views(building, space, options))
         return views[0].view
 
     steps = part(progress, 0.1, 0.6)

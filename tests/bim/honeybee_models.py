@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 LOW, HIGH = 0.0, 3.0
+WEEKDAYS = ("monday", "tuesday", "wednesday", "thursday", "friday")
 
 
 def box_faces(room: str, x0: float, x1: float, depth: float, *, beside: dict[str, str]) -> list:
@@ -122,6 +123,53 @@ def _radiance() -> dict:
             "wall_set": {"exterior_modifier": "paint", "interior_modifier": "paint"},
         },
     }  # fmt: skip
+
+
+def used_model() -> dict:
+    """Two rooms with a program, the office's own lamps, an ideal system in the office alone."""
+    model = two_rooms()
+
+    def day(name, times, values, **more):
+        return {"type": "ScheduleDay", "identifier": name, "times": times, "values": values} | more
+
+    weekday = day("work", [[0, 0], [8, 30], [18, 0]], [0.1, 1.0, 0.2])
+    summer = day("summer", [[0, 0]], [0.5])
+    schedules = [
+        {"type": "ScheduleRulesetAbridged", "identifier": "occupied",
+         "day_schedules": [weekday, summer, day("free", [[0, 0]], [0.0])],
+         "default_day_schedule": "free", "holiday_schedule": "free",
+         "schedule_rules": [
+             {"schedule_day": "summer", "apply_monday": True, "start_date": [7, 1],
+              "end_date": [8, 31]},
+             {"schedule_day": "work"} | {f"apply_{d}": True for d in WEEKDAYS}]},
+        {"type": "ScheduleRulesetAbridged", "identifier": "warm",
+         "day_schedules": [day("21", [[0, 0]], [21.0])], "default_day_schedule": "21"},
+        {"type": "ScheduleFixedIntervalAbridged", "identifier": "cool", "timestep": 2,
+         "values": [24.0, 26.0] * 8760},
+    ]  # fmt: skip
+    program = {
+        "type": "ProgramTypeAbridged", "identifier": "Office",
+        "people": {"people_per_area": 0.1, "occupancy_schedule": "occupied",
+                   "latent_fraction": 0.25},
+        "lighting": {"watts_per_area": 8.0, "schedule": "occupied", "radiant_fraction": 0.4},
+        "electric_equipment": {"watts_per_area": 5.0, "schedule": "occupied"},
+        "gas_equipment": {"watts_per_area": 2.0, "schedule": "occupied", "lost_fraction": 0.5},
+        "infiltration": {"flow_per_exterior_area": 3e-4, "schedule": "occupied",
+                         "velocity_coefficient": 0.2, "constant_coefficient": 0.6},
+        "ventilation": {"flow_per_person": 0.01, "flow_per_area": 1e-4},
+        "setpoint": {"heating_schedule": "warm", "cooling_schedule": "cool"},
+    }  # fmt: skip
+    energy = model["properties"]["energy"]
+    energy |= {"schedules": schedules, "program_types": [program],
+               "hvacs": [{"type": "IdealAirSystemAbridged", "identifier": "ideal",
+                          "economizer_type": "NoEconomizer", "sensible_heat_recovery": 0.7,
+                          "heating_limit": 900.0}]}  # fmt: skip
+    for room in model["rooms"]:
+        room["properties"]["energy"]["program_type"] = "Office"
+    own = model["rooms"][0]["properties"]["energy"]
+    own |= {"hvac": "ideal", "lighting": {"watts_per_area": 3.0, "schedule": "occupied"},
+            "service_hot_water": {"flow_per_area": 0.1}}  # fmt: skip
+    return model
 
 
 def write(model: dict, folder: Path, name: str = "two_rooms.hbjson") -> Path:

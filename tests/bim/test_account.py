@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import zipfile
 
+import ifcopenshell.api.feature
+import ifcopenshell.api.root
 import pytest
 from click.testing import CliRunner
 
@@ -70,6 +72,12 @@ def test_sound_room_is_usable_and_all_its_glass_used(tmp_path):
     assert "1 of 1 windows" in found.lines[2]
 
 
+def test_a_file_without_rooms_claims_no_share_of_glass():
+    account = Account((), 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert account.lines[1].startswith("Rooms read: none: the file has no spaces")
+    assert account.lines[2] == "Glass: none looks out of a room"
+
+
 # phantom glass -------------------------------------------------------------------------------
 
 
@@ -106,6 +114,62 @@ def test_transparent_roof_is_glass_by_its_names_or_as_thin_as_a_pane(
     assert (building.account.phantom > 0) == (panes == 0)
     named = [p for p in building.problems if "no glass: taken as opaque" in p.consequence]
     assert [p.where for p in named] == ([] if panes else [named[0].where])
+
+
+@pytest.mark.parametrize("on", ["wall", "pane", ""])
+def test_a_clear_sheet_on_a_wall_or_a_pane_is_no_window(tmp_path, on):
+    """A banner on the north wall, a film on the glass of the south window; a pane in an opening."""
+    small, _ = box_model()
+    clear = small.style("Transparent", 0.5, 0.5)
+    glass = read(tmp_path, small).account.glass_used
+    if on == "pane":  # the window's glass is 20 mm thick about the middle of the wall
+        small.box("IfcBuildingElementProxy", "film", (1.3, -0.17, 1.0), (0.9, 0.023, 1.0), clear)
+    elif on == "wall":
+        small.box("IfcBuildingElementProxy", "banner", (1.0, DEPTH - 0.023, 1.0),
+                  (1.0, 0.023, 1.0), clear)  # fmt: skip
+    else:
+        opening = small.box("IfcOpeningElement", "hole", (1.0, DEPTH - 0.1, 1.0), (1.0, 0.5, 1.0))
+        (wall,) = (w for w in small.model.by_type("IfcWall") if w.Name == "north")
+        ifcopenshell.api.feature.add_feature(small.model, feature=opening, element=wall)
+        small.box("IfcBuildingElementProxy", "pane", (1.0, DEPTH + 0.1, 1.0), (1.0, 0.023, 1.0),
+                  clear)  # fmt: skip
+    building = read(tmp_path, small)
+    assert building.account.glass_used == pytest.approx(glass + (not on) * 1.0, abs=0.01)
+    said = [p for p in building.problems if "lies on something else" in p.what]
+    assert len(said) == bool(on)
+    assert (building.account.phantom > 0) == bool(on)
+
+
+@pytest.mark.parametrize("width", [0.05, 0.5])
+def test_a_clear_bar_of_a_frame_is_no_window(tmp_path, width):
+    """Beside the panes in a hole of the north wall: one bar of the panes' own style."""
+    small, _ = box_model()
+    own = read(tmp_path, small).account.glass_used
+    clear = small.style("Cristal", 0.9, 0.75)
+    opening = small.box("IfcOpeningElement", "hole", (1.0, DEPTH - 0.1, 1.0), (1.0, 0.5, 1.0))
+    (wall,) = (w for w in small.model.by_type("IfcWall") if w.Name == "north")
+    ifcopenshell.api.feature.add_feature(small.model, feature=opening, element=wall)
+    small.box("IfcMember", "mullion", (1.0, DEPTH + 0.1, 1.0), (width, 0.1, 1.0), clear)
+    small.box("IfcPlate", "pane", (1.0 + width, DEPTH + 0.1, 1.0), (1.0 - width, 0.02, 1.0), clear)
+    building = read(tmp_path, small)
+    glass = own + 1.0 - (width < 0.2) * width
+    assert building.account.glass_used == pytest.approx(glass, abs=0.01)
+    assert any("a bar of a frame" in p.what for p in building.problems) == (width < 0.2)
+
+
+def test_a_window_drawn_twice_is_counted_once(tmp_path):
+    small, _ = box_model()
+    once = read(tmp_path, small).account
+    (window,) = small.model.by_type("IfcWindow")
+    ifcopenshell.api.root.copy_class(small.model, product=window)
+    copy = small.model.by_type("IfcWindow")[-1]
+    assert copy != window
+    copy.Representation, copy.ObjectPlacement = window.Representation, window.ObjectPlacement
+    building = read(tmp_path, small)
+    assert any("drawn twice" in p.consequence for p in building.problems)
+    assert building.account.glass_out == pytest.approx(once.glass_out)
+    assert building.account.share_used == pytest.approx(1.0)
+    assert building.account.windows_out == 1
 
 
 def two_rooms(name: str, material: str, *, floor: bool = False):

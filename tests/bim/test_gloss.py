@@ -10,11 +10,12 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
+from bim.colours import GREY
 from bim.defaults import CLEAR_GLAZING
 from bim.gloss_materials import gltf_factors, mitsuba_bsdf
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import read_corrections
-from bim.model import COLOURS, GREY, Element
+from bim.model import COLOURS, Element
 from bim.outdoors import mirrors_in_view
 from bim.shoebox import shoebox
 from bim.solids import triangles_of
@@ -263,4 +264,4 @@ def test_a_styles_colour_is_its_reflectance_in_three_bands(tmp_path):
     assert np.isclose(faces, linear[0], rtol=1e-4).any()
     bright = replace(wall, reflectance_visible=0.5, gloss=dielectric(1.5, 0.1))
     assert bright.reflectance("red") == 1 - bright.gloss.at_normal, "no more than it gets"
-    assert [f.tint for f in shoebox().spaces[0].faces if f.tint != GREY] == []
+    assert [f.hue for f in shoebox().spaces[0].faces if f.hue != GREY] == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -53,6 +54,19 @@ def test_export_writes_what_is_asked_for(path, tmp_path):
     assert (rad / "R1_Room" / "windows_S.rad").is_file()
     assert (mitsuba / "R1_Room" / "scene.xml").is_file()
     assert zone.is_file() and view.is_file()
+
+
+def test_the_radiance_folder_is_of_the_grid_the_sky_and_the_band_asked_for(path, tmp_path):
+    asked = ["--spacing", "1.5", "--height", "1", "--subdivision", "4", "--band", "solar"]
+    call = ["export", str(path), "--radiance", str(tmp_path / "rad"), *asked]
+    assert CliRunner().invoke(command, call, catch_exceptions=False).exit_code == 0
+    folder = tmp_path / "rad" / "R1_Room"
+    sensors = np.loadtxt(folder / "sensors.pts")
+    assert np.all(sensors[:, 2] == 1.0)
+    assert np.diff(np.unique(sensors[:, 0])) == pytest.approx(1.5)
+    assert "h=r4" in (folder / "sky.rad").read_text()
+    walls = np.loadtxt(folder / "surfaces.pts")
+    assert len(np.unique(walls[:, 3:], axis=0)) >= 6  # on all sides
 
 
 def test_export_of_an_unknown_room_and_of_nothing(path, tmp_path):

@@ -97,6 +97,17 @@ def test_rooms_drawn_to_the_axis_of_a_wall_are_open_at_its_doorway_once(tmp_path
     assert said.what == "rooms dark and lit are open to each other by 2.1 m2"
 
 
+def test_rooms_open_by_a_door_and_by_more_are_reported_once(tmp_path):
+    small = two_rooms(thick=0.2)
+    partition(small, SOUTH, 0.2, (0.2, 0.0, 0.9, 2.0), (1.5, 0.0, 2.0, 2.5))
+    building = read(small, tmp_path)
+    assert open_areas(building, "dark") == pytest.approx([1.8, 5.0], rel=1e-6)
+    (said,) = [p for p in building.problems if "open to each other" in p.what]
+    assert said.what == "rooms dark and lit are open to each other by 6.8 m2 in 2 openings"
+    assert "--join open joins all" in said.consequence
+    assert read(small, tmp_path, join=["open"]).space("dark").name == "lit + dark"
+
+
 def test_a_void_in_a_slab_is_open(tmp_path):
     small, _ = box_model(space=False)
     small.box("IfcSpace", "below", (0, 0, 0), (WIDTH, DEPTH, 1.4))

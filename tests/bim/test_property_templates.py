@@ -15,6 +15,7 @@ import pytest
 from bim.fenestration import ShadingState
 from bim.ifc.fenestration_read import THERMAL
 from bim.ifc.fenestration_write import BLOCKS, attach_state
+from bim.ifc.property_definition import write_psd
 from bim.ifc.property_templates import IDS, KINDS, XS, write_ids, write_templates
 from mitsuba_cfs.bsdf.klems import KLEMS_HALF, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
@@ -129,3 +130,57 @@ def test_the_ids_asks_windows_for_u_and_checks_types_and_ranges(tmp_path):
     pattern = root.find(".//ids:propertySet/xs:restriction/xs:pattern", NAMES).get("value")
     assert re.fullmatch(pattern, "BlackBox Model") and re.fullmatch(pattern, "BlackBox Model: a")
     assert not re.fullmatch(pattern, "BlackBox Modelled")
+
+
+# The children that PSD_IFC4.xsd allows in an element, in its order; "*" where any number may follow
+PSD = {
+    "PropertySetDef": ("IfcVersion", "Name", "Definition", "Applicability", "ApplicableClasses",
+                       "ApplicableTypeValue", "PropertyDefs"),
+    "ApplicableClasses": ("ClassName*",),
+    "PropertyDefs": ("PropertyDef*",),
+    "PropertyDef": ("Name", "Definition", "PropertyType"),
+    "TypeComplexProperty": ("PropertyDef*",),
+    "TypePropertySingleValue": ("DataType", "UnitType?"),
+    "TypePropertyListValue": ("ListValue",),
+    "ListValue": ("DataType", "UnitType?"),
+    "TypePropertyBoundedValue": ("ValueRangeDef", "DataType", "UnitType?"),
+    "ValueRangeDef": ("LowerBoundValue", "UpperBoundValue"),
+}  # fmt: skip
+
+
+def _structured(element: ElementTree.Element) -> None:
+    """Raise where an element holds what the schema does not know, or in another order."""
+    tags = " ".join(child.tag for child in element)
+    if element.tag == "PropertyType":
+        assert tags in PSD and tags.startswith("Type")  # a choice
+    elif element.tag in PSD:
+        parts = [re.sub(r"(\w+)([*?]?)", r"(\1 )\2", part) for part in PSD[element.tag]]
+        assert re.fullmatch("".join(parts), f"{tags} ")
+    else:
+        assert not tags
+    for child in element:
+        _structured(child)
+
+
+def test_the_psd_has_the_schemas_structure_and_the_librarys_properties(library, tmp_path):
+    """Every template of the library is defined in it, with its measure, at its place."""
+    write_psd(tmp_path / "set.xml")
+    root = ElementTree.parse(tmp_path / "set.xml").getroot()
+    _structured(root)
+    classes = [one.text for one in root.iterfind("ApplicableClasses/ClassName")]
+    (template,) = library.by_type("IfcPropertySetTemplate")
+    assert classes == template.ApplicableEntity.split(",")
+    guids = [one.get("ifdguid") for one in root.iter() if one.get("ifdguid")]
+    assert len(set(guids)) == len(guids)
+    places = {ifcopenshell.guid.expand(one.GlobalId) for one in _below(template)}
+    assert set(guids) == {place.replace("-", "") for place in places}
+    measures = sorted(
+        one.PrimaryMeasureType for one in library.by_type("IfcSimplePropertyTemplate")
+    )
+    assert sorted(one.get("type") for one in root.iter("DataType")) == measures
+
+
+def _below(template):
+    yield template
+    for one in getattr(template, "HasPropertyTemplates", None) or ():
+        yield from _below(one)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bim.model import Element
+from bim.outdoors import before_windows
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_radiance import FilledGroup, write_radiance
 from bim.to_tracer import window_groups
@@ -82,6 +84,47 @@ def test_the_sun_meets_the_finest_data_of_a_window(room, tmp_path):
     assert materials[:2] == ["void", "aBSDF"]
     found = read_bsdf_xml(tmp_path / materials[4])
     assert isinstance(found.bands["Visible"], TensorTreeBsdf)
+
+
+def test_only_what_a_window_may_see_stands_before_the_sun():
+    """A stair in the room is left out, a wall across a window's plane is cut there."""
+    within = WALL + np.array([0.0, 7.0, 0.0])  # y = 2
+    stair = Element("s", "stair", "IfcStair", within, 0.4, 0.4)
+    across = Element("w", "fin", "IfcWall", WALL[:, :, [1, 0, 2]], 0.4, 0.4)  # y from 0 to 6
+    across = replace(across, triangles=across.triangles - [0, 3, 0])
+    window = WindowRectangle(0.5, 0.9, 2.0, 1.5)
+    space = shoebox(4, 5, 3, windows=[window], recess=0.2).spaces[0]
+    glass = space.windows[0].centre[1]
+    assert len(before_windows([stair], space.windows)) == 0
+    found = before_windows([across], space.windows)
+    assert found[..., 1].max() == pytest.approx(glass) and found[..., 1].min() == -3
+    sides = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+    assert 0.5 * np.linalg.norm(sides, axis=1).sum() == pytest.approx(4 * (3 + glass))
+    assert before_windows([], space.windows).shape == (0, 3, 3)
+
+
+@pytest.mark.peer
+def test_a_room_without_windows_has_no_light(tmp_path):
+    """Its folder runs too, in either band; `getbbox` and `oconv` take every scene of it."""
+    pytest.importorskip("pyradiance")
+    from scenes.evidence.benchmarks.radiance import environment, run
+
+    street = Element("street", "street", "IfcSite", WALL, 0.2, 0.2)
+    building = shoebox(4, 5, 3, windows=(), elements=(street,))
+    for band, result in (("visible", "illuminance.txt"), ("solar", "irradiance.txt")):
+        folder = tmp_path / band
+        files = write_radiance(building.spaces[0], building, folder, band=band, spacing=2)
+        (folder / "hour.wea").write_text(
+            "place x\nlatitude 45\nlongitude 0\ntime_zone 0\nsite_elevation 0\n"
+            "weather_data_file_units 1\n6 21 12.5 800 200\n6 21 13.5 700 200\n"
+        )
+        call = [str(files.script), str(folder / "hour.wea")]
+        done = subprocess.run(call, check=True, capture_output=True, env=environment())
+        assert b"error" not in done.stderr and b"warning" not in done.stderr
+        found = np.loadtxt(folder / result)
+        assert found.shape == (len(np.loadtxt(files.sensors)), 2) and not found.any()
+        box = np.array(run("getbbox -h room.rad", folder).split(), dtype=float)
+        assert box == pytest.approx([0, 4, 0, 5, 0, 3])
 
 
 @pytest.mark.slow

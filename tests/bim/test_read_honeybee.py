@@ -14,7 +14,6 @@ from bim.building_file import read_building_file
 from bim.honeybee.building import read_honeybee
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.images.view import parse_view
 from thermal.glazing_unit import Environment, GlazingLayer, GlazingUnit
 from thermal.iso15099 import Conditions, iso15099_g_values, iso15099_u_value
 
@@ -166,19 +165,46 @@ def used_rooms() -> dict:
     return model
 
 
-def test_what_is_no_part_of_a_building_is_named(tmp_path):
+def test_sensors_and_views_come_along_and_what_is_not_used_is_named(tmp_path):
     model = used_rooms()
-    said = {p.what: p.consequence for p in read_honeybee(write(model, tmp_path)).problems}
-    assert "1 sensor grid(s) with 7 sensors: desks" in said
-    assert said["view nowhere"] == "left out"
-    options = said["view desk"].split("'")[1]
-    view = parse_view(options)
-    assert (view.kind, view.horizontal_deg) == ("angular", 180)
-    np.testing.assert_allclose(view.position, [2.0, 3.0, 1.2])
-    np.testing.assert_allclose(view.direction, [0, -1, 0], atol=1e-12)
-    assert "1 room(s) with loads, schedules or systems: Office" in said
+    found = read_honeybee(write(model, tmp_path))
+    (grid,), (view,) = found.grids, found.views
+    assert (grid.name, len(grid.points)) == ("desks", 7)
+    np.testing.assert_allclose(grid.points, np.tile([0.01, 0.01, 0.008], (7, 1)))
+    np.testing.assert_allclose(grid.directions, np.tile([0.0, 0.0, 1.0], (7, 1)))
+    assert (view.name, view.view.kind, view.view.horizontal_deg) == ("desk", "angular", 180)
+    np.testing.assert_allclose(view.view.position, [2.0, 3.0, 1.2])
+    np.testing.assert_allclose(view.view.direction, [0, -1, 0], atol=1e-12)
+    said = {p.what: p.consequence for p in found.problems if p.kind == "not used"}
+    assert said["view nowhere: its fields give no view"] == "left out"
     assert said["1 shade(s) with states: Overhang"] == "their own modifier holds all year"
     assert said["1 shade(s) let light through by a schedule: Overhang"] == "opaque"
+
+
+def test_states_of_glass_are_states_of_the_window(tmp_path):
+    """By hand: a pane of n = 1.52 and transmissivity t passes (1 - F)^2 t / (1 - F^2 t^2)."""
+    model = two_rooms()
+    modifiers = model["properties"]["radiance"]["modifiers"]
+    for name, t in (("clear", 0.9), ("dark", 0.2)):
+        modifiers.append({"type": "Glass", "identifier": name, "refraction_index": 1.52}
+                         | {f"{c}_transmissivity": t for c in "rgb"})  # fmt: skip
+    window = model["rooms"][0]["faces"][0]["apertures"][0]
+    window["properties"]["radiance"] = {
+        "modifier": "clear", "dynamic_group_identifier": "south",
+        "states": [{}, {"modifier": "dark"}, {"modifier": "paint"}],
+    }  # fmt: skip
+    building = read_honeybee(write(model, tmp_path))
+    (found,) = building.space("Office").windows
+    assert [state.name for state in found.states] == ["", "dark"]
+    f = (0.52 / 2.52) ** 2
+    for state, t in zip(found.states, (0.9, 0.2), strict=True):
+        passed = (1 - f) ** 2 * t / (1 - f**2 * t**2)
+        through = (one := state.bands["Visible"]).direct_hemispherical(one.transmission_front)[0]
+        assert through == pytest.approx(passed, rel=1e-3)
+        assert state.u_value == 1.1
+    assert found.states[0].g_normal == 0.5 and found.states[1].g_normal is None
+    (lost,) = [p.what for p in building.problems if "its states" in p.what]
+    assert lost == "Window: 1 of its states are neither a BSDF nor a pane of glass"
 
 
 def test_u_is_of_nfrcs_winter_and_g_of_its_summer(tmp_path):

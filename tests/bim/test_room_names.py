@@ -50,6 +50,29 @@ def test_a_name_of_several_lists_them_so_that_one_can_be_chosen():
         found_by_name(twins, "1 Bad", "space")
 
 
+@pytest.mark.parametrize(
+    ("name", "long_name", "label"),
+    [
+        ("1 - Living room", "Living room", "1 - Living room"), ("101", "101 Office", "101 Office"),
+        ("1", "Living room", "1 Living room"), ("lab", "Lab", "lab Lab"), ("", "Bad", "Bad"),
+        ("Bad", "Bad", "Bad"), ("Bath 1", "1 Bath", "Bath 1 1 Bath"), ("", "", "guid"),
+    ],
+)  # fmt: skip
+def test_a_label_says_each_name_once(name, long_name, label):
+    assert label_of(name, long_name, "guid") == label
+
+
+@pytest.mark.parametrize("wanted", ["Hall", "HALL", "2", "2 Living", "Living"])
+def test_a_joined_room_is_found_by_its_parts(wanted):
+    rooms = (Room("a", "1 + 2", "Hall + Living"), Room("b", "3", "Bad"))
+    assert found_by_name(rooms, wanted, "space").guid == "a"
+
+
+def test_a_room_of_its_own_goes_before_a_part_of_a_joined_one():
+    rooms = (Room("a", "1 + 2", "Hall + Living"), Room("b", "3", "Hall"))
+    assert found_by_name(rooms, "Hall", "space").guid == "b"
+
+
 def test_an_unknown_name_lists_the_nearest_first():
     with pytest.raises(KeyError, match="no space 'Wonzimmer'; there are: 01 Wohnzimmer, "):
         found_by_name(ROOMS, "Wonzimmer", "space")

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mitsuba_cfs.matrices import cache as cache_module
 from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache, default_folder, digest
 from tests.trace import rooms
 
@@ -130,8 +131,24 @@ def test_every_input_counts():
     assert digest(*inputs[0]) == digest(*rooms.test_room(), 1, 0.5, None, "a")
     assert digest("ab", "c") != digest("a", "bc")
     assert digest(1) != digest(1.0) != digest("1.0")
+    assert len({digest(v) for v in (("1",), "('1',)", (1,), (1.0,), (True,), ("1", None))}) == 6
     with pytest.raises(ValueError, match="cannot hash"):
         digest(object())
+
+
+def test_what_is_hashed_again_is_not_read_again(monkeypatch):
+    """Fifteen matrices of a room have the whole building in their keys."""
+    room, groups = rooms.test_room()
+    fed, feed = [], cache_module._feed
+    monkeypatch.setattr(cache_module, "_feed", lambda *of: (fed.append(of[1]), feed(*of)))
+    first, again = digest("D", room, groups, 1), replace(room)
+    assert any(value is room.triangles for value in fed)
+    fed.clear()
+    assert digest("D", room, groups, 1) == first
+    assert not any(value is room.triangles for value in fed)
+    for _ in range(cache_module.KEPT_HASHES + 1):  # others in between
+        digest(replace(room, reflectance=room.reflectance / 2))
+    assert digest("D", room, groups, 1) == first == digest("D", again, groups, 1)
 
 
 def test_the_environment_names_the_folder(monkeypatch, tmp_path):

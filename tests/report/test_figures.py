@@ -11,6 +11,7 @@ import pytest
 import shapely
 from matplotlib import colormaps
 
+from bim.model import Element
 from bim.sensors import sensor_grid
 from bim.shoebox import WindowRectangle, shoebox
 from scenes.figures.carpet import carpet, class_carpet, day_grid, month_ticks
@@ -25,7 +26,7 @@ from scenes.figures.scale import (
     round_values,
 )
 from scenes.report.glare_figures import luminance_scale, outline
-from scenes.report.model3d import model3d, outline_edges
+from scenes.report.model3d import building_box, model3d, outline_edges
 from scenes.results import LuminancePicture
 from tests.report.synthetic import run_result, slab
 
@@ -162,6 +163,27 @@ def test_box_has_twelve_edges_and_a_square_four() -> None:
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     assert sorted(lengths) == pytest.approx([1] * 4 + [2] * 4 + [3] * 4)
     assert len(outline_edges(cube[:2])) == 4
+
+
+def test_a_building_is_its_rooms_and_what_touches_them() -> None:
+    """The attic above the room and the roof on it, not the terrain, nor a tree 5 m away."""
+    parts = (
+        ("IfcWall", [0, 0, 3.2], [4, 6, 6]), ("IfcRoof", [-0.5, -0.5, 6], [4.5, 6.5, 7]),
+        ("IfcSite", [-50, -50, -1], [50, 50, 0]),
+        ("IfcBuildingElementProxy", [9, 0, 0], [10, 1, 9]),
+    )  # fmt: skip
+    elements = tuple(
+        Element(f"{i}", kind, kind, slab(low, high), 0.3, 0.3)
+        for i, (kind, low, high) in enumerate(parts)
+    )
+    box = building_box(shoebox(4.0, 6.0, 3.0, elements=elements))
+    np.testing.assert_allclose(box, [[-0.5, -0.5, 0], [4.5, 6.5, 7]], atol=1e-9)
+    model = model3d(run_result(picture_size=32, pictures=1))
+    rooms = np.concatenate(
+        [s.shell for s in run_result(picture_size=32, pictures=1).building.spaces]
+    ).reshape(-1, 3)
+    low, high = (np.array(corner) + model.centre for corner in model.whole)
+    assert np.all(low <= rooms.min(axis=0) + 1e-3) and np.all(high >= rooms.max(axis=0) - 1e-3)
 
 
 def test_mesh_keeps_positions_to_a_step_and_every_sensor() -> None:

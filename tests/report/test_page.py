@@ -104,7 +104,8 @@ def test_account_stands_in_the_head_and_alike_problems_once(result) -> None:
     dull = [Problem(str(i), f"wall {i}: is {i} mm off", "kept") for i in range(19)]
     lost = Problem("W1", "window W1: no room behind it", "no daylight", "window", 11.0)
     page = report_html(replace(result, building=building, problems=(*dull, lost)))
-    head, _, rest = page.partition("</header>")
+    head, _, rest = page.replace("\u00a0", " ").partition("</header>")
+    assert "9.0 of 20.0 m² that looks out used" in head
     assert "not usable: only 45 % of the glass that looks out is used" in head
     assert "3 of 4 spaces" in head and "A gym" in head
     assert "19 times: wall 0: is 0 mm off" in rest and "wall 7: is" not in rest

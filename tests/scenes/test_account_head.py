@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import scenes.run.notes
 import scenes.run.run
 from bim.ifc.building import read_ifc
 from scenes.commands.run import _print_account
@@ -32,5 +33,5 @@ def test_run_begins_with_the_account_and_notes_a_model_that_will_not_do(
     verdict = "Model: not usable: only 15 % of the glass that looks out is used"
     assert said[0].splitlines()[0].startswith(verdict)
     assert "Rooms read: 1 of 1 spaces" in said[0] and "Glass: " in said[0]
-    (note,) = scenes.run.run._account_notes(building)
+    (note,) = scenes.run.notes._account_notes(building)
     assert note.startswith(verdict)

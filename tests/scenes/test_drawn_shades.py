@@ -11,8 +11,8 @@ from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.room.drawn_shades import holds_shade
+from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
-from scenes.run.run import read_inputs
 from tests.bim.small_ifc import OPENING, WALL, WIDTH, SmallIfc, box_room
 
 X, SILL, W, H = OPENING

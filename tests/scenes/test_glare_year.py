@@ -111,11 +111,12 @@ def test_views_that_mean_nothing_are_refused(view, message):
     from scenes.run.inputs import chosen_spaces
     from scenes.year_of_glare.views import chosen_views
 
-    space = chosen_spaces(read_ifc(OFFICE), (), OFFICE)[0]
+    building = read_ifc(OFFICE)
+    space = chosen_spaces(building, (), OFFICE)[0]
     options = YearOptions(OFFICE, WEATHER, VENETIAN_BLIND, size=64)
-    assert chosen_views(space, replace(options, views=(INSIDE,)))[0].view.width == 64
+    assert chosen_views(building, space, replace(options, views=(INSIDE,)))[0].view.width == 64
     with pytest.raises(DataError, match=message):
-        chosen_views(space, replace(options, views=(view,)))
+        chosen_views(building, space, replace(options, views=(view,)))
 
 
 def test_wrong_words_and_a_strange_folder_end_with_one_line(tmp_path, capsys):

@@ -14,6 +14,7 @@ from scenes.cli import cfs
 KINDS_DIFFER = {
     "--out": "a folder of results, or a file where a command writes one",
     "--g": "cfs ifc attach takes a table by angle as well",
+    "--band": "a BSDF file may have more than the two of the exports",
 }
 
 

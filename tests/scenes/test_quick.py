@@ -58,7 +58,7 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list:
     """The options that commands would have run with."""
     seen: list = []
 
-    def keep(options, *_rest):
+    def keep(options, *_rest, **_more):
         seen.append(options)
         raise DataError("stop here")
 
@@ -190,14 +190,15 @@ def test_progress_counts_the_rooms(three_rooms, monkeypatch) -> None:
 
 
 def test_a_room_is_said_though_the_run_fails_later(monkeypatch, tmp_path, capsys) -> None:
-    def half(options, progress, files, *, on_room, on_light, on_building):
+    def half(options, progress, files, *, on_room, on_light, on_building, workers):
         on_light(first)
         on_room(first)
-        on_room(SimpleNamespace(space=SimpleNamespace(guid="b", label="B")))
+        on_room(SimpleNamespace(space=SimpleNamespace(guid="b", label="B"), daylight=light))
         raise DataError("the second failed")
 
     monkeypatch.setattr("scenes.run.run.run_job", half)
-    first = SimpleNamespace(space=SimpleNamespace(guid="a", label="A"))
+    light = SimpleNamespace(grids=())
+    first = SimpleNamespace(space=SimpleNamespace(guid="a", label="A"), daylight=light)
     monkeypatch.setattr(run_command, "_light_figures", lambda room: "DGP 0.30")
     monkeypatch.setattr(run_command, "_heat_figures", lambda room: "20 C")
     assert run([*RUN[:-1], str(tmp_path / "o"), "--quick"]) == 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ OFFICE = DEMO / "office.ifc"
 WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
 SYSTEM = DEMO / "venetian_blind.xml"
 QUICK = ["--quick", "--size", "96", "--picture", "06-21 12", "--space", "A"]
+NETCDF = find_spec("xarray") is not None and find_spec("h5netcdf") is not None
 
 
 def call(out, *options, building=OFFICE, weather=WEATHER, system=SYSTEM) -> int:
@@ -36,7 +38,7 @@ def call(out, *options, building=OFFICE, weather=WEATHER, system=SYSTEM) -> int:
 def results(tmp_path_factory) -> Path:
     """The files of one quick run."""
     out = tmp_path_factory.mktemp("run") / "out"
-    assert call(out, *QUICK) == 0
+    assert call(out, *QUICK, *["--netcdf"] * NETCDF) == 0
     return out
 
 
@@ -45,7 +47,7 @@ def test_files_of_a_run(results):
         "report.html", "run.json", "cfs-results.json", "problems.csv",
         "illuminance.parquet", "daylight_metrics.csv",
         "room_metrics.csv", "dgp.csv", "temperatures.csv", "comfort.csv",
-        "view_06-21_12h.hdr", "view_06-21_12h.png",
+        "view_06-21_12h.hdr", "view_06-21_12h.png", *["results.nc"] * NETCDF,
     }  # fmt: skip
     illuminance = pd.read_parquet(results / "illuminance.parquet")
     metrics = pd.read_csv(results / "daylight_metrics.csv")
@@ -79,6 +81,54 @@ def test_numbers_hang_together(results):
     operative = ((heat["air_c"] + heat["mrt_c"]) / 2).to_numpy()
     assert heat["operative_c"].to_numpy() == pytest.approx(operative, abs=2e-4)
     assert heat["air_c"].mean() > heat["outdoor_c"].mean()  # sun and people warm the room
+
+
+def test_netcdf_holds_the_numbers_of_the_tables_with_their_units(results):
+    """Every column of every table, to the six digits that the tables have."""
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+
+    def same(name: str, values: pd.Series, **of: object) -> None:
+        found = data[name].isel(**of).to_numpy()
+        np.testing.assert_allclose(found, values, rtol=6e-6, atol=1e-30, err_msg=name)
+
+    with xarray.open_dataset(results / "results.nc") as data:
+        light = pd.read_parquet(results / "illuminance.parquet")
+        assert np.array_equal(data["time"].to_numpy(), light.index.to_numpy())
+        assert np.array_equal(data["illuminance"].to_numpy(), light.to_numpy())
+        hours = pd.read_csv(results / "temperatures.csv", index_col="time")
+        surfaces = [name for name in hours if " " in name]
+        for name in hours.columns.difference(surfaces):
+            same(name, hours[name], room=0)
+        names = [f"{name}_c" for name in data["surface_name"].to_numpy()]
+        assert names == surfaces
+        np.testing.assert_allclose(data["surface_temperature_c"], hours[surfaces], rtol=6e-6)
+        sensors = pd.read_csv(results / "daylight_metrics.csv", index_col="sensor")
+        for name in sensors:
+            same(name if name in "xyz" else f"sensor_{name}", sensors[name])
+        for file in ("room_metrics.csv", "comfort.csv"):
+            for name, value in pd.read_csv(results / file).iloc[0].items():
+                same(f"room_{name}", value, room=0)
+        pictures = pd.read_csv(results / "dgp.csv")
+        for name in pictures.columns.difference(["time"]):
+            same(f"picture_{name}", pictures[name])
+        times = pd.DatetimeIndex(data["picture_time"].to_numpy())
+        assert list(times) == list(pd.to_datetime(pictures["time"]))
+        units = {name: values.attrs.get("units") for name, values in data.variables.items()}
+        assert units["air_c"] == "degC" and units["transmitted_w"] == "W" and units["x"] == "m"
+        assert units["illuminance"] == "lx" and units["room_sda300_50"] == "percent"
+        assert units["within_80"] == "1" and units["ppd"] == units["room_within_80"] == "percent"
+        numbers = [v for v in data.data_vars.values() if v.dtype.kind in "fi"]
+        assert all(values.attrs["units"] and values.attrs["long_name"] for values in numbers)
+        assert data.attrs["Conventions"].startswith("CF-")
+        assert list(data["room_label"].to_numpy()) == ["A South office"]
+
+
+def test_netcdf_without_its_packages_is_one_line_at_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("scenes.run.netcdf.NEEDED", ("xarray", "no_such_package"))
+    assert call(tmp_path / "out", *QUICK, "--netcdf") == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--netcdf" in line and "no_such_package" in line and "mitsuba-cfs[netcdf]" in line
 
 
 def test_picture_gives_the_eye_the_light_of_the_table(results):

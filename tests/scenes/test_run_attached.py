@@ -21,8 +21,8 @@ from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.attached import g_by_patch
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import thermal_system
+from scenes.run.job import read_inputs, used_systems
 from scenes.run.options import JobOptions
-from scenes.run.run import read_inputs, used_systems
 
 pytestmark = pytest.mark.early
 

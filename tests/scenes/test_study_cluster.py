@@ -135,7 +135,7 @@ def test_a_case_that_fails_on_a_worker_leaves_the_others(cluster, tmp_path):
 
 
 def test_no_scheduler_is_one_clear_line(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenes.study.schedule.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("scenes.workers.CONNECT_SECONDS", 0.5)
     wanted, _ = cases(tmp_path, [0])
     with pytest.raises(DataError, match=r"--scheduler: no Dask scheduler answers there") as error:
         list(computed(wanted, noted, scheduler="tcp://127.0.0.1:9"))

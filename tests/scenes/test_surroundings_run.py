@@ -7,12 +7,20 @@ from dataclasses import replace
 
 import pytest
 
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import silent
 from scenes import cli
+from scenes.commands.room_options import with_flags
 from scenes.demo import WEATHER
+from scenes.heat import study_file as heat_file
+from scenes.heat.study import rooms_of as heat_rooms
 from scenes.run.files import read_files
+from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
-from scenes.run.run import _manifest, read_inputs
+from scenes.run.run import _manifest
+from scenes.study import one_case
+from scenes.study import study_file as grid_file
+from scenes.study.plan import plan_of
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.year import read_year
 from tests.conftest import REPOSITORY
@@ -71,3 +79,62 @@ def test_ratings_of_a_year_are_not_found_again_for_other_surroundings(tmp_path, 
     wall.write_text(wall.read_text().replace("6", "7"))
     digests.append(read_year(options).digest)
     assert len(set(digests)) == 3
+
+
+def study_of(folder, kind: str, more: str = ""):
+    """A study of the room of the tutorials with a wall before its window."""
+    wall = folder / "wall.obj"
+    wall.write_text("v -9 -3 0\nv 9 -3 0\nv 9 -3 6\nv -9 -3 6\nf 1 2 3 4\n")
+    building = (TUTORIALS / "two_rooms.hbjson").as_posix()
+    around = f'surroundings = ["wall.obj"]\nsurroundings_offset = [0, -1, 0]\n{more}'
+    text = {
+        "thermal": f'{around}building = "{building}"\nspaces = ["Office"]\n'
+        f'weather = "{WEATHER.as_posix()}"\n',
+        "study": f'{around}[[room]]\nbuilding = "{building}"\nspaces = ["Office"]\n'
+        f'[[climate]]\nweather = "{WEATHER.as_posix()}"\n',
+    }
+    path = folder / f"{kind}.toml"
+    path.write_text(text[kind])
+    return path
+
+
+def test_study_files_name_them(tmp_path):
+    """Of `cfs thermal` and `cfs study`; `--surroundings` adds to them; the offset moves all."""
+    heat = heat_file.read_study(study_of(tmp_path, "thermal"))
+    heat = with_flags(heat, (QUARTER,), (-456000.0, -5430000.0, -110.0))
+    building, _ = heat_rooms(heat)
+    assert {"north block", "tower"} <= {element.name for element in building.elements}
+    assert [file.name for file in heat.surroundings] == ["wall.obj", QUARTER.name]
+    grid = grid_file.read_study(study_of(tmp_path, "study"))
+    plan = plan_of(grid)
+    building, _ = one_case._room(plan.cases[0])
+    (wall,) = (element for element in building.elements if element.guid == "wall-0")
+    assert wall.triangles[..., 1] == pytest.approx(-4.0)
+    assert [file.path for file in plan.cases[0].surroundings] == list(grid.surroundings)
+    assert plan.cases[0].surroundings[0] in plan.cases[0].files
+
+
+def test_cases_are_not_found_again_for_other_surroundings(tmp_path):
+    file = study_of(tmp_path, "study")
+    grid = grid_file.read_study(file)
+    moved = with_flags(grid, (), (0.0, -2.0, 0.0))
+    keys = [plan_of(one).cases[0].key for one in (grid, moved)]
+    wall = tmp_path / "wall.obj"
+    wall.write_text(wall.read_text().replace("6", "7"))
+    keys.append(plan_of(grid).cases[0].key)
+    assert len(set(keys)) == 3
+
+
+def test_a_study_does_not_turn_them(tmp_path):
+    file = study_of(tmp_path, "study", "orientations_deg = [0, 90]\n")
+    with pytest.raises(DataError, match="orientations_deg: surroundings stand still"):
+        plan_of(grid_file.read_study(file))
+
+
+@pytest.mark.parametrize("command", ["thermal", "study"])
+def test_commands_of_study_files_read_them(command, tmp_path, capfd):
+    broken = tmp_path / "broken.city.json"
+    broken.write_text("{")
+    words = [command, study_of(tmp_path, command), "--surroundings", broken, "--out", "out"]
+    assert cli.run([str(word) for word in words]) == 1
+    assert "broken.city.json" in capfd.readouterr().err.strip().splitlines()[-1]

@@ -104,6 +104,7 @@ JOBS = {
                                "out.epJSON"),
     "ifc export --gltf": Job(lambda _, out: ["ifc", "export", OFFICE, "--gltf", out], "out.glb"),
     "ifc templates": to_folder("ifc", "templates"),
+    "ifc bonsai": Job(lambda _, out: ["ifc", "bonsai", "--out", out], "out.zip"),
     "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
     "bsdf plot": Job(
         lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out],

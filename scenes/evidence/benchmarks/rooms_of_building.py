@@ -21,8 +21,8 @@ from scenes.quick import ROOM
 from scenes.room.options import RoomOptions
 from scenes.room.room import skies_for
 from scenes.room.room_year import compute_room
+from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
-from scenes.run.run import read_inputs
 
 
 def main() -> None:

@@ -192,6 +192,12 @@ def _mitsuba_scene(opaque: Quads, panes: Quads):
 
 def by_radiance(rooms: int, folder: Path) -> NDArray[np.float64]:
     """The same [S] by `rtrace` in all rooms, panes as `trans`."""
+    write_rooms(rooms, folder)
+    return illuminance_by_rtrace(folder, sensors(rooms), UP)
+
+
+def write_rooms(rooms: int, folder: Path) -> None:
+    """All rooms and panes for Radiance: room.rad and panes.rad."""
     write_surfaces(surfaces([q for i in range(rooms) for q in room(i, rooms)]), folder / "room.rad")
     lines = []
     for number in range(rooms):
@@ -201,7 +207,6 @@ def by_radiance(rooms: int, folder: Path) -> NDArray[np.float64]:
         for i, triangle in enumerate(group(number, rooms).windows[0].triangles):
             lines.append(polygon(f"pane{number}", f"pane{number}_{i}", triangle))
     (folder / "panes.rad").write_text("\n".join(lines))
-    return illuminance_by_rtrace(folder, sensors(rooms), UP)
 
 
 def illuminance_by_rtrace(

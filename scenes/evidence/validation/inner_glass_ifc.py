@@ -73,15 +73,15 @@ def borrowing_scene(building: Building, space: Space) -> DaylightScene | None:
 def _plain(scene: DaylightScene) -> DaylightScene:
     """The scene with nothing outdoors, and the same glass everywhere."""
     beyond = []
-    for one, tau in zip(scene.beyond, _inner_taus(scene), strict=True):
+    for one, tau in zip(scene.beyond, inner_taus(scene), strict=True):
         behind = _plain(one.scene)
-        taus = [TAU] * len(behind.outdoor_groups) + _inner_taus(one.scene)
+        taus = [TAU] * len(behind.outdoor_groups) + inner_taus(one.scene)
         passed = tuple(t * EYE for t in taus)
         beyond.append(replace(one, scene=behind, transmission=passed, beam=tau * EYE.diagonal()))
     return replace(scene, exterior=Surfaces.none(), beyond=tuple(beyond))
 
 
-def _inner_taus(scene: DaylightScene) -> list[float]:
+def inner_taus(scene: DaylightScene) -> list[float]:
     """What each pane between rooms passes: a doorway all."""
     return [1.0 if np.all(one.beam == 1) else INNER_TAU for one in scene.beyond]
 
@@ -89,7 +89,7 @@ def _inner_taus(scene: DaylightScene) -> list[float]:
 def by_phases(scene: DaylightScene, seed: int) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
     traced = PhaseScene(scene, replace(SAMPLING, seed=seed), five_phase=False)
-    tau = [0.0] * len(scene.outdoor_groups) + _inner_taus(scene)
+    tau = [0.0] * len(scene.outdoor_groups) + inner_taus(scene)
     light = PhaseSystems(traced, [[GivenOptics(t * EYE)] for t in tau])
     return light.light(overcast()).illuminance()[:, 0]
 
@@ -106,7 +106,7 @@ def by_paths(scene: DaylightScene, samples: int, seed: int) -> NDArray[np.float6
     for room in rooms:
         panes += [
             (_triangles([group]), tau)
-            for group, tau in zip(_inner_groups(room), _inner_taus(room), strict=True)
+            for group, tau in zip(_inner_groups(room), inner_taus(room), strict=True)
             if tau < 1
         ]
         if room is not scene and room.outdoor_groups:
@@ -116,15 +116,20 @@ def by_paths(scene: DaylightScene, samples: int, seed: int) -> NDArray[np.float6
 
 def by_radiance(scene: DaylightScene, folder: Path) -> NDArray[np.float64]:
     """The same [S] by `rtrace` in all rooms."""
+    write_rooms(scene, folder)
+    return illuminance_by_rtrace(folder, scene.points, scene.normals)
+
+
+def write_rooms(scene: DaylightScene, folder: Path) -> None:
+    """All rooms and panes for Radiance: room0.rad, room1.rad ... and panes.rad."""
     lines = [*_glass("black", 0.0, scene.outdoor_groups)]
     for number, room in enumerate(_all_behind([scene])):
         write_surfaces(_without_panes(room, scene), folder / f"room{number}.rad")
-        for i, (group, tau) in enumerate(zip(_inner_groups(room), _inner_taus(room), strict=True)):
+        for i, (group, tau) in enumerate(zip(_inner_groups(room), inner_taus(room), strict=True)):
             lines += _glass(f"inner{number}_{i}", tau, [group]) if tau < 1 else []
         if number:
             lines += _glass(f"window{number}", TAU, room.outdoor_groups)
     (folder / "panes.rad").write_text("\n".join(lines))
-    return illuminance_by_rtrace(folder, scene.points, scene.normals)
 
 
 def _all_behind(rooms) -> Iterator[DaylightScene]:

@@ -6,6 +6,10 @@ r"""A room of an IFC file by its exported folder's own run.sh, and by our matric
 V T D of each sensor under four skies that weigh directions differently; with a weather file also
 the hours of three days by five phases, of the suns of MF 2.  The root mean square of the sensors'
 relative differences, and the standard error of either side's mean over the runs.
+
+Both sides have the surfaces as grey as they are light; a last run of Radiance has their colours.
+What a blind passes straight on is even in a Klems patch, as Radiance reads the file; `cfs run`
+takes it to be linear between the patches' middles, which the last line shows.
 """
 
 from __future__ import annotations
@@ -16,6 +20,8 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +33,7 @@ from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
+from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
 from mitsuba_cfs.trace.systems import sun_scattering
 from mitsuba_cfs.trace.view_matrix import view_matrix
 from scenes.demo import VENETIAN_BLIND
@@ -37,6 +43,20 @@ DAYS = ("3 21", "6 21", "12 21")
 SUNS = 2  # MF of the sun's places: 577
 LUX = "-c 47.435 119.93 11.635"  # lm/W of Radiance's three channels
 LEAST = 50.0  # [lx] of a sensor's hour that is compared
+
+
+class EvenBeams(KlemsScattering):
+    """A Klems block whose through beam is even in a patch."""
+
+    def __init__(self, block: KlemsScattering) -> None:
+        """From the same with beams that are linear between the patches."""
+        self.__dict__.update(block.__dict__)
+        self.key = ("even", *block.key)
+        self._beams = mi.Float(block.beams.astype(np.float32))
+
+    def through(self, sun: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return dr.gather(mi.Float, self._beams, self._bins.index(sun))
 
 
 @dataclass(frozen=True)
@@ -70,10 +90,12 @@ def three_days(weather: Path, folder: Path) -> Path:
     return days
 
 
-def theirs(room: Room, indoors: int, outdoors: int) -> tuple[NDArray, NDArray | None]:
+def theirs(
+    room: Room, indoors: int, outdoors: int, *, materials: str = "grey.rad"
+) -> tuple[NDArray, NDArray | None]:
     """Coefficients [S, P] by Radiance alone, its seed the clock's, and lux [S, H] of the hours."""
     folder, call = room.files.script.parent, [str(room.files.script.resolve())]
-    rays = {"INDOORS": str(indoors), "OUTDOORS": str(outdoors)}
+    rays = {"INDOORS": str(indoors), "OUTDOORS": str(outdoors), "MATERIALS": materials}
     if room.weather is not None:
         call.append(str(room.weather))
         rays |= {"PHASES": "5", "SUNS": str(SUNS), "STRAIGHT": str(4 * indoors)}
@@ -83,8 +105,11 @@ def theirs(room: Room, indoors: int, outdoors: int) -> tuple[NDArray, NDArray | 
     return np.loadtxt(text.split("\n\n", 1)[1].splitlines()), hours
 
 
-def ours(room: Room, seed: int) -> tuple[NDArray, NDArray | None]:
-    """The same by our matrices; the skies are Radiance's."""
+def ours(room: Room, seed: int, *, even: bool = True) -> tuple[NDArray, NDArray | None]:
+    """The same by our matrices; the skies are Radiance's.
+
+    Args: even: whether a blind's through beams are even in a patch; else linear between them.
+    """
     inside, outside = interior_surfaces(room.space), exterior_surfaces(room.building, room.space)
     groups, rows = window_groups(room.space), np.loadtxt(room.files.sensors)
     visible, sensors = room.blind.bands["Visible"], (rows[:, :3], rows[:, 3:])
@@ -99,8 +124,11 @@ def ours(room: Room, seed: int) -> tuple[NDArray, NDArray | None]:
     whole = product()
     if room.weather is None:
         return whole, None
+    block = sun_scattering(visible)
+    assert isinstance(block, KlemsScattering)
+    block = EvenBeams(block) if even else block
     suns = direct_sun_matrix(
-        inside, outside, groups, [sun_scattering(visible)] * len(groups), *sensors,
+        inside, outside, groups, [block] * len(groups), *sensors,
         suns=ReinhartSky(SUNS).directions[1:], seed=seed,
     ).values  # fmt: skip
     sky, direct, places = (
@@ -143,6 +171,12 @@ def main() -> None:
         a, b = (np.array([hours for _, hours in runs]) for runs in (found, radiance))
         bright = b.mean(axis=0) > LEAST
         _print(f"{bright.sum()} sensor-hours by five phases", a[:, bright], b[:, bright])
+        linear = np.array([ours(room, seed, even=False)[1] for seed in range(given.runs)])
+        _print("the same, beams between patches", linear[:, bright], b[:, bright])
+    rays = given.indoors, given.outdoors
+    coloured = [theirs(room, *rays, materials="materials.rad") for _ in range(given.runs)]
+    b = np.array([whole.sum(axis=1) for whole, _ in coloured])
+    _print("uniform, in colours", np.array([whole.sum(axis=1) for whole, _ in found]), b)
 
 
 def _print(name: str, a: NDArray[np.float64], b: NDArray[np.float64]) -> None:

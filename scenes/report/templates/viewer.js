@@ -60,7 +60,8 @@
 
   // ---- camera
   function fit() {
-    const low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
+    const [low, high] = see.room < 0 && see.storey < 0 && byId("outdoors").checked
+      ? data.whole.map((corner) => [...corner]) : [[1e9, 1e9, 1e9], [-1e9, -1e9, -1e9]];
     for (const b of batches) {
       if (b.room < 0 || (see.room >= 0 && b.room !== see.room) || (rise(b) && !lifted())) continue;
       const up = [0, 0, rise(b)];

@@ -1,0 +1,107 @@
+"""Glass and open doorways between two rooms: the faces that are the same opening in both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.defaults import ROOM_REFLECTANCE, default_construction
+from bim.model import Building, Face, Space, centroid
+
+SAME_SIZE = 0.05  # share by which the pane may differ as the two rooms have it
+THINNEST = 1e-3  # walls up to this have no reveal [m]
+Key = tuple[str, str]  # GUID of a room, name of its face
+
+
+def panes_between(building: Building, space: Space) -> dict[str, list[tuple[Face, Face]]]:
+    """Panes of a room and the same as the room beyond has them, by the GUID of that room."""
+    rooms = {other.guid: other for other in building.spaces}
+    found: dict[str, list[tuple[Face, Face]]] = {}
+    for face in space.faces:
+        other = rooms.get(face.neighbour or "")
+        if face.pane is None or other is None or other.guid == space.guid:
+            continue
+        for back in other.faces:
+            if back.pane is None or back.neighbour != space.guid:
+                continue
+            away = wall_depth(face, back)
+            if (
+                back.pane.guid == face.pane.guid
+                and back.normal @ face.normal < -0.999
+                and abs(back.area - face.area) < SAME_SIZE * face.area
+                and away > -THINNEST
+                and _beside(face, back) < 0.5 * np.sqrt(face.area)
+            ):
+                found.setdefault(other.guid, []).append((face, back))
+    return found
+
+
+def wall_depth(face: Face, back: Face) -> float:
+    """How far the pane of the room beyond lies behind that of the room [m]."""
+    return float((centroid(back.triangles) - centroid(face.triangles)) @ face.normal)
+
+
+def _beside(face: Face, back: Face) -> float:
+    """How far the panes' middles lie apart along the wall [m]."""
+    step = centroid(back.triangles) - centroid(face.triangles)
+    return float(np.linalg.norm(step - (step @ face.normal) * face.normal))
+
+
+def reveals_between(face: Face, depth: float) -> NDArray[np.float64]:
+    """The reveals [E, 2, 3, 3], two triangles an edge of a pane, through the wall behind it."""
+    corners, number = np.unique(
+        np.round(face.triangles.reshape(-1, 3), 6), axis=0, return_inverse=True
+    )
+    triangles = number.reshape(-1, 3)
+    edges = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    _, first, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    a, b = corners[edges[first[count == 1]]].transpose(1, 0, 2)
+    step = depth * face.normal
+    return np.stack(
+        [np.stack([a, b, b + step], axis=1), np.stack([a, b + step, a + step], axis=1)], axis=1
+    )
+
+
+def touching(building: Building) -> tuple[Building, dict[Key, Key]]:
+    """The building with open doorways as one face of both rooms, and each such face's other side.
+
+    The way through the wall belongs to the first of the two rooms, its reveals with it; programs
+    that draw walls without thickness have the air of two rooms meet in one polygon.
+    """
+    sides: dict[Key, Key] = {}
+    spaces = []
+    for space in building.spaces:
+        pairs = [pair for own in panes_between(building, space).values() for pair in own]
+        open_ = [(face, back) for face, back in pairs if face.pane.is_open]
+        moved: dict[str, list[Face]] = {}
+        for face, back in open_:
+            key, other = (space.guid, face.name), (face.neighbour, back.name)
+            if key not in sides and other not in sides:
+                sides |= {key: other, other: key}
+                moved[face.name] = _through(face, back)
+        faces = [new for face in space.faces for new in moved.get(face.name, [face])]
+        spaces.append(replace(space, faces=tuple(faces)))
+    return replace(building, spaces=tuple(spaces)), sides
+
+
+def _through(face: Face, back: Face) -> Sequence[Face]:
+    """The face moved to where the room beyond has it, and the reveals up to there."""
+    depth = wall_depth(face, back)
+    if depth <= THINNEST:
+        return [face]
+    rho = ROOM_REFLECTANCE["reveal"]
+    return [
+        replace(face, triangles=back.triangles[:, ::-1]),
+        *(
+            Face(
+                f"{face.name} reveal {number}", "reveal", strip, "adiabatic",
+                default_construction("reveal", "adiabatic"), rho, rho,
+            )
+            for number, strip in enumerate(reveals_between(face, depth), start=1)
+        ),
+    ]  # fmt: skip

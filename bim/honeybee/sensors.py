@@ -1,0 +1,106 @@
+"""Sensor grids and views of a honeybee model, and what of its shades holds no result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bim.held_sensors import HeldGrid, HeldView
+from bim.honeybee.library import listed
+from bim.honeybee.schema import HoneybeeModel, Shade, ShadeMesh
+from bim.model import NOT_USED, Problem
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.images.view import KINDS, View
+
+
+class SensorReader:
+    """The grids and views of a model; what cannot be one is in the problems."""
+
+    def __init__(self, model: HoneybeeModel, file: Path) -> None:
+        self.radiance, self.scale, self.file = model.properties.radiance, model.scale, file
+        self.problems: list[Problem] = []
+
+    def grids(self) -> tuple[HeldGrid, ...]:
+        """The sensor grids [m].
+
+        Raises: `DataError` that names the grid.
+        """
+        found = []
+        for grid in _objects(self.radiance, "sensor_grids"):
+            name = str(grid.get("display_name") or grid["identifier"])
+            try:
+                rows = [(one["pos"], one["dir"]) for one in grid["sensors"]]
+                points, towards = np.array(rows, dtype=float).reshape(-1, 2, 3).transpose(1, 0, 2)
+                lengths = np.linalg.norm(towards, axis=1, keepdims=True)
+                if not (np.isfinite(points).all() and (lengths > 0).all() and len(points)):
+                    raise ValueError(name)
+            except (KeyError, TypeError, ValueError, OverflowError):
+                message = "expected sensors, each with pos and dir of three numbers"
+                raise DataError(message, file=self.file, element=name, field="sensors") from None
+            found.append(HeldGrid(name, self.scale * points, towards / lengths))
+        return tuple(found)
+
+    def views(self) -> tuple[HeldView, ...]:
+        """The views [m] that can be made; the others are named in the problems."""
+        found = []
+        for view in _objects(self.radiance, "views"):
+            name = str(view.get("display_name") or view["identifier"])
+            made = view_of(view, self.scale)
+            if made is None:
+                what = f"view {name}: its fields give no view"
+                self.problems.append(Problem(self.file.name, what, "left out", kind=NOT_USED))
+            else:
+                found.append(HeldView(name, made))
+        return tuple(found)
+
+
+def shade_problems(model: HoneybeeModel, file: Path) -> Iterator[Problem]:
+    """Problems that name shades with states, and shades that let light through by a schedule."""
+    shades = [s for s in _shades(model) if s.properties.radiance.get("states")]
+    if shades:
+        what = f"{len(shades)} shade(s) with states: {listed([s.label for s in shades])}"
+        yield Problem(file.name, what, "their own modifier holds all year", kind=NOT_USED)
+    seasonal = [s for s in _shades(model) if s.properties.energy.get("transmittance_schedule")]
+    if seasonal:
+        what = f"{len(seasonal)} shade(s) let light through by a schedule"
+        what = f"{what}: {listed([s.label for s in seasonal])}"
+        yield Problem(file.name, what, "opaque", kind=NOT_USED)
+
+
+def view_of(view: Mapping[str, Any], scale: float) -> View | None:
+    """A honeybee view [m]; None where one of its fields cannot be one.
+
+    Args: scale: metres in the model's unit of length.
+    """
+    sizes = [60.0 if view.get(field) is None else view[field] for field in ("h_size", "v_size")]
+    try:
+        position, direction = (
+            np.array(view[field], dtype=float) for field in ("position", "direction")
+        )
+        return View(
+            KINDS[view.get("view_type") or "v"], tuple(scale * position), tuple(direction),
+            view.get("up_vector") or (0.0, 0.0, 1.0), *map(float, sizes),
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _objects(properties: Mapping[str, Any], field: str) -> list[Mapping[str, Any]]:
+    """The objects with an identifier that an extension lists."""
+    listed = properties.get(field)
+    listed = listed if isinstance(listed, list) else []
+    return [one for one in listed if isinstance(one, dict) and one.get("identifier")]
+
+
+def _shades(model: HoneybeeModel) -> Iterator[Shade | ShadeMesh]:
+    yield from model.orphaned_shades or ()
+    yield from model.shade_meshes or ()
+    for room in model.rooms or ():
+        yield from room.outdoor_shades or ()
+        for face in room.faces:
+            yield from face.outdoor_shades or ()
+            for opening in (*(face.apertures or ()), *(face.doors or ())):
+                yield from opening.outdoor_shades or ()

@@ -1,0 +1,250 @@
+"""How a honeybee model says that its rooms are used: programs, loads, schedules, set points.
+
+A room's own load goes before its program's, as honeybee-energy has it.
+
+Source: honeybee-schema, "ProgramType", "ScheduleRuleset", "IdealAirSystem"; EnergyPlus Engineering
+Reference, "People": the dry share of a person's heat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bim.honeybee.library import NamedObjects, listed
+from bim.honeybee.schedules import ScheduleLibrary
+from bim.honeybee.schema import HoneybeeRoom
+from bim.model import NOT_USED, Problem, Space
+from bim.use import ALWAYS, ScheduledValue, StatedUse, YearSchedule
+
+LOADS = ("people", "lighting", "electric_equipment", "gas_equipment", "infiltration",
+         "ventilation", "setpoint")  # fmt: skip
+PASSED_OVER = {  # of a room's extension of energy, in words
+    "service_hot_water": "service hot water",
+    "process_loads": "process loads",
+    "internal_masses": "internal masses",
+    "window_vent_control": "opening of windows",
+    "fans": "fans",
+}
+INDOORS = 24.0  # at which a person's heat is split [degC]
+SEATED = 120.0  # heat of a person at light office work, which honeybee-energy takes [W]
+VAPORISING = 2.43e6  # heat of vaporisation at skin temperature [J/kg]
+IDEAL = "IdealAirSystem"
+
+
+class UseLibrary:
+    """Programs and loads of a model by room."""
+
+    def __init__(self, energy: Mapping[str, Any], file: Path) -> None:
+        self.objects = NamedObjects(energy, ("program_types", "hvacs"), "construction", file)
+        self.schedules = ScheduleLibrary(energy, file)
+        self._said: dict[tuple[str, str], list[str]] = {}  # what and what was done: its rooms
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """What of the uses is not used, each once with its rooms."""
+        name = self.objects.file.name
+        return tuple(
+            Problem(name, f"{what} ({listed(rooms)})", done, kind=NOT_USED)
+            for (what, done), rooms in self._said.items()
+        )
+
+    def use(self, room: HoneybeeRoom, space: Space) -> StatedUse | None:
+        """The use of a room that became a space; None where the file says nothing of it."""
+        own = room.properties.energy
+        program = self._program(room)
+        loads = {kind: own.get(kind) or program.get(kind) for kind in LOADS}
+        loads = {kind: one for kind, one in loads.items() if isinstance(one, dict)}
+        for field, words in PASSED_OVER.items():
+            if own.get(field) or program.get(field):
+                self._say(room, words, "not used")
+        if not loads and not program:
+            return None
+        parts = _Parts(self, room, space, loads)
+        return parts.use()
+
+    def _program(self, room: HoneybeeRoom) -> Mapping[str, Any]:
+        name = room.properties.energy.get("program_type")
+        if isinstance(name, dict):
+            return name
+        found = self.objects.find("program_types", str(name)) if name else None
+        if name and found is None:
+            self._say(room, f"program {name} is not in the file", "its loads are not known")
+        return found or {}
+
+    def hvac(self, room: HoneybeeRoom) -> Mapping[str, Any] | None:
+        """The system of a room; None where it has none."""
+        name = room.properties.energy.get("hvac")
+        if isinstance(name, dict):
+            return name
+        return (self.objects.find("hvacs", str(name)) or {"type": str(name)}) if name else None
+
+    def _say(self, room: HoneybeeRoom, what: str, done: str) -> None:
+        rooms = self._said.setdefault((what, done), [])
+        if room.label not in rooms:
+            rooms.append(room.label)
+
+
+class _Parts:
+    """The loads of one room."""
+
+    def __init__(
+        self, library: UseLibrary, room: HoneybeeRoom, space: Space, loads: Mapping[str, dict]
+    ) -> None:
+        self.library, self.room, self.space, self.loads = library, room, space, loads
+        self.number = library.objects.number
+        self.say: Callable[[str, str], None] = lambda what, done: library._say(room, what, done)
+
+    def use(self) -> StatedUse:
+        """All of them as a use; a load that neither room nor program has is none."""
+        found: dict[str, Any] = {}
+        for part in (self._people, self._lamps, self._equipment, self._air, self._loads):
+            found |= dict(part())
+        return StatedUse(**found, radiant_share=self._radiant())
+
+    def _of(self, kind: str) -> Mapping[str, Any]:
+        return self.loads.get(kind, {})
+
+    def _held(self, kind: str, field: str) -> YearSchedule | None:
+        """A schedule that a load names; None where it names none."""
+        named = self._of(kind).get(field)
+        return None if named is None else self.library.schedules.schedule(named)
+
+    def _share(self, kind: str, field: str = "schedule") -> YearSchedule:
+        """The schedule of a load, which is there always without one."""
+        return self._held(kind, field) or ALWAYS
+
+    def _people(self) -> Iterator[tuple[str, Any]]:
+        people = self._of("people")
+        count = self.number(people, "people_per_area", 0.0) * self.space.floor_area
+        share = self._share("people", "occupancy_schedule")
+        yield "persons", ScheduledValue(count, share)
+        if not count:
+            return
+        heat = _mean_activity(self._held("people", "activity_schedule"), share)
+        latent = people.get("latent_fraction")
+        dry = sensible_heat(heat) if isinstance(latent, dict | None) else None
+        if dry is None:
+            dry = heat * (1.0 - self.number(people, "latent_fraction", 0.0, most=1.0))
+        yield "person_w", dry
+        yield "person_vapour_g_h", max(heat - dry, 0.0) / VAPORISING * 3.6e6
+
+    def _lamps(self) -> Iterator[tuple[str, Any]]:
+        lamps = self._of("lighting")
+        power = self.number(lamps, "watts_per_area", 0.0) * self.space.floor_area
+        yield "lighting_w", ScheduledValue(power, self._share("lighting"))
+        if self.number(lamps, "return_air_fraction", 0.0, most=1.0):
+            self.say("heat of lamps that goes with the return air", "stays in the room")
+        control = self.room.properties.energy.get("daylighting_control")
+        if isinstance(control, dict):
+            yield "lighting_target_lx", self.number(control, "illuminance_setpoint", 300.0, least=1)
+            self.say("daylighting control", "dims by the mean of the work plane down to nothing")
+
+    def _equipment(self) -> Iterator[tuple[str, Any]]:
+        kinds = [k for k in ("electric_equipment", "gas_equipment") if self._of(k)]
+        found: YearSchedule | None = None
+        for kind in kinds:
+            one = self._of(kind)
+            away = sum(
+                self.number(one, f, 0.0, most=1.0) for f in ("latent_fraction", "lost_fraction")
+            )
+            if away:
+                self.say(f"{kind}: {100 * away:g} % is vapour or lost", "left out with its power")
+            power = self.number(one, "watts_per_area", 0.0) * self.space.floor_area
+            part = self._share(kind).times(power * max(1.0 - away, 0.0))
+            found = part if found is None else found.plus(part)
+        yield "equipment_w", ScheduledValue(0.0) if found is None else ScheduledValue(1.0, found)
+
+    def _air(self) -> Iterator[tuple[str, Any]]:
+        leaks, fan, space = self._of("infiltration"), self._of("ventilation"), self.space
+        flow = self.number(leaks, "flow_per_exterior_area", 0.0) * _exterior_area(space)
+        yield "infiltration_m3_s", ScheduledValue(flow, self._share("infiltration"))
+        if leaks:
+            names = ("constant_coefficient", "temperature_coefficient", "velocity_coefficient")
+            a, b, c = (
+                self.number(leaks, name, default)
+                for name, default in zip(names, (1.0, 0.0, 0.0), strict=True)
+            )
+            yield "infiltration_factors", (a, b, c, 0.0)
+        system = self.library.hvac(self.room)
+        if system is None:
+            yield "ventilation_m3_s", ScheduledValue(0.0)
+            if fan:
+                self.say("outdoor air of a fan", "not used: the room has no system")
+            return
+        people = self.number(self._of("people"), "people_per_area", 0.0) * space.floor_area
+        flow = (
+            self.number(fan, "flow_per_person", 0.0) * people
+            + self.number(fan, "flow_per_area", 0.0) * space.floor_area
+            + self.number(fan, "flow_per_zone", 0.0)
+            + self.number(fan, "air_changes_per_hour", 0.0) * space.volume / 3600.0
+        )
+        yield "ventilation_m3_s", ScheduledValue(flow, self._share("ventilation"))
+        recovered = system.get("sensible_heat_recovery")
+        if str(system.get("type", "")).startswith(IDEAL) and recovered:
+            yield "heat_recovery", self.number(system, "sensible_heat_recovery", 0.0, most=1.0)
+
+    def _loads(self) -> Iterator[tuple[str, Any]]:
+        points, system = self._of("setpoint"), self.library.hvac(self.room)
+        if system is None:
+            if points:
+                self.say("set points", "not used: the room has no system")
+            return
+        kind = str(system.get("type", ""))
+        if not kind.startswith(IDEAL):
+            self.say(f"system {kind}", "an ideal one holds the set points")
+        elif system.get("economizer_type", "DifferentialDryBulb") != "NoEconomizer":
+            self.say("economizer of the system", "not used: outdoor air is the least that is asked")
+        for limit in ("heating", "cooling"):
+            if isinstance(system.get(f"{limit}_limit"), int | float):
+                yield f"{limit}_limit_w", self.number(system, f"{limit}_limit", least=1e-3)
+            schedule = self._held("setpoint", f"{limit}_schedule")
+            if schedule is not None:
+                yield f"{limit}_c", schedule
+        for field, target in (("humidifying", "humidify_to"), ("dehumidifying", "dehumidify_to")):
+            schedule = self._held("setpoint", f"{field}_schedule")
+            if schedule is None:
+                continue
+            if np.ptp(schedule.values) > 0:
+                self.say(f"{field} set point that changes", "its mean holds")
+            yield target, float(schedule.values.mean())
+
+    def _radiant(self) -> float | None:
+        """The radiant share of people, lamps and equipment, by their power."""
+        people, area = self._of("people"), self.space.floor_area
+        weights = [(self.number(people, "people_per_area", 0.0) * area * 100.0,
+                    self.number(people, "radiant_fraction", 0.3, most=1.0))]  # fmt: skip
+        for kind in ("lighting", "electric_equipment", "gas_equipment"):
+            one = self._of(kind)
+            radiant = self.number(one, "radiant_fraction", 0.0, most=1.0)
+            radiant += self.number(one, "visible_fraction", 0.0, most=1.0)
+            weights.append((self.number(one, "watts_per_area", 0.0) * area, min(radiant, 1.0)))
+        power = sum(watts for watts, _ in weights)
+        return sum(watts * share for watts, share in weights) / power if power else None
+
+
+def sensible_heat(activity: float, air_c: float = INDOORS) -> float:
+    """Dry heat of a person of an activity [W], EnergyPlus Engineering Reference, "People"."""
+    m, t = activity, air_c
+    dry = (
+        6.461927 + 0.946892 * m + 2.55737e-5 * m**2 + 7.139322 * t - 0.0627909 * t * m
+        + 5.89172e-5 * t * m**2 - 0.198550 * t**2 + 9.40018e-4 * t**2 * m - 1.49532e-6 * t**2 * m**2
+    )  # fmt: skip
+    return float(np.clip(dry, 0.0, activity))
+
+
+def _mean_activity(activity: YearSchedule | None, share: YearSchedule) -> float:
+    """The heat of a person while there are some [W], of a seated one where no schedule says it."""
+    total = float(share.values.sum())
+    if activity is None or not total:
+        return SEATED
+    return float((activity.values * share.values).sum() / total)
+
+
+def _exterior_area(space: Space) -> float:
+    """What of a room's boundary is exposed to the air outdoors [m2]."""
+    faces = sum(face.area for face in space.faces if face.adjacency == "outside")
+    return faces + sum(window.area for window in space.windows)

@@ -1,0 +1,37 @@
+"""What a run says at its head of the building's file and of its place."""
+
+from __future__ import annotations
+
+from bim.account import NOT_USABLE
+from bim.model import JOINED, NOT_USED, Building
+from mitsuba_cfs.sky.weather import Weather
+
+AT_THE_HEAD = (JOINED, NOT_USED)  # kinds of the model's problems that are notes of a run
+FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+
+
+def model_notes(building: Building) -> tuple[str, ...]:
+    """Whether the model will do, what of it was joined, and what of it no result depends on."""
+    told = (p for p in building.problems if p.kind in AT_THE_HEAD)
+    return (*_account_notes(building), *(f"{p.what}: {p.consequence}." for p in told))
+
+
+def _account_notes(building: Building) -> tuple[str, ...]:
+    """Why the model will not do, where that is so."""
+    account = building.account
+    return account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
+
+
+def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
+    """A sentence where building and weather lie far apart."""
+    if building.latitude_deg is None or building.longitude_deg is None:
+        return ()
+    north = building.latitude_deg - weather.latitude_deg
+    east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
+    if max(abs(north), abs(east)) <= FAR_SITE_DEG:
+        return ()
+    return (
+        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
+        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
+        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
+    )

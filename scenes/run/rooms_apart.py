@@ -1,0 +1,113 @@
+"""What computes a room of a run: here, in processes beside each other, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from bim.model import Space
+from mitsuba_cfs import variants
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.source_code import code_version
+from scenes.room.room import skies_for
+from scenes.run.inputs import sha256
+from scenes.run.job import JobInputs, read_inputs, run_spaces
+from scenes.run.options import JobOptions
+from scenes.workers import Tasks
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Who computes the rooms of a run beside each other."""
+
+    processes: int = 1  # rooms at a time on this machine
+    scheduler: str | None = None  # address of a Dask scheduler, whose workers then do
+
+
+@dataclass(frozen=True, slots=True)
+class RoomWork(Generic[R]):
+    """What is done with each room of a run."""
+
+    function: Callable[..., R]  # `compute_room` or `lit_room`
+    inputs: JobInputs
+    skies: AnnualSky
+    options: JobOptions
+
+    def __call__(self, space: Space, progress: Progress = silent) -> R:
+        """What comes of a room."""
+        inputs, options = self.inputs, self.options
+        cache = MatrixCache.of_user() if options.cache else None
+        return self.function(
+            inputs.building, space, inputs.systems, inputs.weather, options.room,
+            operation=inputs.operation, skies=self.skies, cache=cache, explore=options.explore,
+            inner=options.inner_glass, progress=progress,
+        )  # fmt: skip
+
+    def beside(
+        self, spaces: Sequence[Space], *, workers: Workers
+    ) -> Iterator[tuple[Space, R | BaseException]]:
+        """Each room, in any order, with its result or with why it has none."""
+        rooms = {space.guid: space for space in spaces}
+        here = workers.scheduler is None
+        compute = _Here(self) if here else _FromFiles(self.function, self.options)
+        run = "" if here else _identity(self.options)
+        tasks = Tasks(
+            list(rooms), compute, _failed, key=lambda guid: f"{run}{guid}", scene=lambda guid: guid
+        )
+        for guid, result in tasks.results(**asdict(workers)):
+            yield rooms[guid], result
+
+    def of(self, guid: str) -> R:
+        """What comes of the room with a GUID."""
+        spaces = run_spaces(self.inputs, self.options)
+        return self(next(space for space in spaces if space.guid == guid))
+
+
+@dataclass(frozen=True, slots=True)
+class _Here(Generic[R]):
+    """A room by its GUID, with inputs that were read before."""
+
+    work: RoomWork[R]
+
+    def __call__(self, guid: str) -> tuple[str, R]:
+        variants.activate()
+        return guid, self.work.of(guid)
+
+
+@dataclass(frozen=True, slots=True)
+class _FromFiles(Generic[R]):
+    """A room by its GUID, with inputs read where it is computed, once in each process."""
+
+    function: Callable[..., R]
+    options: JobOptions
+
+    def __call__(self, guid: str) -> tuple[str, R]:
+        variants.activate()
+        return guid, RoomWork(self.function, *_read(self.options), self.options).of(guid)
+
+
+@lru_cache(maxsize=1)
+def _read(options: JobOptions) -> tuple[JobInputs, AnnualSky]:
+    inputs, room = read_inputs(options, silent), options.room
+    return inputs, skies_for(inputs.weather, room.method, room.sampling, **room.sky)
+
+
+def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:
+    return guid, error
+
+
+def _identity(options: JobOptions) -> str:
+    """What tells the rooms of this run from those of others on the same cluster."""
+    said = [repr(options), code_version(__name__)]
+    for path in options.named().values():
+        if isinstance(path, Path) and path.is_file():
+            said.append(sha256(path))
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:16] + "-"

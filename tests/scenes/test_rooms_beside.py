@@ -1,0 +1,134 @@
+"""Rooms of one run computed beside each other: the same results, in the rooms' order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bim.model import Building, Space
+from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.errors import DataError, RoomError
+from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.room.options import RoomOptions
+from scenes.run import rooms as series
+from scenes.run.job import JobInputs
+from scenes.run.options import JobOptions
+from scenes.run.rooms import RoomSeries
+from scenes.run.rooms_apart import Workers
+from scenes.run.run import run_inputs, run_job
+from tests.conftest import REPOSITORY
+from tests.scenes.small_box import BOX, ROOM, SMALL
+from tests.scenes.test_equal_rooms import moved
+
+
+def box(name: str, depth: float) -> Space:
+    window = WindowRectangle(0.5, 0.9, 1.5, 1.5)
+    return shoebox(2.5, depth, 2.8, windows=(window,), name=name).spaces[0]
+
+
+def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[RoomSeries, list]:
+    """Rooms whose result is their name, computed last room first, and which were asked for."""
+    asked: list[list[str]] = []
+
+    def beside(rooms):
+        asked.append([room.name for room in rooms])
+        for room in reversed(rooms):
+            yield room, RoomError("no floor") if room.name == fails else room.name
+
+    def here(space, steps):
+        asked.append([space.name])
+        return f"here {space.name}"
+
+    return RoomSeries(
+        replace(BOX, spaces=tuple(spaces)), spaces, {}, SMALL.sampling, None, here,
+        lambda result, space: f"{space.name} like {result}",
+        alike=lambda one, other: alike, beside=beside,
+    ), asked  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def seen_alike(monkeypatch):
+    """Equal rooms see the same; nothing is traced."""
+    monkeypatch.setattr(series, "same_systems", lambda *rooms: True)
+    monkeypatch.setattr(series.OutdoorLight, "same", lambda one, other: True)
+
+
+def test_results_come_in_the_rooms_order_and_equal_rooms_are_computed_once():
+    twin, heard = moved(BOX, (10.0, 0.0, 3.0), "twin"), []
+    rooms, asked = named([ROOM, box("deep", 6.0), twin])
+    found, problems, notes = replace(rooms, on_room=heard.append).results()
+    assert found == heard == ["room", "deep", "twin like room"]
+    assert asked == [["room", "deep"]] and not problems and len(notes) == 1
+    rooms, asked = named([ROOM, twin], alike=False)
+    assert rooms.results()[0] == ["room", "twin"] and asked == [["room", "twin"]]
+
+
+def test_a_room_that_fails_leaves_the_others_and_is_no_template():
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    rooms, asked = named([ROOM, box("deep", 6.0), twin], fails="room")
+    found, problems, _ = rooms.results()
+    assert found == ["deep", "here twin"] and asked == [["room", "deep"], ["twin"]]
+    assert [problem.what for problem in problems] == ["no floor"]
+
+
+def test_what_is_no_fault_of_a_room_ends_the_run():
+    rooms, _ = named([ROOM, box("deep", 6.0)])
+    broken = replace(rooms, beside=lambda some: iter([(some[0], DataError("file is gone"))]))
+    with pytest.raises(DataError, match="file is gone"):
+        broken.results()
+
+
+@pytest.mark.slow
+def test_two_processes_give_what_one_gives(variant, weather, glass):
+    """Bit by bit: the same random numbers, one after the other or beside each other."""
+    spaces = [ROOM, box("deep", 6.0), box("shallow", 3.0)]
+    building: Building = replace(BOX, spaces=tuple(spaces))
+    systems = {w.guid: (glass,) for s in spaces for w in s.windows}
+    room = RoomOptions.of(
+        sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256,
+        picture_size=64, picture_count=1, picture_samples=1,
+    )  # fmt: skip
+    inputs = JobInputs(building, spaces, weather, systems, None)
+    options = JobOptions(Path(__file__), Path(__file__), cache=False, room=room)
+    told: list[SimpleNamespace] = []
+    one = run_inputs(inputs, options)
+    two = run_inputs(inputs, options, workers=Workers(2), on_light=told.append)
+    assert [r.space.name for r in two.spaces] == [r.space.name for r in told] == [
+        "room", "deep", "shallow",
+    ]  # fmt: skip
+    for mine, theirs in zip(one.spaces, two.spaces, strict=True):
+        np.testing.assert_array_equal(mine.daylight.illuminance, theirs.daylight.illuminance)
+        np.testing.assert_array_equal(mine.heat.air_c, theirs.heat.air_c)
+        (picture,), (same,) = mine.glare.pictures, theirs.glare.pictures
+        np.testing.assert_array_equal(picture.luminance, same.luminance)
+
+
+@pytest.mark.slow
+def test_workers_of_a_cluster_give_what_one_process_gives(variant, tmp_path_factory):
+    """They read the files for themselves; a scheduler that is asked twice gives the same."""
+    pytest.importorskip("distributed")
+    from tests.scenes.test_study_cluster import Cluster
+
+    room = RoomOptions.of(
+        sky_subdivision=1, sensor_spacing=1.0, sensor_samples=512, patch_samples=256,
+        picture_size=64, picture_count=1, picture_samples=1,
+    )  # fmt: skip
+    building = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
+    options = JobOptions(building, WEATHER, VENETIAN_BLIND, cache=False, room=room)
+    cluster = Cluster(tmp_path_factory.mktemp("dask"), 2)
+    try:
+        runs = [run_job(options), run_job(options, workers=Workers(1, cluster.address))]
+        reseeded = replace(options, room=room.changed(seed=1))
+        other = run_job(reseeded, workers=Workers(1, cluster.address))
+    finally:
+        cluster.stop()
+    one, two = runs
+    assert len(one.spaces) == len(two.spaces) == 2
+    for mine, theirs, seeded in zip(one.spaces, two.spaces, other.spaces, strict=True):
+        np.testing.assert_array_equal(mine.daylight.illuminance, theirs.daylight.illuminance)
+        np.testing.assert_array_equal(mine.heat.air_c, theirs.heat.air_c)
+        assert not np.array_equal(seeded.daylight.illuminance, mine.daylight.illuminance)
