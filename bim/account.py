@@ -141,6 +141,8 @@ class Account:
         return found
 
     def _rooms_line(self) -> str:
+        if not self.rooms and not self.spaces:
+            return "none: the file has no spaces, and no room was found between its walls"
         if self.found:
             by_storey = (f"{s.name or 'no storey'} {s.rooms}" for s in self.storeys)
             return f"{self.rooms} found from geometry ({', '.join(by_storey)})"
@@ -151,6 +153,8 @@ class Account:
         parts = [
             f"{self.glass_used:.1f} of {self.glass_out:.1f} m2 that looks out used "
             f"({_percent(self.share_used)}; {self.windows_used} of {self.windows_out} windows)"
+            if self.glass_out > 0
+            else "none looks out of a room"
         ]
         for area, what in (
             (self.glass_assumed, "assumed"),

@@ -41,9 +41,10 @@ from bim.energyplus_parts import (
 )
 from bim.energyplus_windows import WindowOptics, complex_state, shading_control
 from bim.model import Building, Element, Face, Space
+from bim.outer_faces import OFF_THE_WALL, OuterFaces, outer_faces
 from bim.planes import Facet, planar_facets, triangulated
 from bim.rays import hemisphere, ray_mesh
-from bim.to_thermal import OFF_THE_WALL, ThermalRoom
+from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_text
 from thermal.climate import Climate
@@ -52,6 +53,7 @@ from thermal.zone import OpaqueSurface, Zone
 
 LEAST_SHADE = 0.05  # [m2] smaller plane parts of what stands outdoors shade nothing
 LEAST_SURFACE = 1e-3  # [m2]
+LOOKOUTS = 8  # of so many places before an outer wall one is looked from
 RAYS = 400  # from each point, to what may shade it
 TERRAINS = {"suburbs": "Suburbs", "country": "Country", "city": "City"}
 OUTPUTS = (
@@ -112,12 +114,13 @@ class EnergyPlusTwin:
         self.notes: dict[str, None] = {}
         self._states: dict[int, str] = {}
         self.zones = [f"Z{k} {object_name(r.zone.name)}" for k, r in enumerate(rooms)]
-        for zone, room in zip(self.zones, rooms, strict=True):
-            self._zone(zone, room)
+        outer = [outer_faces(building, room.space, room.room) for room in rooms]
+        for zone, room, faces in zip(self.zones, rooms, outer, strict=True):
+            self._zone(zone, room, dict(zip(faces.surfaces.tolist(), faces.depth, strict=True)))
         self._air_between(air or TwinAir())
         own = {window.guid for room in rooms for window in room.space.windows}
         others = [element for element in building.elements if element.guid not in own]
-        shades(self.model, others, *_lookouts(rooms))
+        shades(self.model, others, *_lookouts(rooms, outer))
         if others:
             self.notes["what stands outdoors shades, but reflects nothing"] = None
 
@@ -131,7 +134,8 @@ class EnergyPlusTwin:
         write_text(folder / FILE, table)
         return model, folder / FILE
 
-    def _zone(self, zone: str, room: TwinRoom) -> None:
+    def _zone(self, zone: str, room: TwinRoom, depth: Mapping[int, float]) -> None:
+        """A room; depth: of the outer face behind that in the room, by surface [m]."""
         one, model = room.zone, self.model
         model["Zone"][zone] = {
             "volume": one.volume, "floor_area": max(room.space.floor_area, 0.01),
@@ -142,7 +146,8 @@ class EnergyPlusTwin:
             at = room.room.surface_of_face == index
             faces = [face for face, here in zip(room.space.faces, at, strict=True) if here]
             if faces[0].kind != "window frame":
-                self._surface(zone, f"{zone} S{index}", surface, faces)
+                out = depth.get(index, 0.0) + OFF_THE_WALL
+                self._surface(zone, f"{zone} S{index}", surface, faces, out)
         for index in range(len(one.windows)):
             self._window(zone, room, index)
         internal_heat(model, zone, one.gains, self.schedules)
@@ -150,8 +155,13 @@ class EnergyPlusTwin:
         notes += ideal_plant(model, zone, one.loads, self.schedules)
         self.notes |= dict.fromkeys(notes)
 
-    def _surface(self, zone: str, name: str, surface: OpaqueSurface, faces: Sequence[Face]) -> None:
-        """A surface of the balance: its faces, or a rectangle of its area where rooms share it."""
+    def _surface(
+        self, zone: str, name: str, surface: OpaqueSurface, faces: Sequence[Face], out: float
+    ) -> None:
+        """A surface of the balance: its faces, or a rectangle of its area where rooms share it.
+
+        Args: out: how far it is moved where it faces outdoors [m].
+        """
         kind = _kind(surface)
         construction, outside, extra = self._construction(name, surface)
         biggest = max(faces, key=lambda face: face.area)
@@ -160,10 +170,7 @@ class EnergyPlusTwin:
         else:
             rings = [ring for face in faces for ring in outlines(face, gap=NEAR, convex=True)]
         if outside == "Outdoors":
-            rings = [
-                ring + surface.normal * (biggest.construction.thickness + OFF_THE_WALL)
-                for ring in rings
-            ]
+            rings = [ring + surface.normal * out for ring in rings]
         written = self.model["BuildingSurface:Detailed"]
         rings = [ring for ring in rings if _area(ring) > LEAST_SURFACE]
         for part, ring in enumerate(rings):
@@ -289,17 +296,18 @@ def _seen(facets: Sequence[Facet], points: Ring, normals: Ring) -> list[int]:
     return sorted(found)
 
 
-def _lookouts(rooms: Sequence[TwinRoom]) -> tuple[Ring, Ring]:
+def _lookouts(rooms: Sequence[TwinRoom], outer: Sequence[OuterFaces]) -> tuple[Ring, Ring]:
     """Points [N, 3] before the corners and middles of windows and before the outer walls."""
     points, normals = [], []
-    for room in rooms:
+    for room, walls in zip(rooms, outer, strict=True):
         for window in room.space.windows:
             glass, _ = window_rectangles(window)
             spread = [window.centre + 0.9 * (corner - window.centre) for corner in glass]
             points += [p + 0.01 * window.normal for p in (window.centre, *spread)]
             normals += [window.normal] * (1 + len(glass))
-        points += list(room.room.outdoor_points)
-        normals += list(room.room.outdoor_normals)
+        some = walls.points[:, ::LOOKOUTS]
+        points += list(some.reshape(-1, 3))
+        normals += list(np.repeat(walls.normals, some.shape[1], axis=0))
     return np.array(points).reshape(-1, 3), np.array(normals).reshape(-1, 3)
 
 

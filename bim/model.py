@@ -30,6 +30,7 @@ BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
 JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
 NOT_USED = "not used"  # kind of a problem: what the file states and no result depends on
+COLOURS = ("red", "green", "blue")  # bands of colour pictures
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
 
@@ -85,6 +86,14 @@ class Construction:
         return sum(layer.resistance for layer in self.layers)
 
 
+def _in_band(surface: Face | Element, band: str) -> float:
+    """Diffuse reflectance; in a band of colour no more than the gloss leaves."""
+    if band in COLOURS:
+        most = 1.0 - (0.0 if surface.gloss is None else surface.gloss.at_normal)
+        return min(surface.reflectance_visible * surface.hue[COLOURS.index(band)], most)
+    return {"visible": surface.reflectance_visible, "solar": surface.reflectance_solar}[band]
+
+
 @dataclass(frozen=True, slots=True)
 class Face:
     """A plane opaque part of a room's boundary: one element, one construction, one neighbour."""
@@ -118,8 +127,8 @@ class Face:
         set_normal_and_area(self)
 
     def reflectance(self, band: str) -> float:
-        """Diffuse reflectance in the band "visible" or "solar"."""
-        return {"visible": self.reflectance_visible, "solar": self.reflectance_solar}[band]
+        """Diffuse reflectance in the band "visible", "solar", "red", "green" or "blue"."""
+        return _in_band(self, band)
 
     def total_reflectance(self, band: str) -> float:
         """Reflectance in a band at normal incidence, diffuse and like a mirror."""
@@ -228,8 +237,8 @@ class Element:
     hue: Colour = GREY  # of what it reflects diffusely: linear sRGB of luminance 1
 
     def reflectance(self, band: str) -> float:
-        """Diffuse reflectance in the band "visible" or "solar"."""
-        return {"visible": self.reflectance_visible, "solar": self.reflectance_solar}[band]
+        """Diffuse reflectance in the band "visible", "solar", "red", "green" or "blue"."""
+        return _in_band(self, band)
 
 
 @dataclass(frozen=True, slots=True)

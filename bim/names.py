@@ -40,8 +40,13 @@ T = TypeVar("T", bound=Named)
 
 def label_of(name: str, long_name: str, guid: str) -> str:
     """Number and name of a room as people use them, each once; its GUID where it has neither."""
-    parts = [name] if long_name in ("", name) else [name, long_name]
-    return " ".join(part for part in parts if part) or guid
+    words, long_words = name.split(), long_name.split()
+    count = len(long_words)
+    if not count or words[-count:] == long_words:  # "1 - Living room" that is a "Living room"
+        return name or guid
+    if words == long_words[: len(words)]:
+        return long_name
+    return f"{name} {long_name}"
 
 
 @lru_cache(maxsize=4096)  # the same words are looked for in every material of a model

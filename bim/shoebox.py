@@ -33,6 +33,17 @@ class WindowRectangle:
 
 
 @dataclass(frozen=True, slots=True)
+class Plate:
+    """An overhang or a fin: a plate that stands square out of a line on one side of the box."""
+
+    start: tuple[float, float]  # x to the right seen from outdoors, y above the floor [m]
+    end: tuple[float, float]
+    depth: float  # from the plane of the glass [m]
+    side: str = "front"  # one of BOX_SIDES
+    reflectance: float = 0.2  # diffuse, in both bands
+
+
+@dataclass(frozen=True, slots=True)
 class SideFacet:
     """A polygon of the box: what it is, on which side, and of which window (-1: of none)."""
 
@@ -58,6 +69,7 @@ def shoebox(
     emissivity: float = 0.9,
     latitude_deg: float | None = None,
     longitude_deg: float | None = None,
+    plates: Sequence[Plate] = (),
     elements: Sequence[Element] = (),
     name: str = "room",
 ) -> Building:
@@ -73,7 +85,7 @@ def shoebox(
         reflectance: visible diffuse reflectances; `reflectance_solar`: solar ones, else the same.
         gloss: what parts reflect like a mirror besides, `mitsuba_cfs.gloss`.
         adjacency: what lies beyond a side, one of `bim.model.ADJACENCIES`.
-        elements: what stands outdoors.
+        plates, elements: what stands outdoors.
     """
     if min(width, depth, height) <= 0 or recess < 0:
         raise RoomError("width, depth and height must be positive, the recess not negative")
@@ -81,7 +93,8 @@ def shoebox(
         if w.side not in BOX_SIDES or w.side == "floor":
             raise ValueError(f"window side {w.side!r}: expected one of {BOX_SIDES}, not the floor")
     facets: list[SideFacet] = []
-    for side, (plane, size) in _side_planes(width, depth, height, facing_deg).items():
+    sides = _side_planes(width, depth, height, facing_deg)
+    for side, (plane, size) in sides.items():
         holes = [(i, w) for i, w in enumerate(windows) if w.side == side]
         facets += _side_facets(side, plane, size, holes, recess)
     meshes = conforming_triangles([part.facet for part in facets])
@@ -109,7 +122,23 @@ def shoebox(
         tuple(apertures[i] for i in range(len(windows))),
         volume,
     )
-    return Building(name, (space,), tuple(elements), (), latitude_deg, longitude_deg)
+    outdoors = [_plate(f"{name}-plate-{i}", p, sides, recess) for i, p in enumerate(plates)]
+    return Building(name, (space,), (*outdoors, *elements), (), latitude_deg, longitude_deg)
+
+
+def _plate(
+    guid: str, plate: Plate, sides: Mapping[str, tuple[Plane, tuple[float, float]]], recess: float
+) -> Element:
+    """A plate before a side of the box."""
+    if plate.depth <= 0 or plate.start == plate.end:
+        raise RoomError(f"{guid}: needs a depth and two ends that differ")
+    plane = sides[plate.side][0]
+    near = plane.to_world(np.array([plate.start, plate.end])) + recess * plane.normal
+    far = near[::-1] + plate.depth * plane.normal
+    corners = np.concatenate([near, far])
+    triangles = corners[[[0, 1, 2], [0, 2, 3]]]
+    rho = plate.reflectance
+    return Element(guid, "plate", "IfcShadingDevice", triangles, rho, rho)
 
 
 @dataclass(frozen=True, slots=True)

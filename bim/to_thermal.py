@@ -23,7 +23,6 @@ OUTSIDE = {
     "unknown": "adiabatic",
 }
 THINNEST = 5e-4  # [m] thinner layers (paint, foils) take no part in the heat balance
-OFF_THE_WALL = 0.02  # [m] sensors stand this far before the outer face of a wall
 SAME_AREA = 0.02  # the two faces of a partition differ by this share at most
 OPPOSITE = -0.98  # cosine between their normals
 
@@ -35,8 +34,6 @@ class ThermalRoom:
     zone: Zone
     surface_of_face: NDArray[np.int64]  # [faces of the space] surface F of the zone
     outdoor: NDArray[np.int64]  # [N] surfaces that face outdoors
-    outdoor_points: NDArray[np.float64]  # [N, 3] before their outer faces [m]
-    outdoor_normals: NDArray[np.float64]  # [N, 3]
     neighbours: tuple[str | None, ...] = ()  # [F] GUID of the room behind each surface
 
 
@@ -57,12 +54,11 @@ def thermal_room(
     """
     groups = _faces_of_surfaces(space)
     surface_of_face = np.empty(len(space.faces), dtype=np.int64)
-    surfaces, points = [], []
+    surfaces = []
     for number, members in enumerate(groups):
         faces = [space.faces[i] for i in members]
         surface_of_face[members] = number
         surfaces.append(_surface(f"{faces[0].kind} {number + 1}", faces, ground_level))
-        points.append(_outdoor_point(max(faces, key=lambda face: face.area)))
     outdoor = [i for i, surface in enumerate(surfaces) if surface.outside == "outdoor"]
     zone = Zone(
         space.label,
@@ -77,8 +73,6 @@ def thermal_room(
         zone,
         surface_of_face,
         np.array(outdoor, dtype=np.int64),
-        np.array([points[i] for i in outdoor]).reshape(-1, 3),
-        np.array([surfaces[i].normal for i in outdoor]).reshape(-1, 3),
         surface_neighbours(space),
     )
 
@@ -244,15 +238,6 @@ def _surface(name: str, faces: list[Face], ground_level: float) -> OpaqueSurface
         absorptance_in=1.0 - mean([face.total_reflectance("solar") for face in faces]),
         height=max(height, 0.5),
     )
-
-
-def _outdoor_point(face: Face) -> NDArray[np.float64]:
-    """A point before the middle of the face's biggest triangle, outside the wall."""
-    edges = np.cross(
-        face.triangles[:, 1] - face.triangles[:, 0], face.triangles[:, 2] - face.triangles[:, 0]
-    )
-    middle = face.triangles[np.argmax(np.linalg.norm(edges, axis=1))].mean(axis=0)
-    return middle + face.normal * (face.construction.thickness + OFF_THE_WALL)
 
 
 def _windows(

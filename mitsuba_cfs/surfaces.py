@@ -127,6 +127,23 @@ class WindowGroup:
         return self.windows[0].frame
 
 
+def points_on_triangles(
+    triangles: NDArray[np.float64], u: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points [n, 3] spread evenly over triangles [T, 3, 3], and the triangle [n] of each.
+
+    Args: u: [n, 2] numbers in [0, 1), which may be a low-discrepancy set.
+    """
+    area = triangle_areas(triangles)
+    shares = area / area.sum()
+    at = np.cumsum(shares)
+    chosen = np.minimum(np.searchsorted(at, u[:, 0], side="right"), len(area) - 1)
+    reused = np.clip((u[:, 0] - at[chosen] + shares[chosen]) / shares[chosen], 0.0, 1.0)
+    root, v = np.sqrt(reused)[:, None], u[:, 1, None]
+    a, b, c = (triangles[chosen, k] for k in range(3))
+    return a * (1 - root) + b * (root * (1 - v)) + c * (root * v), chosen
+
+
 def triangle_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area of each triangle [N] [m2] from vertices [N, 3, 3] [m]."""
     edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

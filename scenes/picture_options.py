@@ -31,3 +31,4 @@ class PictureOptions:
     sun_model: str = "spa"  # see `mitsuba_cfs.sky.sun`
     sky_ground: str = "reflected"  # see `mitsuba_cfs.sky.ground`
     seed: int = 0
+    colour: bool = False  # by the surfaces' colours, in three bands

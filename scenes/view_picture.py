@@ -15,6 +15,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, fitted, pixel_directions
+from mitsuba_cfs.methods.colour_view import coloured_picture
 from mitsuba_cfs.methods.glare import rated_pictures
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.sampling import Sampling
@@ -37,6 +38,7 @@ class RoomPicture:
     time: pd.Timestamp  # middle of the hour
     notes: tuple[str, ...]  # of systems and weather
     glare: GlareResult | None = None  # of a fisheye of the whole hemisphere
+    radiance: NDArray[np.float32] | None = None  # [ny, nx, 3] [W/m2/sr] in colour
 
 
 def room_picture(
@@ -63,26 +65,28 @@ def room_picture(
         apertures=options.apertures,
         surroundings=options.surroundings,
         surroundings_offset=options.surroundings_offset,
+        colour=options.colour,
     )  # fmt: skip
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
-    light = PathSystems(viewed.scene, viewed.optics, sampling).light(
-        annual_sky(
-            weather,
-            sampling.subdivision,
-            hours=[hour],
-            sun_model=options.sun_model,
-            ground=options.sky_ground,
-        )
-    )
-    view, steps, rated = viewed.scene.view, part(progress, 0.4, 1.0, "picture"), None
+    place = {"sun_model": options.sun_model, "ground": options.sky_ground}
+    sky = annual_sky(weather, sampling.subdivision, hours=[hour], **place)
+    light = PathSystems(viewed.scene, viewed.optics, sampling).light(sky)
+    end = 0.7 if options.colour else 1.0
+    view, steps, rated = viewed.scene.view, part(progress, 0.4, end, "picture"), None
     if rates_glare(view):
         rating = GlareOptions(grouping=options.glare_sources, sun=options.glare_sun)
         [(luminance, rated)] = rated_pictures(light, [0], options=rating, progress=steps)
     else:
         luminance = light.picture(0, progress=steps)
     notes = (*viewed.notes(), *weather.notes)
-    return RoomPicture(luminance, view, viewed.space.label, weather.midpoints[hour], notes, rated)
+    radiance = None
+    if options.colour:
+        bands = [PathSystems(scene, viewed.optics, sampling) for scene in viewed.bands]
+        steps = part(progress, end, 1.0, "colour")
+        radiance = coloured_picture(luminance, bands, sky, 0, progress=steps)
+    middle = weather.midpoints[hour]
+    return RoomPicture(luminance, view, viewed.space.label, middle, notes, rated, radiance)
 
 
 def rates_glare(view: View) -> bool:
@@ -92,16 +96,17 @@ def rates_glare(view: View) -> bool:
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:
-    """Write `.hdr`, `.exr`, or `.png`: falsecolour, or tone-mapped if `print_like`."""
+    """Write `.hdr`, `.exr`, or `.png`: falsecolour, or tone-mapped if `print_like` or in colour."""
     title = f"{picture.room}, {picture.time:%d %B %H:%M}"
+    pixels = picture.luminance if picture.radiance is None else picture.radiance
     if path.suffix == ".hdr":
-        write_hdr(path, picture.luminance, picture.view, comments=(title,))
+        write_hdr(path, pixels, picture.view, comments=(title,))
     elif path.suffix == ".exr":
         from mitsuba_cfs.images.exr import write_exr
 
-        write_exr(path, picture.luminance, picture.view, comment=title)
-    elif path.suffix == ".png" and print_like:
-        write_tone_mapped(path, picture.luminance, scale=True, title=title)
+        write_exr(path, pixels, picture.view, comment=title)
+    elif path.suffix == ".png" and (print_like or pixels.ndim == 3):
+        write_tone_mapped(path, pixels, scale=True, title=title)
     elif path.suffix == ".png":
         seen = pixel_directions(picture.view)[1]
         write_falsecolour(path, picture.luminance, title=title, seen=seen)

@@ -75,12 +75,17 @@ def area_view_factors(area: ArrayLike, normals: ArrayLike) -> NDArray[np.float64
     return seen / total
 
 
-def outside_factors(normal_z: float) -> tuple[float, float, float]:
-    """Shares (sky, air, ground) of the hemisphere that an outside face exchanges longwave with.
+def outside_factors(normal_z: float, sky_seen: float = 1.0) -> tuple[float, float, float]:
+    """Shares (sky, air, below) of the hemisphere that an outside face exchanges longwave with.
 
     The sky half of a tilted face splits into sky and air by beta = sqrt((1 + cos tilt)/2)
-    (Walton 1983; EnergyPlus).  normal_z: z component of the exterior normal.
+    (Walton 1983; EnergyPlus).  What hides the sky counts with the ground, at the temperature of
+    the air: F_sky = sky_seen (1 + cos tilt)/2 (EnergyPlus; ISO 52016-1 6.5.13.3 likewise takes the
+    sky's share with obstacles off).
+
+    Args: normal_z: z component of the exterior normal; sky_seen: share of the sky that is not
+        hidden by what stands outdoors.
     """
     half = 0.5 * (1.0 + normal_z)
-    beta = np.sqrt(half)
-    return float(half * beta), float(half * (1.0 - beta)), float(1.0 - half)
+    beta, seen = np.sqrt(half), half * sky_seen
+    return float(seen * beta), float(seen * (1.0 - beta)), float(1.0 - seen)

@@ -103,6 +103,7 @@ def frame_surface(window: WindowElement) -> OpaqueSurface:
         absorptance_out=window.frame_absorptance,
         roughness="very smooth",
         height=window.height,
+        sky_seen=window.sky_seen,
     )
 
 
@@ -286,7 +287,7 @@ def _faces(
         normal=np.array([e.normal for e in solid]),
         height=np.array([getattr(e, "glazing_height", 1.5) for e in solid]),
         emissivity_out=np.array([_emissivity_out(e) for e in solid]),
-        hemisphere=np.array([outside_factors(e.normal[2]) for e in solid]),
+        hemisphere=np.array([outside_factors(e.normal[2], e.sky_seen) for e in solid]),
         roughness=np.array([ROUGHNESS[getattr(e, "roughness", "very smooth")] for e in solid]),
         wind=np.array([[a * f**b for a, b in forms] for f in factor]),
         radiant_share=weight / totals[zone],

@@ -72,6 +72,7 @@ class OpaqueSurface:
     roughness: str = "medium rough"
     height: float = 1.5  # [m] of the centroid above the ground outside, for the wind profile
     beyond_c: NDArray[np.float64] | float | None = None  # [H] or [T] of the outer face, "known"
+    sky_seen: float = 1.0  # share of the sky above its plane that nothing outdoors hides
 
     def __post_init__(self) -> None:
         item = f"surface {self.name}"
@@ -85,6 +86,7 @@ class OpaqueSurface:
             (self.emissivity_out, "outside emissivity"),
             (self.absorptance_in, "inside solar absorptance"),
             (self.absorptance_out, "outside solar absorptance"),
+            (self.sky_seen, "share of the sky that is seen"),
         ):
             require_range(value, 0.0, 1.0, f"{item}: {label}")
         known = ", ".join(ROUGHNESS)
@@ -106,9 +108,11 @@ class WindowElement:
     frame_u: float = 2.0  # [W/(m2 K)] with the films 0.04 and 0.13 m2 K/W
     frame_absorptance: float = OUTSIDE_ABSORPTANCE  # solar, outside
     height: float = 1.75  # [m] of the centroid above the ground outside
+    sky_seen: float = 1.0  # share of the sky above its plane that nothing outdoors hides
 
     def __post_init__(self) -> None:
         item = f"window {self.name}"
+        require_range(self.sky_seen, 0.0, 1.0, f"{item}: share of the sky that is seen")
         require(self.area > 0, item, f"area must be positive, got {self.area} m2")
         require(len(self.states) > 0, item, "has no fenestration system")
         require(self.glazing_height > 0, item, "glazing height must be positive")

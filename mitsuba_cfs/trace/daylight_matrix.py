@@ -158,33 +158,39 @@ def sky_irradiance_matrix(
     A row sums to pi where nothing around the sensor absorbs.
 
     Args:
-        points, directions: [S, 3] sensor positions [m] and normals.
+        points, directions: [S, 3] sensor positions [m] and normals; or [S, K, 3] places of each
+            sensor, of which its rows are the mean.
         acceptance: what the sensor takes up of light at even steps from normal to grazing
             incidence, 0 to 90 degrees; all of it by default.
         max_depth: 1 leaves the sky that the sensor sees itself.
         samples: paths for each sensor in each batch.
     """
-    points, directions = sensors_of(points, directions)
+    points = np.asarray(points, dtype=float)
+    places = points if points.ndim == 3 else np.atleast_2d(points)[:, None]
+    middles, directions = sensors_of(places.mean(axis=1), directions)
     if max_depth == 1:  # what the sensor sees itself, mirrors are left to the rest
         surfaces = replace(surfaces, gloss=())
-    tracer = TracedScene(surfaces, centre=points.mean(axis=0))
+    tracer = TracedScene(surfaces, centre=middles.mean(axis=0))
     sky = SkyBins(ReinhartSky(subdivision))
     accepted = AcceptedDirections(acceptance)
-    S, P, n = len(points), sky.size, int(samples)
-    place = vectors(points - tracer.centre, mi.Point3f)
+    S, P, n = len(places), sky.size, int(samples)
+    place = vectors(places.reshape(-1, 3) - tracer.centre, mi.Point3f)
     normal = vectors(directions)
 
     def batch(number: int) -> NDArray[np.float64]:
         matrix = empty_sums(S * P)
-        count = dr.opaque(mi.UInt32, n)
+        K = places.shape[1]
+        count, each = dr.opaque(mi.UInt32, n), dr.opaque(mi.UInt32, K)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
+        turn = dr.opaque(mi.UInt32, number * n % K)  # where the last batch ended
+        at = sensor * each + (path - sensor * count + turn) % each
         key = batch_key(seed, number)
         stream = mi.sample_tea_32(sensor, key)[0]
         local = accepted.sample(lattice_2d(path - sensor * count, stream, 0))
         starts = PathStarts(
             sensor,
-            mi.Point3f(dr.gather(mi.Point3f, place, sensor)),
+            mi.Point3f(dr.gather(mi.Point3f, place, at)),
             mi.Frame3f(dr.gather(mi.Vector3f, normal, sensor)).to_world(local),
             path_generator(path, key),
             dr.opaque(mi.UInt32, max_depth),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import window_frame
-from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.surfaces import Surfaces, points_on_triangles
 from mitsuba_cfs.trace.sampling import vectors
 from mitsuba_cfs.trace.scene import TracedScene
 
@@ -36,16 +36,9 @@ def view_factors(surfaces: Surfaces, *, samples: int = 16384, seed: int = 0) -> 
         if not len(corners):
             raise ValueError(f"surface {i} of {N} has no triangle")
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(normal, axis=1)
         u = plan.numbers(i)
-        at = np.cumsum(area) / area.sum()
-        chosen = np.minimum(np.searchsorted(at, u[:, 0], side="right"), len(area) - 1)
-        before = at[chosen] - area[chosen] / area.sum()
-        reused = np.clip((u[:, 0] - before) * area.sum() / area[chosen], 0.0, 1.0)
-        root = np.sqrt(reused)[:, None]
-        a, b, c = (corners[chosen, k] for k in range(3))
-        v = u[:, 1, None]
-        origins.append(a * (1 - root) + b * (root * (1 - v)) + c * (root * v))
+        points, chosen = points_on_triangles(corners, u)
+        origins.append(points)
         frames = np.stack([window_frame(-n) for n in normal])
         directions.append(_cosine(frames[chosen], u[:, 2:]))
     hits = _hits(surfaces, np.concatenate(origins), np.concatenate(directions))
@@ -78,6 +71,36 @@ def person_view_factors(
     origins = np.broadcast_to(np.asarray(place, dtype=float), rays.shape)
     shares = _shares(_hits(surfaces, origins, rays).reshape(6, plan.count), N)
     return np.array(SEATED) @ shares / sum(SEATED)
+
+
+def sky_shares(
+    surfaces: Surfaces,
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    samples: int = 4096,
+    seed: int = 0,
+) -> FloatArray:
+    """Share [S] that planes outdoors see of the sky that they would see with nothing before them.
+
+    The view factor to the sky over (1 + cos tilt) / 2; 1 where a plane looks straight down.
+
+    Args:
+        surfaces: all that stands outdoors.
+        points: [S, K, 3] places of each plane [m]; normals: [S, 3].
+        samples: rays from each plane, rounded up to a power of two.
+    """
+    points, normals = np.asarray(points, dtype=float), np.asarray(normals, dtype=float)
+    S, K = points.shape[:2]
+    if not S or not len(surfaces.triangles):
+        return np.ones(S)
+    plan = _Plan(samples, seed)
+    rays = [_cosine(window_frame(n)[None], plan.numbers(k)[:, 2:]) for k, n in enumerate(normals)]
+    places = points[:, np.arange(plan.count) % K]
+    hits = _hits(surfaces, places.reshape(-1, 3), np.concatenate(rays)).reshape(S, -1)
+    up = np.stack(rays)[..., 2] > 0
+    free, sky = (up & (hits < 0)).sum(axis=1), up.sum(axis=1)
+    return np.where(sky > 0, free / np.maximum(sky, 1), 1.0)
 
 
 class _Plan:

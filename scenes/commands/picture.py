@@ -50,6 +50,9 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @size_option("size", 800, "as evalglare wants them")
 @samples_option(16, "for the one hour")
 @click.option("--tone", is_flag=True, help="PNG tone-mapped for the eye, not in falsecolour.")
+@click.option(
+    "--colour", is_flag=True, help="By the surfaces' colours, white-balanced; PNG tone-mapped."
+)
 @glare_sources_option
 @glare_sun_option
 @sun_option

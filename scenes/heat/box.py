@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bim.model import Building, Construction, MaterialLayer
-from bim.shoebox import WindowRectangle, shoebox
+from bim.shoebox import Plate, WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import lacquer
 from scenes.heat.study_file import BoxTable
@@ -37,6 +37,7 @@ def box_building(box: BoxTable) -> Building:
             adjacency=box.adjacency or None,
             constructions=constructions or None,
             gloss=gloss or None,
+            plates=[Plate(**one.model_dump()) for one in box.plate],
         )
     except ValueError as error:
         raise DataError(str(error), field="box") from error

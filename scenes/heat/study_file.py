@@ -48,6 +48,16 @@ class WindowTable(TomlTable):
     frame: Annotated[float, Field(ge=0)] = 0.0
 
 
+class PlateTable(TomlTable):
+    """An overhang or a fin: a plate out of a line on a side of the box, as of `bim.shoebox`."""
+
+    start: tuple[float, float]  # x to the right seen from outdoors, y above the floor [m]
+    end: tuple[float, float]
+    depth: Length  # from the plane of the glass [m]
+    side: Literal["front", "right", "back", "left", "ceiling"] = "front"
+    reflectance: Share = 0.2
+
+
 class BoxTable(TomlTable):
     """A box-shaped room in place of a building file."""
 
@@ -57,6 +67,7 @@ class BoxTable(TomlTable):
     facing_deg: float = 180.0
     recess: Annotated[float, Field(ge=0)] = 0.0
     window: tuple[WindowTable, ...]
+    plate: tuple[PlateTable, ...] = ()
     reflectance: dict[Part, Share] = Field(default_factory=dict)
     specular: dict[Part, Share] = Field(default_factory=dict)  # of a lacquer at normal incidence
     roughness: dict[Part, Annotated[float, Field(ge=0, le=ROUGHEST)]] = Field(default_factory=dict)

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
 from scenes.language.catalogue import in_language, said, short_month
+from scenes.language.heard import heard, heard_list
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
@@ -57,6 +58,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
         page=page,
         title=page.title or result.building.name or said("Building"),
         result=result,
+        notes=notes(result),
         rooms=rooms,
         verdict=verdict(result, [room.cards for room in rooms]),
         model=model,
@@ -161,8 +163,14 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     rooms += said(", {count} more in the file", count=others) if others > 0 else ""
     rows.append((said("Rooms"), rooms))
     account = building.account
-    facts = account.facts if account is not None else ()
-    return (*rows, *((title, prose(text)) for title, text in facts))
+    read = () if account is None else account.facts
+    return (*rows, *((said(title), prose(heard_list(text, ", "))) for title, text in read))
+
+
+def notes(result: RunResult) -> tuple[tuple[str, bool], ...]:
+    """What is to be known first, and whether it is there in English alone."""
+    found = [(note, said(note) if note == NOTE else heard(note)) for note in result.notes]
+    return tuple((text, text == note) for note, text in found)
 
 
 def comparison(result: RunResult, rooms) -> tables.Table | None:

@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
+from bim.outer_faces import OuterFaces, outer_faces
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.glare.annual import AnnualGlare
@@ -49,6 +50,7 @@ from scenes.room.kept_sun import kept_sun
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
+from scenes.room.sky_seen import under_the_sky
 from scenes.room.solar import RoomSun
 from scenes.room.thermal import fenestration_table
 from scenes.room.windows import room_windows
@@ -266,11 +268,16 @@ class RoomSimulation:
         return found
 
     @cached_property
+    def outer(self) -> OuterFaces:
+        """Places before the outer faces of the room's walls and windows."""
+        return outer_faces(self.building, self.space, self.surfaces)
+
+    @cached_property
     def sun(self) -> RoomSun:
         """The sun outside and what the room does with it."""
         steps = part(self.progress, 0.0, 0.8, "heat")
         interior = interior_surfaces(self.space, "solar")
-        return RoomSun(self.outdoors, interior, self.surfaces, self.skies, steps)
+        return RoomSun(self.outdoors, interior, self.surfaces, self.outer, self.skies, steps)
 
     @cached_property
     def thermals(self) -> list[list[ThermalSystem]]:
@@ -317,6 +324,8 @@ class RoomSimulation:
             services = services_of(self.operation, area, self.weather)
         else:
             services = plain_services(self.space, self.occupied, self.options.occupancy)
+        exterior, seed = self.outdoors.scene.exterior, self.sampling.seed
+        room = under_the_sky(room, self.outer, exterior, seed=seed, cache=self.cache)
         solar, gains = sun.switched(self.windows, self.thermals, state)
         return RoomZone(
             self.space, room, solar, gains, state, lamps, self.occupied, plane, services

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.outer_faces import OuterFaces
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
@@ -50,11 +51,13 @@ class RoomSun:
         outdoors: PhaseScene,
         interior: Surfaces,
         room: ThermalRoom,
+        outer: OuterFaces,
         skies: AnnualSky,
         progress: Progress,
     ) -> None:
         """From the windows' groups and what stands before them, and the room, in the solar band."""
-        self.outdoors, self.room, self.skies, self.progress = outdoors, room, skies, progress
+        self.outdoors, self.outer, self.skies, self.progress = outdoors, outer, skies, progress
+        self.surfaces = len(room.zone.surfaces)
         # the room's triangles, numbered by the surfaces of the zone
         numbers = room.surface_of_face[interior.surface]
         self.interior = Surfaces(
@@ -85,18 +88,17 @@ class RoomSun:
     @cached_property
     def facade(self) -> FloatArray:
         """Irradiance on the outside of the zone's surfaces [H, F] [W/m2]."""
-        room = self.room
-        facade = np.zeros((self.skies.hours, len(room.zone.surfaces)))
-        if len(room.outdoor):
+        outer, facade = self.outer, np.zeros((self.skies.hours, self.surfaces))
+        if len(outer.surfaces):
             matrix = sky_irradiance_matrix(
                 self.outdoors.scene.exterior,
-                room.outdoor_points,
-                room.outdoor_normals,
+                outer.points,
+                outer.normals,
                 subdivision=self.outdoors.sampling.subdivision,
                 progress=part(self.progress, 0.4, 0.6),
                 **self._tracing,
             )
-            facade[:, room.outdoor] = self.skies.whole_year(matrix.values @ self.skies.solar).T
+            facade[:, outer.surfaces] = self.skies.whole_year(matrix.values @ self.skies.solar).T
         return facade
 
     def absorbed(self, reflectance: FloatArray) -> FloatArray:

@@ -22,7 +22,6 @@ import pandas as pd
 from bim.names import folder_names
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import temporary_folder
-from scenes.report.names import quantity
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -106,6 +105,8 @@ def write_netcdf(result: RunResult, path: str | PathLike[str]) -> None:
 
 def attributes(key: str) -> dict[str, str]:
     """CF attributes of a quantity of the results: units, long_name, what it means."""
+    from scenes.report.names import quantity  # whose package draws; `check_netcdf` does not
+
     known = quantity(key)
     unit, label = UNITS.get(known.unit, known.unit).replace("²", "2"), known.label
     unit, label = LABELS.get(key, (unit, label))

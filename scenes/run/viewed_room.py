@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bim.model import Building, Space
+from bim.model import COLOURS, Building, Space
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -31,6 +31,7 @@ class ViewedRoom:
     systems: tuple[FenestrationSystem, ...]  # [G]
     optics: list[list[BsdfOptics]]  # [G][1]
     sources: list[dict]  # name, source and windows of each system
+    bands: tuple[DaylightScene, ...] = ()  # the scene by red, green and blue, where asked for
 
     def notes(self) -> tuple[str, ...]:
         """What fills the windows, what its data lack, and light that is lost; traces a little."""
@@ -51,6 +52,7 @@ def read_viewed_room(
     apertures: Sequence[str] = (),
     surroundings: Sequence[Path] = (),
     surroundings_offset: tuple[float, float, float] | None = None,
+    colour: bool = False,
 ) -> ViewedRoom:
     """The room of a building file, seen in the visible band.
 
@@ -61,6 +63,7 @@ def read_viewed_room(
         furniture: whether what stands in the room is seen.
         apertures: materials of a Radiance scene's windows.
         surroundings, surroundings_offset: as of `read_building`.
+        colour: the scene in three bands too.
     """
     building = read_building(
         file,
@@ -76,11 +79,12 @@ def read_viewed_room(
     filled = {guid: states[:1] for guid, states in fill_windows(room.windows, given, file).items()}
     windows = room_windows(room, filled)
     building = traced_building(building, filled)
-    scene = DaylightScene(
-        furnished_surfaces(room, "visible"),
-        exterior_surfaces(building, room, "visible"),
-        windows.groups,
-        view=view,
-    )
+
+    def scene(band: str) -> DaylightScene:
+        inside, outside = furnished_surfaces(room, band), exterior_surfaces(building, room, band)
+        return DaylightScene(inside, outside, windows.groups, view=view)
+
     systems = tuple(system for (system,) in windows.systems)
-    return ViewedRoom(room, scene, systems, windows.optics(), window_sources(room.windows, filled))
+    bands = tuple(scene(band) for band in COLOURS) if colour else ()
+    sources = window_sources(room.windows, filled)
+    return ViewedRoom(room, scene("visible"), systems, windows.optics(), sources, bands)

@@ -72,6 +72,12 @@ def test_sound_room_is_usable_and_all_its_glass_used(tmp_path):
     assert "1 of 1 windows" in found.lines[2]
 
 
+def test_a_file_without_rooms_claims_no_share_of_glass():
+    account = Account((), 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert account.lines[1].startswith("Rooms read: none: the file has no spaces")
+    assert account.lines[2] == "Glass: none looks out of a room"
+
+
 # phantom glass -------------------------------------------------------------------------------
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,11 +10,12 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
+from bim.colours import GREY
 from bim.defaults import CLEAR_GLAZING
 from bim.gloss_materials import gltf_factors, mitsuba_bsdf
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import read_corrections
-from bim.model import Element
+from bim.model import COLOURS, Element
 from bim.outdoors import mirrors_in_view
 from bim.shoebox import shoebox
 from bim.solids import triangles_of
@@ -246,3 +248,20 @@ def test_gltf_is_metal_and_smooth_as_the_gloss_says(tmp_path):
     walls = [g for name, g in scene.geometry.items() if "R1 Room wall" in name]
     materials = [wall.visual.material for wall in walls]
     assert [(m.metallicFactor, m.roughnessFactor) for m in materials] == [(1.0, pytest.approx(0.3))]
+
+
+def test_a_styles_colour_is_its_reflectance_in_three_bands(tmp_path):
+    """What a screen shows as (0.8, 0.4, 0.2) is these values' linear light (IEC 61966-2-1)."""
+    shown, whole = ("IfcColourRgb", None, 0.8, 0.4, 0.2), ("IfcNormalisedRatioMeasure", 1.0)
+    found = building_with(tmp_path, SurfaceColour=shown, DiffuseColour=whole)
+    linear = np.array([0.603827, 0.132868, 0.033105])
+    wall, outdoors = wall_of(found), element_of(found, "south again")
+    for surface in (wall, outdoors):
+        bands = [surface.reflectance(band) for band in COLOURS]
+        assert bands == pytest.approx(linear, rel=1e-4)
+        assert np.dot(bands, (0.2126, 0.7152, 0.0722)) == pytest.approx(surface.reflectance_visible)
+    faces = interior_surfaces(found.spaces[0], "red").reflectance
+    assert np.isclose(faces, linear[0], rtol=1e-4).any()
+    bright = replace(wall, reflectance_visible=0.5, gloss=dielectric(1.5, 0.1))
+    assert bright.reflectance("red") == 1 - bright.gloss.at_normal, "no more than it gets"
+    assert [f.hue for f in shoebox().spaces[0].faces if f.hue != GREY] == []

@@ -50,6 +50,18 @@ def test_a_name_of_several_lists_them_so_that_one_can_be_chosen():
         found_by_name(twins, "1 Bad", "space")
 
 
+@pytest.mark.parametrize(
+    ("name", "long_name", "label"),
+    [
+        ("1 - Living room", "Living room", "1 - Living room"), ("101", "101 Office", "101 Office"),
+        ("1", "Living room", "1 Living room"), ("lab", "Lab", "lab Lab"), ("", "Bad", "Bad"),
+        ("Bad", "Bad", "Bad"), ("Bath 1", "1 Bath", "Bath 1 1 Bath"), ("", "", "guid"),
+    ],
+)  # fmt: skip
+def test_a_label_says_each_name_once(name, long_name, label):
+    assert label_of(name, long_name, "guid") == label
+
+
 @pytest.mark.parametrize("wanted", ["Hall", "HALL", "2", "2 Living", "Living"])
 def test_a_joined_room_is_found_by_its_parts(wanted):
     rooms = (Room("a", "1 + 2", "Hall + Living"), Room("b", "3", "Bad"))

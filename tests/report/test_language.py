@@ -13,22 +13,33 @@ from pathlib import Path
 
 import pytest
 
+from bim.account import Account, StoreyAccount
 from mitsuba_cfs.errors import DataError
 from scenes.language import catalogue
 from scenes.language.catalogue import CATALOGUES, MONTHS, decimal, in_language, said, short_month
+from scenes.language.heard import HEARD, heard
 from scenes.page_options import PageOptions, RunSection, StudySection, read_page
 from scenes.report.headline import PROTECTION
 from scenes.report.method import LIGHT, PATCHES, PICTURES, SCATTER
 from scenes.report.names import WORDS
 from scenes.report.numbers import rounded
 from scenes.report.operation_figures import RULES
-from scenes.report.page import report_html
+from scenes.report.page import report_html, summary
 from tests.modules import MODULES
 from tests.report.browser import chromium, inspect
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
 
 LANGUAGES = tuple(CATALOGUES)
+EVERYTHING = Account(  # that can be said of a model which is usable with care
+    (StoreyAccount("EG", 3, 5, 20.0, 15.5), StoreyAccount("OG", 0, 0, 2.5, 0.0)), 9, 7,
+    glass_assumed=4.2, glass_low=1.5, glass_missing=0.5, phantom=3.1, closed=1.1,
+    overlapping=("1.01 / 1.02",), low=("1.03",), missing=("1.04", "1.05"), leaking=("1.06",),
+    raised=("1.07",),
+)  # fmt: skip
+ENGLISH = re.compile(r"\b(of|that|rooms?|glass|windows?|spaces|usable|with|used|pairs|closed)\b")
+BLIND = Account((StoreyAccount("EG", 0, 2, 0.0, 0.0),), 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0,
+                cut_off=True)  # fmt: skip
 MARK = re.compile(r"‹[^‹›]*›")
 # What a page shows that is no text of its own: names of the run's rooms, files, systems and states,
 # symbols and units, and what the program notes in English
@@ -134,6 +145,7 @@ def _asked_in_code() -> set[str]:
     found |= {*RULES.values(), *PICTURES.values(), PATCHES, SCATTER, *LIGHT}
     found |= {sentence for sentences in LIGHT.values() for sentence in sentences}
     found |= {f"{level}: at most {dgp}" for level, dgp in PROTECTION.items()}
+    found |= {*HEARD, *(title for title, _ in EVERYTHING.facts)}
     found |= {*MONTHS, *(month[:3] for month in MONTHS)}
     return found
 
@@ -255,3 +267,30 @@ def test_longer_words_fit(result, tmp_path, language, width) -> None:
     found = inspect(page, tmp_path, width=width, use="")
     assert found["faults"] == [] and found["overlaps"] == [] and found["clipped"] == []
     assert found["scroll"] <= found["width"], "the page scrolls sideways"
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize(
+    "account",
+    [EVERYTHING, BLIND, replace(EVERYTHING, found=True), replace(EVERYTHING, phantom=0.0)],
+    ids=["all", "none", "found", "less"],
+)
+def test_the_account_of_the_model_is_in_the_pages_language(result, language, account) -> None:
+    """Every part of the lines that `bim.account` writes has its translation, whatever it says."""
+    run = replace(result, building=replace(result.building, account=account))
+    with in_language(language):
+        facts = dict(summary(run))
+    shown = [facts[catalogue.CATALOGUES[language][title]] for title, _ in account.facts]
+    assert len(shown) >= 3
+    for text in shown:
+        assert not ENGLISH.search(text), text
+    assert dict(summary(run))["Rooms read"] == dict(account.facts)["Rooms read"]
+
+
+def test_notes_are_translated_or_named_english(result) -> None:
+    note = "Windows A, B: Blind 45, from --cfs blind.xml."
+    run = replace(result, notes=(note, "Nobody has translated this."))
+    page = report_html(run, PageOptions(language="de"))
+    assert "<li>Fenster A, B: Blind 45, aus --cfs blind.xml.</li>" in page
+    assert '<li lang="en">Nobody has translated this.</li>' in page
+    assert heard(note) == note

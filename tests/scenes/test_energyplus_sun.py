@@ -9,7 +9,13 @@ import pandas as pd
 import pytest
 
 from scenes.evidence.benchmarks.coupled_zones import row_of_zones
-from scenes.evidence.validation.energyplus_twin import ABSORBED, INCIDENT, SUN, with_their_sun
+from scenes.evidence.validation.energyplus_twin import (
+    ABSORBED,
+    INCIDENT,
+    SUN,
+    sky_seen,
+    with_their_sun,
+)
 from scenes.heat.study_file import read_study
 from scenes.room.zone import RoomZone
 from tests.conftest import REPOSITORY
@@ -61,3 +67,22 @@ def test_a_room_has_their_sums_spread_as_ours():
     others = [k for k in range(walls) if k != outdoor[0]]
     np.testing.assert_allclose(got.facade[:, others], 1.0)
     assert found.gains["incident_w"] == pytest.approx([60.0, 100.0, 8.0])
+
+
+def test_their_share_of_the_sky_is_the_mean_of_a_surface_s_parts():
+    (zone,) = row_of_zones(1)
+    room = RoomZone(
+        None, SimpleNamespace(zone=zone), None, {}, None, None, None, None, None
+    )  # fmt: skip
+    (at,) = [k for k, s in enumerate(zone.surfaces) if s.outside == "outdoor"][:1]
+    half = 0.5 * (1.0 + zone.surfaces[at].normal[2])
+    listed = (
+        "! <HeatTransfer Surface>,Surface Name,Area (Net) {m2},ViewFactorToSky-IR\n"
+        f"HeatTransfer Surface,Z0 S{at}.0,3.0,{0.2 * half}\n"
+        f"HeatTransfer Surface,Z0 S{at}.1,1.0,{1.0 * half}\n"
+        "HeatTransfer Surface,Z0 W0,4.5,0.25\nHeatTransfer Surface,Z0 W0 FRAME,1.0,0.1\n"
+        f"HeatTransfer Surface,Z01 S{at},9.0,0.0\n"
+    )
+    found = sky_seen("Z0", room, listed)
+    assert list(found["sky seen E+"]) == pytest.approx([0.4, 0.5])
+    assert list(found["sky seen"]) == [1.0, 1.0]

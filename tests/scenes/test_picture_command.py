@@ -28,6 +28,22 @@ def test_one_picture_in_every_format(tmp_path, capsys):
     assert exact.max() > 500 and files[2].stat().st_size > 10_000
 
 
+def test_a_colour_picture_has_three_bands_and_the_same_luminance(tmp_path):
+    from mitsuba_cfs.images.exr import read_exr
+    from mitsuba_cfs.images.hdr import luminance
+
+    call = ["picture", "--at", "06-21 12:30", "--size", "32", "--samples", "4"]
+    grey, colour = tmp_path / "grey.exr", tmp_path / "colour.exr"
+    assert cli.run([*call, "--out", str(grey)]) == 0
+    picture = ["--out", str(tmp_path / "colour.png")]
+    assert cli.run([*call, "--colour", "--out", str(colour), *picture]) == 0
+    pixels = read_exr(colour)[0]
+    assert pixels.shape == (32, 32, 3)
+    assert luminance(pixels) == pytest.approx(read_exr(grey)[0], rel=1e-4)
+    lit = pixels[pixels[..., 1] > 0]
+    assert np.ptp(lit[:, 2] / lit[:, 0]) > 0.2, "sky and sunlit ground have one colour"
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -34,8 +34,9 @@ PANES = (CLEAR | {"gap": {"width": 0.012}}, CLEAR)
 def test_case_of_the_standard_reads(file: Path, tmp_path: Path) -> None:
     (tmp_path / ashrae140_studies.WEATHER).write_text("")
     study = read_study(Path(shutil.copy(file, tmp_path)))
-    floating = file.stem.endswith("FF")
-    assert (study.loads.heating_c is None) == floating and study.terrain == "country"
+    unheated, uncooled = (file.stem[1:].startswith("50"), file.stem.endswith("FF"))
+    assert (study.loads.heating_c is None) == (unheated or uncooled)
+    assert (study.loads.cooling_c is None) == uncooled and study.terrain == "country"
     assert study.system[0].bsdf is None
 
 
@@ -103,7 +104,10 @@ def test_cases_of_the_standard_lie_in_the_range_of_its_programs(reference_data, 
     if not (reference / RANGES).is_file():
         pytest.skip("ASHRAE 140's figures (../shared/reference/ashrae140) are not here")
     found = ashrae140_studies.compare(reference, tmp_path)
-    assert len(found) == 14 and found["inside"].all(), found
+    assert len(found) == 60
+    outside = found[~found["inside"]]  # docs/validation.md says so
+    assert set(outside["case"]) <= {"610", "950"} and set(outside["output"]) <= {"cooling"}
+    assert (outside["ours"] < 1.03 * outside["high"]).all(), outside
 
 
 @pytest.mark.slow

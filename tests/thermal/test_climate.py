@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.thermal.rooms import box
+from thermal.blackbox import Fenestration
 from thermal.climate import SIGMA, sky_temperature, to_steps, undisturbed_ground
 from thermal.convection import local_wind_factor
 from thermal.network import network
@@ -31,6 +34,20 @@ def test_ground_is_damped_and_late():
     assert np.ptp(ground) / 2 == pytest.approx(12.0 * np.exp(-decay), rel=1e-3)
     late = (np.argmin(ground) - np.argmin(outdoor)) / 24
     assert late == pytest.approx(decay / (2 * np.pi) * 365, abs=0.5)
+
+
+def test_walls_windows_and_frames_see_their_own_share_of_the_sky():
+    glass = Fenestration("glass", 1.2)
+    zone = box(window=glass)
+    (window,) = zone.windows
+    hidden = replace(window, frame_area=0.4, sky_seen=0.25)
+    wall = replace(zone.surfaces[0], sky_seen=0.5)
+    zone = replace(zone, surfaces=(wall, *zone.surfaces[1:]), windows=(hidden,))
+    net = network([zone], step_s=600.0, terrain="suburbs", cell=0.02, link=np.zeros((1, 1)))
+    half = np.array([0.5**1.5, 0.5 - 0.5**1.5])
+    for face, seen in ((0, 0.5), (1, 1.0), (6, 0.25), (7, 0.25)):
+        expected = [*half * seen, 1.0 - 0.5 * seen]
+        np.testing.assert_allclose(net.faces.hemisphere[face], expected)
 
 
 def test_forced_film_takes_the_local_wind_to_its_power():

@@ -48,6 +48,14 @@ def test_hemisphere_shares_sum_to_one():
     assert (sky, air, ground) == pytest.approx((0.5**1.5, 0.5 - 0.5**1.5, 0.5))
 
 
+def test_what_hides_the_sky_counts_with_the_ground():
+    sky, air, below = outside_factors(0.0, 0.6)
+    assert (sky, air) == pytest.approx((0.6 * 0.5**1.5, 0.6 * (0.5 - 0.5**1.5)))
+    assert sky + air + below == pytest.approx(1.0)
+    assert outside_factors(1.0, 0.25) == pytest.approx((0.25, 0.0, 0.75))
+    assert outside_factors(-1.0, 0.25) == pytest.approx((0.0, 0.0, 1.0))
+
+
 def test_films_know_up_and_down():
     # EQUATIONS.md 5.1: 1.520 unstable, 0.760 stable, 1.31 vertical
     assert tarp_inside(21.0, 20.0, -1.0) == pytest.approx(1.520, abs=1e-3)

@@ -10,7 +10,7 @@ import pytest
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 
 from . import rooms
 
@@ -326,3 +326,31 @@ def test_the_reveal_between_panes_and_a_screen_lights_the_screen():
     total = expected.values.sum()
     assert error < 0.003 * total  # the reveal gives a quarter
     assert abs(found.values.sum() - total) < 4 * error
+
+
+def test_a_sensor_of_several_places_is_their_mean(variant):
+    from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
+
+    corners = np.array([(-50, -2, 1), (50, -2, 1), (50, 50, 1), (-50, 50, 1)], dtype=float)
+    roof = Surfaces(corners[[[0, 1, 2], [0, 2, 3]]], np.zeros(2), np.zeros(2, dtype=int))
+    places = np.array([[[0, -4, 0], [0, -1, 0]], [[0, -2, 0], [9, -3, 0]]], dtype=float)
+    together, apart = (
+        sky_irradiance_matrix(roof, p, np.full((len(p), 3), UP), subdivision=1, samples=65536)
+        for p in (places, places.reshape(4, 3))
+    )
+    mean = apart.values.reshape(2, 2, -1).mean(axis=1)
+    assert together.values.sum(axis=1) == pytest.approx(mean.sum(axis=1), rel=0.003)
+    np.testing.assert_allclose(together.values, mean, atol=0.002)
+
+
+def test_batches_of_few_paths_go_on_to_the_next_places(variant):
+    from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
+    from mitsuba_cfs.trace.estimate import Stopping
+
+    corners = np.array([(-1e4, 0, 1), (1e4, 0, 1), (1e4, 1e4, 1), (-1e4, 1e4, 1)], dtype=float)
+    roof = Surfaces(corners[[[0, 1, 2], [0, 2, 3]]], np.zeros(2), np.zeros(2, dtype=int))
+    places = np.array([[[0, -5e3, 0], [0, 5e3, 0]]], dtype=float)  # free, and below the roof
+    found = sky_irradiance_matrix(
+        roof, places, [UP], subdivision=1, samples=1, stopping=Stopping(batches=32)
+    )
+    assert found.values.sum() == pytest.approx(np.pi / 2, rel=0.01)

@@ -105,3 +105,39 @@ def test_person_beside_a_wall_sees_it_most(variant):
     assert near.argmax() == 4
     with pytest.raises(ValueError, match="horizontal"):
         person_view_factors(box_parts(), [2, 2, 2], [0, 0, 1])
+
+
+def plate(width: float, depth: float, height: float) -> Surfaces:
+    """A level plate over the plane y = 0, standing out towards -y."""
+    corners = [(-width, 0, height), (width, 0, height), (width, -depth, height)]
+    corners.append((-width, -depth, height))
+    triangles = np.array(corners, dtype=float)[[[0, 1, 2], [0, 2, 3]]]
+    return Surfaces(triangles, np.full(2, 0.9), np.zeros(2, dtype=int))
+
+
+def test_the_sky_below_a_long_overhang(variant):
+    from mitsuba_cfs.trace.view_factors import sky_shares
+
+    depth, down = 1.5, np.array([0.2, 0.8, 1.7, 2.9])
+    places = np.stack([0 * down, 0 * down - 1e-3, 3.0 - down], axis=1)
+    found = sky_shares(
+        plate(2e3, depth, 3.0), places[:, None], [[0, -1, 0]] * 4, samples=2**15, seed=3
+    )
+    # the edge stands at the angle phi over the horizon: of the half space's sky, sin phi is seen
+    expected = down / np.hypot(down, depth)
+    assert found == pytest.approx(expected, abs=0.008)
+    both = sky_shares(plate(2e3, depth, 3.0), places[None], [[0, -1, 0]], samples=2**15)
+    assert both == pytest.approx([expected.mean()], abs=0.005)
+
+
+def test_the_sky_of_planes_that_nothing_hides(variant):
+    from mitsuba_cfs.trace.view_factors import sky_shares
+
+    below = plate(5.0, 5.0, -1.0)  # lies under them, and hides no sky
+    up, down, south = [0, 0, 1], [0, 0, -1], [0, -1, 0]
+    shares = sky_shares(below, np.zeros((3, 1, 3)), [up, down, south])
+    np.testing.assert_array_equal(shares, 1.0)
+    covered = sky_shares(plate(1e4, 1e4, 1.0), np.array([[[0, -5e3, 0]]]), [up])
+    assert covered == pytest.approx(0.0, abs=1e-3)
+    none = Surfaces.none()
+    np.testing.assert_array_equal(sky_shares(none, np.zeros((1, 2, 3)), [south]), 1.0)

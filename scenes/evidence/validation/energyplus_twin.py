@@ -5,7 +5,9 @@
 Each study runs by `cfs thermal STUDY.toml --energyplus`; EnergyPlus then runs the model that this
 has written, with the study's own weather file.  With `--their-sun` our balance is solved again with
 EnergyPlus' sun in every hour: on the outer walls, in the window layers by what falls on the glass,
-and indoors what the room's surfaces absorb.  What still differs then is not the sun's.
+and indoors what the room's surfaces absorb.  What still differs then is not the sun's.  With
+`--open-sky` it is solved again as if nothing hid the sky from the outer faces' longwave, and the
+share of the sky that each face sees stands beside EnergyPlus' own.
 """
 
 from __future__ import annotations
@@ -40,10 +42,12 @@ ABSORBED = "Surface Inside Face Solar Radiation Heat Gain Rate"
 SUMS = {"incident_w": "sun on", "transmitted_w": "sun in", "absorbed_room_w": "sun kept"}
 
 
-def compared(path: Path, folder: Path, *, their_sun: bool = False) -> list[pd.DataFrame]:
-    """Air [K] and loads [kWh] of every room of a study, ours and EnergyPlus'.
+def compared(
+    path: Path, folder: Path, *, their_sun: bool = False, open_sky: bool = False
+) -> dict[str, pd.DataFrame]:
+    """Air [K] and loads [kWh] of every room of a study, ours and EnergyPlus', by what ours has.
 
-    Args: their_sun: a second table, of ours with EnergyPlus' sun.
+    Args: their_sun: a table of ours with EnergyPlus' sun; open_sky: one of ours with a free sky.
     """
     study = read_study(path)
     kept: list[BalancedRooms] = []
@@ -51,18 +55,62 @@ def compared(path: Path, folder: Path, *, their_sun: bool = False) -> list[pd.Da
     found = kept[0]
     twin = energyplus_twin(study, found)
     folder.mkdir(parents=True, exist_ok=True)
+    twin.model["Output:Surfaces:List"] = {"seen": {"report_type": "Details"}}
     model, *_ = twin.write(folder)
     theirs = run_written(model, study.weather)
-    tables = [_rows(twin.zones, found, theirs)]
-    if their_sun:
-        pairs = zip(twin.zones, found.rooms, strict=True)
-        rooms = [with_their_sun(zone, room, theirs) for zone, room in pairs]
+
+    def again(rooms: list[RoomZone]) -> pd.DataFrame:
         results = balances(
             rooms, found.weather, study.options.heat_step_s,
             air_links=found.air_links, transfers=found.transfers, terrain=study.terrain,
         )  # fmt: skip
-        tables.append(_rows(twin.zones, replace(found, rooms=rooms, results=results), theirs))
+        return _rows(twin.zones, replace(found, rooms=rooms, results=results), theirs)
+
+    tables = {"ours": _rows(twin.zones, found, theirs)}
+    if open_sky:
+        named = zip(twin.zones, found.rooms, strict=True)
+        listed = (folder / "eplusout.eio").read_text()
+        tables["sky seen"] = pd.concat([sky_seen(zone, room, listed) for zone, room in named])
+        tables["ours under an open sky"] = again([under_open_sky(room) for room in found.rooms])
+    if their_sun:
+        pairs = zip(twin.zones, found.rooms, strict=True)
+        tables["ours with EnergyPlus' sun"] = again(
+            [with_their_sun(zone, room, theirs) for zone, room in pairs]
+        )
     return tables
+
+
+def under_open_sky(room: RoomZone) -> RoomZone:
+    """A room from whose outer faces nothing hides the sky."""
+    zone = room.zone
+    surfaces = tuple(replace(one, sky_seen=1.0) for one in zone.surfaces)
+    windows = tuple(replace(one, sky_seen=1.0) for one in zone.windows)
+    free = replace(zone, surfaces=surfaces, windows=windows)
+    return replace(room, room=replace(room.room, zone=free))
+
+
+def sky_seen(zone: str, room: RoomZone, listed: str) -> pd.DataFrame:
+    """Shares of the sky that a room's outer faces see, ours and EnergyPlus'.
+
+    Args: listed: EnergyPlus' list of surfaces (`eplusout.eio`).
+    """
+    lines = [line.split(",") for line in listed.splitlines() if "<HeatTransfer Surface>" in line]
+    (head,) = ([name.strip() for name in line] for line in lines)
+    number = {name.split(" {")[0]: k for k, name in enumerate(head)}
+    parts = [line.split(",") for line in listed.splitlines() if line.startswith("HeatTransfer S")]
+    walls = {f"S{k}": one for k, one in enumerate(room.zone.surfaces) if one.outside == "outdoor"}
+    glass = {f"W{k}": one for k, one in enumerate(room.zone.windows)}
+    rows = []
+    for key, one in (walls | glass).items():
+        name, half = shouted(f"{zone} {key}"), 0.5 * (1.0 + one.normal[2])
+        mine = [part for part in parts if part[1].split(".")[0] == name]
+        area = [float(part[number["Area (Net)"]]) for part in mine]
+        seen = [float(part[number["ViewFactorToSky-IR"]]) / half for part in mine]
+        if mine:
+            theirs = float(np.average(seen, weights=area))
+            rows.append({"room": zone, "face": one.name, "area": one.area,
+                         "sky seen": one.sky_seen, "sky seen E+": theirs})  # fmt: skip
+    return pd.DataFrame(rows).set_index("room")
 
 
 def their_sums(zone: str, room: RoomZone, theirs: pd.DataFrame) -> dict[str, Hours]:
@@ -149,11 +197,14 @@ def main(words: list[str] | None = None) -> None:
     parser.add_argument("studies", type=Path, nargs="+")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--their-sun", action="store_true", help="ours with EnergyPlus' sun too")
+    parser.add_argument("--open-sky", action="store_true", help="ours with nothing before the sky")
     chosen = parser.parse_args(words)
     for path in chosen.studies:
-        tables = compared(path, chosen.out / path.stem, their_sun=chosen.their_sun)
-        for table, title in zip(tables, ("", ", ours with EnergyPlus' sun"), strict=False):
-            sys.stdout.write(f"{path.name}{title}\n{table.round(2).to_string()}\n")
+        tables = compared(
+            path, chosen.out / path.stem, their_sun=chosen.their_sun, open_sky=chosen.open_sky
+        )
+        for title, table in tables.items():
+            sys.stdout.write(f"{path.name}, {title}\n{table.round(2).to_string()}\n")
 
 
 if __name__ == "__main__":

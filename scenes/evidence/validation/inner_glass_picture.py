@@ -21,6 +21,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import OPEN
@@ -94,7 +95,7 @@ def by_rpict(write: Writer, view: View, folder: Path) -> NDArray[np.float64]:
 
 
 def parts(scene: DaylightScene) -> dict[str, NDArray[np.bool_]]:
-    """Which pixels [ny, nx] see what first."""
+    """Which pixels [ny, nx] see what first; those beside the glass' edge see both and are none."""
     panes = np.concatenate([w.triangles for g in _inner(scene) for w in g.windows])
     own = np.concatenate([scene.interior.triangles, panes])
     directions, inside = pixel_directions(scene.view)
@@ -107,7 +108,9 @@ def parts(scene: DaylightScene) -> dict[str, NDArray[np.bool_]]:
     glass = seen & (hit >= len(scene.interior.triangles))
     flats = seen & ~glass & level[hit]
     found = (glass, flats & (flat[:, 2] < 0), flats & (flat[:, 2] > 0), seen & ~glass & ~flats)
-    return {name: mask.reshape(shape) for name, mask in zip(PARTS, found, strict=True)}
+    beside = binary_dilation(glass.reshape(shape), np.ones((3, 3)))
+    masks = {name: mask.reshape(shape) for name, mask in zip(PARTS, found, strict=True)}
+    return {name: mask if name == "glass" else mask & ~beside for name, mask in masks.items()}
 
 
 def show(pictures: dict[str, NDArray[np.float64]], path: Path) -> None:

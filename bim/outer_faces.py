@@ -1,0 +1,135 @@
+"""Where the outer faces of a room's walls are: beyond the elements that the walls are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Building, Element, Space
+from bim.rays import ray_mesh
+from bim.to_thermal import ThermalRoom
+from mitsuba_cfs.surfaces import points_on_triangles
+
+DEEPEST_WALL = 1.2  # [m] from its face in the room
+TOUCHING = 0.05  # [m] wider gaps are outdoors: no cladding lies beyond them
+OFF_THE_WALL = 0.02  # [m] sensors stand this far before the outer face
+PLACES = 64  # on each surface, a power of two
+MOST_STEPS = 24  # surfaces that a ray is followed through
+ROBERTS = 0.7548776662466927, 0.5698402909980532  # steps of his low-discrepancy sequence R2
+
+
+@dataclass(frozen=True, slots=True)
+class OuterFaces:
+    """Places just before the outer faces of what of a room faces outdoors."""
+
+    surfaces: NDArray[np.int64]  # [N] of the zone
+    points: NDArray[np.float64]  # [N, PLACES, 3] spread evenly over each surface [m]
+    normals: NDArray[np.float64]  # [N, 3]
+    depth: NDArray[np.float64]  # [N] of the outer face behind that in the room, in the middle [m]
+    windows: NDArray[np.float64]  # [W, PLACES, 3] before the glass [m]
+    window_normals: NDArray[np.float64]  # [W, 3]
+
+
+def outer_faces(building: Building, space: Space, room: ThermalRoom) -> OuterFaces:
+    """The outer faces of a room's surfaces and windows.
+
+    A face in the room is followed outwards through the element that it belongs to, or by the
+    thickness of its layers where nothing of that element is drawn, and on through what touches it.
+    """
+    walls = _NearElements(building.elements, space)
+    points, depths = [], []
+    for number in room.outdoor:
+        faces = [f for f, at in zip(space.faces, room.surface_of_face, strict=True) if at == number]
+        counts = [len(face.triangles) for face in faces]
+        inner, triangle = _places(np.concatenate([face.triangles for face in faces]))
+        of = np.repeat(np.arange(len(faces)), counts)[triangle]
+        thickness = np.array([face.construction.thickness for face in faces])[of]
+        element = [faces[i].element for i in of]
+        normal = room.zone.surfaces[number].normal
+        deep = walls.depth(inner, normal, element, thickness)
+        points.append(inner + (deep + OFF_THE_WALL)[:, None] * normal)
+        depths.append(float(np.median(deep)))
+    glass = [
+        _places(window.triangles)[0] + OFF_THE_WALL / 2 * window.normal for window in space.windows
+    ]
+    return OuterFaces(
+        room.outdoor,
+        np.array(points).reshape(-1, PLACES, 3),
+        np.array([room.zone.surfaces[i].normal for i in room.outdoor]).reshape(-1, 3),
+        np.array(depths),
+        np.array(glass).reshape(-1, PLACES, 3),
+        np.array([window.normal for window in space.windows]).reshape(-1, 3),
+    )
+
+
+def _places(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points [PLACES, 3] spread over triangles by area, and the triangle of each."""
+    u = (0.5 + np.arange(PLACES)[:, None] * ROBERTS) % 1.0
+    return points_on_triangles(triangles, u)
+
+
+class _NearElements:
+    """What stands about a room, to follow rays through."""
+
+    def __init__(self, elements: Sequence[Element], space: Space) -> None:
+        corners = space.shell.reshape(-1, 3)
+        low, high = corners.min(axis=0) - DEEPEST_WALL, corners.max(axis=0) + DEEPEST_WALL
+        near = [
+            element
+            for element in elements
+            if np.all(element.triangles.min(axis=(0, 1)) <= high)
+            and np.all(element.triangles.max(axis=(0, 1)) >= low)
+        ]
+        none = np.empty((0, 3, 3))
+        triangles = np.concatenate([none, *(element.triangles for element in near)])
+        self.mesh = ray_mesh(triangles)
+        self.normals = np.cross(
+            triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+        )
+        counts = [len(element.triangles) for element in near]
+        self.guids = np.repeat([element.guid for element in near], counts)
+
+    def depth(
+        self,
+        points: NDArray[np.float64],
+        normal: NDArray[np.float64],
+        element: Sequence[str | None],
+        thickness: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """How far [n] along the normal the last of the wall lies behind points in the room [m].
+
+        Args: element: GUID of the wall at each point; thickness: [n] of its layers [m].
+        """
+        met = self._met(points, normal)
+        own = np.array([guid or "" for guid in element])
+        deep = np.zeros(len(points))
+        for distance, triangle in met:
+            here = (triangle >= 0) & (self.guids[triangle] == own)
+            deep[here] = distance[here]
+        deep = np.where(deep > 0, deep, thickness)
+        going = np.ones(len(points), dtype=bool)
+        for distance, triangle in met:
+            further = (triangle >= 0) & (distance > deep + 1e-6)
+            leaving = self.normals[triangle] @ normal > 0  # a solid that began before
+            going &= ~further | leaving | (distance <= deep + TOUCHING)
+            deep = np.where(further & going, distance, deep)
+        return deep
+
+    def _met(
+        self, points: NDArray[np.float64], normal: NDArray[np.float64]
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]]:
+        """Distances [n] and triangles [n] (-1: none) that rays along the normal meet, in turn."""
+        found: list[tuple[NDArray[np.float64], NDArray[np.int64]]] = []
+        rays, t = np.broadcast_to(normal, points.shape), np.zeros(len(points))
+        for _ in range(MOST_STEPS):
+            step, triangle = self.mesh.first_hits(points + t[:, None] * normal, rays)
+            triangle = np.where(t + step <= DEEPEST_WALL, triangle, -1)
+            if np.all(triangle < 0):
+                break
+            t = np.where(triangle >= 0, t + step, DEEPEST_WALL)
+            found.append((t.copy(), triangle))
+            t = t + 1e-5
+        return found

@@ -1,0 +1,150 @@
+"""Colour of a picture: the hour's sun, sky and ground in three bands, and what they colour.
+
+Colours are linear sRGB over luminance: neutral is (1, 1, 1).  The hour is balanced: what reflects
+all bands alike is neutral under its whole daylight on a horizontal plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs.bsdf.colour import WHITE, relative_rgb
+from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
+from mitsuba_cfs.methods.path_light import PathSystems
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.trace.lit_room import Sky
+from mitsuba_cfs.trace.picture_paths import colour_picture
+
+FEWER = 8  # paths of the luminance for one of a band: colour varies less than light
+OVERCAST_K = 6514.0  # correlated colour temperature of an overcast sky
+LEAST_K, MOST_K = 4000.0, 25000.0  # that CIE's daylight is defined for
+NANOMETRES = np.arange(380.0, 781.0, 5.0)
+# Of the standard spectra of ASTM G173-03
+WATER_CM, OZONE_CM, AEROSOL_500NM, PRESSURE_PA = 1.42, 0.34, 0.084, 101325.0
+LOWEST_SUN = 0.05  # sine of the altitude below which its colour stays as there (87 degrees zenith)
+
+
+@dataclass(frozen=True, slots=True)
+class DaylightColour:
+    """Colours of an hour's daylight, balanced."""
+
+    sun: NDArray[np.float64]  # [3]
+    patches: NDArray[np.float64]  # [P, 3] the ground first
+
+
+def daylight_colour(sky: AnnualSky, hour: int) -> DaylightColour:
+    """The colours of sun, ground and sky in one of the hours L.
+
+    The sky's correlated colour temperature follows its luminance where it is clear and is 6514 K
+    where it is overcast; between, reciprocal temperatures are mixed by the beam's share of the
+    horizontal illuminance (our choice).  The sun is its beam through ASTM G173's atmosphere; the
+    ground is grey under both.
+
+    Source: Chain, Dumortier, Fontoynont 1999, Solar Energy 65, 285-295, as quoted by
+    frudawski.de/specsky; Bird and Riordan 1986 (`pvlib.spectrum.spectrl2`).
+    """
+    luminance = np.asarray(sky.without_sun(hour), dtype=float)
+    weights = _sky_of(len(luminance)).horizontal_weights
+    height = max(float(sky.direction[hour][2]), 0.0)
+    beam, diffuse = float(sky.illuminance[hour]) * height, luminance * weights
+    share = beam / max(beam + diffuse.sum(), 1e-9)
+    sun = sun_colour(height)
+    patches = daylight_rgb(sky_temperature(luminance, share))
+    whole = beam * sun + diffuse @ patches
+    white = whole / np.maximum(whole @ np.asarray(LUMINANCE_WEIGHTS), 1e-9)
+    patches[0] = white  # the ground
+    return DaylightColour(sun / white, patches / white)
+
+
+def sky_temperature(luminance: ArrayLike, clear: float) -> NDArray[np.float64]:
+    """Correlated colour temperature of sky of a luminance [cd/m2] [K]; clear: 0 overcast to 1."""
+    mired = -132.1 + 59.77 * np.log10(np.maximum(np.asarray(luminance, dtype=float), 1.0))
+    mixed = clear * np.clip(mired, 1e6 / MOST_K, 1e6 / LEAST_K) + (1 - clear) * 1e6 / OVERCAST_K
+    return 1e6 / mixed
+
+
+def daylight_rgb(temperature: ArrayLike) -> NDArray[np.float64]:
+    """Linear sRGB over luminance [..., 3] of CIE daylight of a colour temperature [K]."""
+    from colour.temperature import CCT_to_xy_CIE_D  # a second, which only colour takes
+
+    x, y = np.moveaxis(np.asarray(CCT_to_xy_CIE_D(np.asarray(temperature))), -1, 0)
+    return _rgb(x / y, (1 - x - y) / y)
+
+
+def sun_colour(height: float) -> NDArray[np.float64]:
+    """Linear sRGB over luminance [3] of the sun's beam, by the sine of its altitude."""
+    import colour
+    import pvlib
+
+    zenith = float(np.degrees(np.arccos(np.clip(height, LOWEST_SUN, 1.0))))
+    found = pvlib.spectrum.spectrl2(
+        apparent_zenith=zenith, aoi=zenith, surface_tilt=0.0, ground_albedo=0.2,
+        surface_pressure=PRESSURE_PA, precipitable_water=WATER_CM, ozone=OZONE_CM,
+        relative_airmass=pvlib.atmosphere.get_relative_airmass(zenith),
+        aerosol_turbidity_500nm=AEROSOL_500NM, dayofyear=1,
+    )  # fmt: skip
+    beam = np.interp(NANOMETRES, found["wavelength"], np.ravel(found["dni"]))
+    shape = colour.SpectralShape(NANOMETRES[0], NANOMETRES[-1], 5)
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
+    x, y, z = beam @ observer.values
+    return _rgb(x / y, z / y)
+
+
+def _rgb(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
+    """Linear sRGB over luminance of X / Y and Z / Y."""
+    x, z = np.asarray(x) / WHITE[0], np.asarray(z) / WHITE[2]
+    return relative_rgb(x, np.ones_like(x), z)
+
+
+def _sky_of(patches: int) -> ReinhartSky:
+    return next(sky for mf in (1, 2, 4, 6) if (sky := ReinhartSky(mf)).size == patches)
+
+
+def coloured_picture(
+    luminance: NDArray[np.float32],
+    bands: Sequence[PathSystems],
+    sky: AnnualSky,
+    hour: int,
+    *,
+    progress: Progress = silent,
+) -> NDArray[np.float32]:
+    """Radiance [ny, nx, 3] of a luminance picture [cd/m2] of one hour, in its colours.
+
+    Each pixel keeps its luminance; its colour is that of three bands traced with an eighth of the
+    paths each, which share their random numbers.
+
+    Args: bands: the scene with its view by red, green and blue, with the same systems.
+    """
+    shade = daylight_colour(sky, hour)
+    patches, towards = np.asarray(sky.without_sun(hour)), sky.direction[hour]
+    disc = float(sky.illuminance[hour]) / SUN_SOLID_ANGLE
+    skies = [Sky(patches * shade.patches[:, c], towards, disc * shade.sun[c]) for c in range(3)]
+    chosen, view = bands[0].sampling, bands[0].scene.view
+    if view is None:
+        raise ValueError("a picture needs the scene's view")
+    rooms = [band.room([0] * len(band.systems)) for band in bands]
+    rgb = colour_picture(
+        rooms, skies, view,
+        samples=max(chosen.picture_samples // FEWER, 1), seed=chosen.seed, progress=progress,
+    )  # fmt: skip
+    return with_luminance(rgb, luminance)
+
+
+def with_luminance(
+    rgb: NDArray[np.floating], luminance: NDArray[np.floating]
+) -> NDArray[np.float32]:
+    """Radiance [ny, nx, 3] of the colours of one picture and the luminance [cd/m2] of another.
+
+    What is black in the first is grey.
+    """
+    own = rgb @ np.asarray(LUMINANCE_WEIGHTS)
+    lit = own > 0
+    tint = np.where(lit[..., None], rgb / np.where(lit, own, 1.0)[..., None], 1.0)
+    return (tint * luminance[..., None] / EFFICACY).astype(np.float32)

@@ -1,0 +1,81 @@
+"""Sentences that other parts of the program made in English, in the page's language.
+
+What a building's file lacks is said where it is read, long before there is a page, and files and
+logs keep it in English.  The texts below have fields for what differs; a sentence that fits none
+stays as it is.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+from scenes.language.catalogue import decimal, said
+
+LISTS = {"reasons": "; ", "storeys": ", "}  # fields that hold several such sentences
+WORDS = ("verdict", "names", "name", "system", "source", "band", "other", "model", "file", "site")
+NUMBER = r"[\d.]+(?: %)?"  # what the other fields hold
+FIELD = re.compile(r"\\\{(\w+)\\\}")
+HEARD = (
+    "usable", "usable with care", "not usable", "no rooms", "no glass looks out",
+    "rooms found from geometry",
+    "Model: {verdict}: {reasons}",
+    "usable with care: {reasons}", "not usable: {reasons}",
+    "THE FILE IS CUT OFF at its end: an unknown part of the building is lost",
+    "only {share} of the glass that looks out is used",
+    "{share} of the glass that looks out is used",
+    "{area} m2 of glass assumed", "{area} m2 transparent but no glass",
+    "{area} m2 openings without a window closed", "{some} of {all} spaces are no rooms",
+    "{count} pairs of spaces overlap", "{count} rooms with open edges",
+    "{count} found from geometry ({storeys})", "{some} of {all} spaces ({storeys})",
+    "{used} of {all} m2 that looks out used ({share}; {some} of {every} windows)",
+    "{area} m2 assumed", "{area} m2 above rooms that are too low", "{area} m2 with no room behind",
+    "storey {name} has no rooms and {area} m2 of glass unused",
+    "{name} {some} of {all}", "{names} and {count} more",
+    "Windows {names}: {system}, from {source}.", "Window {names}: {system}, from {source}.",
+    "{name}: no BSDF, a clear glazing of {panes} pane(s) after Roos et al. 2001.",
+    "{name}: solar transmittance {tau} from U and g (Arasteh et al. 2009).",
+    "{name} has no {band} band: its {other} band stands in for it.",
+    "{name}: window model: {model}.",
+    "--cfs fills the windows: [[system]] of {file} is not used.",
+    "{name} holds several shading states; without --operation the first of each window ({names}) "
+    "holds all year.",
+    "The building's site ({north} N, {east} E) is far from the weather station {site} "
+    "({other_north} N, {other_east} E): the sun is the weather station's.",
+)  # fmt: skip
+
+
+@cache
+def _patterns() -> tuple[tuple[re.Pattern[str], str], ...]:
+    found = []
+    for text in HEARD:
+        found.append((re.compile(FIELD.sub(_group, re.escape(text))), text))
+    return tuple(found)
+
+
+def _group(field: re.Match[str]) -> str:
+    name = field[1]
+    return f"(?P<{name}>{'.+?' if name in WORDS or name in LISTS else NUMBER})"
+
+
+def heard(text: str) -> str:
+    """A sentence in the page's language; as it is where no text of `HEARD` fits it."""
+    for pattern, key in _patterns():
+        fits = pattern.fullmatch(text)
+        if fits:
+            return said(key, **{name: _field(name, v) for name, v in fits.groupdict().items()})
+    return text
+
+
+def heard_list(text: str, separator: str) -> str:
+    """A sentence, or several in a row, in the page's language."""
+    whole = heard(text)
+    return separator.join(map(heard, text.split(separator))) if whole == text else whole
+
+
+def _field(name: str, value: str) -> str:
+    if name in LISTS:
+        return LISTS[name].join(map(heard, value.split(LISTS[name])))
+    if name == "verdict":
+        return heard(value)
+    return value if name in WORDS else decimal(value)
