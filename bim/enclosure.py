@@ -30,6 +30,7 @@ SMALLEST_ROOM = 2.0  # smaller voids are cavities and shafts [m3]
 LOWEST_ROOM = 1.5  # lower ones are no rooms either [m]
 MOST_TRIANGLES = 120  # elements with more are united as they are: widening takes a second each
 MOST_WIDENED = 20_000  # triangles of all that are not convex, biggest first: a minute on one core
+THICKEST_WALL = 0.6  # a body that is no thicker may be filled where its surface is open [m]
 LARGEST_VOID = 5_000  # triangles; a void with more is not widened back, so that its room is smaller
 LIMIT_S = 180.0  # the search for rooms is stopped then
 
@@ -41,6 +42,7 @@ class Enclosed:
     rooms: tuple[NDArray[np.float64], ...]  # triangles [N, 3, 3] of each, biggest first
     not_widened: int = 0  # elements united as they are: gaps beside them stay open
     kept_small: int = 0  # rooms that end half a gap before their walls
+    hulls: int = 0  # flat elements without a closed body: their convex hulls
 
 
 def rooms_enclosed_by(
@@ -57,14 +59,16 @@ def rooms_enclosed_by(
     turn = main_wall_direction(np.concatenate(elements)) if len(elements) else np.eye(3)
     back = np.linalg.inv(turn)
     cube = manifold3d.Manifold.cube((gap, gap, gap), True)
-    turned, wide, spent, not_widened = {}, {}, 0, 0
+    turned, wide, spent, not_widened, hulls = {}, {}, 0, 0, 0
     areas = [np.linalg.norm(area_vectors(element), axis=1).sum() for element in elements]
     for index in np.argsort(-np.nan_to_num(areas), kind="stable"):
         tell(f"{index} {len(elements)}")
         solid = solid_of(elements[index])
-        if solid is None:
+        body = _flat_hull(elements[index]) if solid is None else solid.manifold
+        if body is None:
             continue
-        own = turned[index] = _turned(solid.manifold, turn)
+        hulls += solid is None
+        own = turned[index] = _turned(body, turn)
         spent += _work_to_widen(own)
         wide[index] = _widened(own, cube) if spent <= MOST_WIDENED else own
         not_widened += spent > MOST_WIDENED
@@ -88,7 +92,7 @@ def rooms_enclosed_by(
         rooms += [piece for piece in room.decompose() if _is_room(piece)]
     rooms.sort(key=lambda room: -room.volume())
     found = (triangles_of(_turned(room, back).as_original())[0] for room in rooms)
-    return Enclosed(tuple(found), not_widened, kept_small)
+    return Enclosed(tuple(found), not_widened, kept_small, hulls)
 
 
 def first_rooms_enclosed(
@@ -102,6 +106,18 @@ def first_rooms_enclosed(
         if found.rooms:
             return number, found
     return -1, Enclosed(())
+
+
+def _flat_hull(triangles: NDArray[np.float64]) -> manifold3d.Manifold | None:
+    """The convex hull of an open body that is as flat as a wall; None of any other one."""
+    corners = np.unique(triangles.reshape(-1, 3), axis=0)
+    if not np.isfinite(corners).all():
+        return None
+    _, _, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
+    if np.ptp(corners @ axes.T, axis=0).min() > THICKEST_WALL:
+        return None
+    hull = manifold3d.Manifold.hull_points(corners)
+    return hull if hull.volume() > 0 else None
 
 
 def _is_room(solid: manifold3d.Manifold) -> bool:

@@ -141,7 +141,7 @@ def add_on_classes(bpy: Any) -> Sequence[type]:
     props = bpy.props
 
     class CfsSettings(bpy.types.PropertyGroup):
-        __annotations__ = {  # noqa: RUF012: as Blender reads them
+        __annotations__ = {
             "program": props.StringProperty(name="Command", default="cfs"),
             "weather": props.StringProperty(name="Weather (EPW)", subtype="FILE_PATH"),
             "system": props.StringProperty(name="BSDF of all windows", subtype="FILE_PATH"),

@@ -127,6 +127,7 @@ class _Search:
     def _say_what_is_less(self, found: Enclosed) -> None:
         for count, what, done in (
             (found.not_widened, "small elements: too many to be widened", "gaps there stay open"),
+            (found.hulls, "flat element(s) without a closed body", "their hulls bound the rooms"),
             (found.kept_small, "room(s) of too many faces to be widened", "end before their walls"),
         ):
             if count and found.rooms:

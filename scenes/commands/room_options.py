@@ -245,7 +245,8 @@ def view_option(name: str, what: str, *, several: bool) -> Option:
     """`--view` into the parameter `name`."""
     return click.option(
         "--view", name, multiple=several, metavar="'-vta ...'|FILE.vf",
-        help=f"View in Radiance's syntax; {what}, default: the room's middle, to its window.",
+        help=f"View in Radiance's syntax; {what}, default: the room's in an HBJSON file, else "
+        "its middle, to its window.",
     )  # fmt: skip
 
 

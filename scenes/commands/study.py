@@ -85,7 +85,7 @@ def study_to_folder(
     """Compute a study with a progress bar, say what comes out case by case, write its files."""
     from scenes.page_options import StudySection, read_page
 
-    page_options = read_page(page, StudySection)
+    page_options = read_page(page, StudySection, translated=True)
     files = (file, *parsed.files, *page_options.inputs)
     store = _checked(files, parsed, out, scheduler, write_ifc)
     from scenes.commands.compiling import compiled_beside

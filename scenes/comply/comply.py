@@ -42,6 +42,7 @@ from scenes.room.options import RoomOptions
 from scenes.room.room import RoomSimulation, skies_for
 from scenes.run.building import read_building
 from scenes.run.inputs import named_spaces
+from scenes.run.notes import unused_notes
 from scenes.run.rooms import RoomSeries
 
 # the parts of a room's light, as the dossier's last line names their seconds
@@ -104,7 +105,7 @@ def check_rooms(
     return Compliance(
         check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
         check.day, tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
-        tuple(dict.fromkeys([*check.notes, *notes])),
+        tuple(dict.fromkeys([*check.notes, *check.files.weather.notes, *notes])),
         (*building.problems, *view_problems, *problems), check.seconds,
     )  # fmt: skip
 
@@ -131,7 +132,7 @@ class Check:
             self.systems = open_and_closed(systems, files.closed)
         self.building = traced_building(building, self.systems)
         self.notes = [*source_notes(window_sources(windows, self.systems))] if self.lit else []
-        self.notes += [*solar_sentences(self.systems), *files.weather.notes]
+        self.notes += [*unused_notes(building), *solar_sentences(self.systems)]
         self.hidden, self.glass = windows_without_view(windows, self.systems)
         self.calendar = calendar_of(files.weather)
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)

@@ -18,6 +18,7 @@ NUMBER = r"[\d.]+(?: %)?"  # what the other fields hold
 FIELD = re.compile(r"\\\{(\w+)\\\}")
 HEARD = (
     "usable", "usable with care", "not usable", "no rooms", "no glass looks out",
+    "none looks out of a room",
     "rooms found from geometry",
     "Model: {verdict}: {reasons}",
     "usable with care: {reasons}", "not usable: {reasons}",

@@ -16,6 +16,18 @@ def model_notes(building: Building) -> tuple[str, ...]:
     return (*_account_notes(building), *(f"{p.what}: {p.consequence}." for p in told))
 
 
+def unused_notes(building: Building) -> tuple[str, ...]:
+    """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
+    found = [f"{p.what}: {p.consequence}." for p in building.problems if p.kind == NOT_USED]
+    held = {
+        "uses of rooms": building.uses, "sensor grids": building.grids, "views": building.views,
+    }  # fmt: skip
+    counts = [f"{len(some)} {what}" for what, some in held.items() if some]
+    if counts and building.file is not None:
+        found.append(f"{building.file.name} holds {', '.join(counts)}: not used here.")
+    return tuple(found)
+
+
 def _account_notes(building: Building) -> tuple[str, ...]:
     """Why the model will not do, where that is so."""
     account = building.account

@@ -12,6 +12,7 @@ from scenes.figures.carpet import carpet
 from scenes.figures.chart import Chart
 from scenes.figures.plan import FloorPlan
 from scenes.figures.scale import ColourScale
+from scenes.language.catalogue import said
 from scenes.report import daylight_figures, tables, thermal_figures
 from scenes.report.names import quantity
 from scenes.report.numbers import rounded
@@ -93,14 +94,17 @@ def case_label(study: StudyResult, case: Case) -> str:
     if len({c.orientation_deg for c in cases}) > 1:
         parts.append(f"{facing(space, case.orientation_deg)} ({case.orientation_deg:g}°)")
     if len({c.options.method for c in cases}) > 1:
-        parts.append(case.options.method)
+        parts.append(said(case.options.method))
     return ", ".join(parts)
 
 
 def method_words(case: Case) -> str:
     """How the case was computed, in a few words."""
-    glare = "no glare" if case.glare == "none" else f"{case.glare} of every occupied hour with sun"
-    return f"{case.options.method}, {glare}"
+    glare = said(
+        "no glare" if case.glare == "none" else "{glare} of every occupied hour with sun",
+        glare=case.glare,
+    )
+    return f"{said(case.options.method)}, {glare}"
 
 
 def room_of(study: StudyResult, case: Case, result: CaseResult) -> RoomYear:
@@ -135,20 +139,22 @@ def glare_map(times: pd.DatetimeIndex, case: Case, result: CaseResult) -> Chart:
     """DGP of every rated hour as a carpet."""
     f = result.figures
     scale = ColourScale(LEAST_DGP, MOST_DGP, case.glare, "", colours="inferno")
-    words = (
-        f"{case.glare} of the occupied hours with the sun up, seen from the middle of the room "
-        f"towards its biggest window. Above 0.40 in "
-        f"{rounded(f['glare_disturbing_h'] + f['glare_intolerable_h'], 0)} h, above 0.45 in "
-        f"{rounded(f['glare_intolerable_h'], 0)} h; highest {rounded(f['dgp_max'], 2)}."
+    words = said(
+        "{glare} of the occupied hours with the sun up, seen from the middle of the room towards "
+        "its biggest window. Above 0.40 in {some} h, above 0.45 in {few} h; highest {most}.",
+        glare=case.glare,
+        some=rounded(f["glare_disturbing_h"] + f["glare_intolerable_h"], 0),
+        few=rounded(f["glare_intolerable_h"], 0),
+        most=rounded(f["dgp_max"], 2),
     )
-    return carpet(times, result.arrays["dgp"], scale, title="Glare through the year",
+    return carpet(times, result.arrays["dgp"], scale, title=said("Glare through the year"),
                   explanation=words, digits=3)  # fmt: skip
 
 
 def figures_table(result: CaseResult) -> tables.Table:
     """Every figure of a case."""
     values = {k: v for k, v in result.figures.items() if v is not None}
-    table = tables.values_table("All figures of this case", values)
+    table = tables.values_table(said("All figures of this case"), values)
     return replace(table, rows=tuple(sorted(table.rows, key=lambda row: row[0].lower())))
 
 

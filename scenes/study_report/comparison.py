@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from mitsuba_cfs.glare.classes import CLASSES
 from scenes.figures.scale import Tick, axis_ticks, round_limits
+from scenes.language.catalogue import said
 from scenes.report import tables
 from scenes.report.names import quantity
 from scenes.report.numbers import cell, percent, rounded
@@ -78,26 +79,42 @@ def scatter(study: StudyResult) -> Scatter:
     x = [result.figures["da300"] for _, _, result in cases]
     y = [glare_share(result) if rated else warm_share(result) for _, _, result in cases]
     (x0, x1), (y0, y1) = round_limits([*x, 0.0, 100.0]), round_limits([*y, 0.0, 1.0])
-    what = "disturbing glare" if rated else "too warm"
+
+    def words(case: Case, light: float, share: float) -> str:
+        return said(
+            "{case}: daylight {light} %, disturbing glare {share} %"
+            if rated
+            else "{case}: daylight {light} %, too warm {share} %",
+            case=case_label(study, case),
+            light=percent(light),
+            share=percent(share),
+        )
+
     dots = tuple(
         Dot(
             100 * (a - x0) / (x1 - x0),
             100 * (b - y0) / (y1 - y0),
             *looks[case.system],
             number,
-            f"{case_label(study, case)}: daylight {percent(a)} %, {what} {percent(b)} %",
+            words(case, a, b),
         )
         for (number, case, _), a, b in zip(cases, x, y, strict=True)
     )
     return Scatter(
-        "Daylight against glare" if rated else "Daylight against warmth",
-        "Each case is a mark in the colour of its system; further right is more daylight, further "
-        "down less "
-        + ("glare" if rated else "heat")
-        + ". No case beats those on the line in both. "
-        "A click shows a case.",
-        "Daylight autonomy: mean over the work plane of the occupied hours above 300 lx [%]",
-        "Occupied hours with DGP above 0.40 [%]" if rated else "Occupied hours above 26 °C [%]",
+        said("Daylight against glare" if rated else "Daylight against warmth"),
+        said(
+            "Each case is a mark in the colour of its system; further right is more daylight, "
+            "further down less glare. No case beats those on the line in both. A click shows a "
+            "case."
+            if rated
+            else "Each case is a mark in the colour of its system; further right is more "
+            "daylight, further down less heat. No case beats those on the line in both. A click "
+            "shows a case."
+        ),
+        said("Daylight autonomy: mean over the work plane of the occupied hours above 300 lx [%]"),
+        said(
+            "Occupied hours with DGP above 0.40 [%]" if rated else "Occupied hours above 26 °C [%]"
+        ),
         axis_ticks(x0, x1),
         axis_ticks(y0, y1),
         dots,
@@ -132,7 +149,7 @@ def bars(study: StudyResult) -> tuple[Bar, ...]:
         if None in hours:
             continue
         shares = tuple((n, 100 * h / sum(hours)) for n, h in zip(CLASSES, hours, strict=True))
-        words = ", ".join(f"{name} {percent(share)} %" for name, share in shares)
+        words = ", ".join(f"{said(name)} {percent(share)} %" for name, share in shares)
         label = case_label(study, case)
         found.append(Bar(number, label, shares, result.figures["da300"], words))
     return tuple(found)
@@ -155,22 +172,22 @@ def comparison_table(study: StudyResult) -> tables.Table:
     present = {name for result in study.results for name in result.figures}
     columns = [c for c in COLUMNS if c in present]
     headings = (
-        tables.Column("Case", meaning="Number of the case; choose it below."),
-        tables.Column("What", numeric=False, short=True),
-        tables.Column("Method", numeric=False, short=True),
+        tables.Column(said("Case"), meaning=said("Number of the case; choose it below.")),
+        tables.Column(said("What"), numeric=False, short=True),
+        tables.Column(said("Method"), numeric=False, short=True),
         *(label_of(c) for c in columns),
     )
     rows = []
     for number, case, result in finished(study):
         values = [_shown(c, result.figures.get(c)) for c in columns]
-        method = case.options.method + ("" if case.glare == "none" else f", {case.glare}")
+        method = said(case.options.method) + ("" if case.glare == "none" else f", {case.glare}")
         rows.append((str(number), case_label(study, case), method, *values))
-    return tables.Table("All cases", headings, tuple(rows))
+    return tables.Table(said("All cases"), headings, tuple(rows))
 
 
 def _shown(column: str, value: float | str | None) -> str:
     if isinstance(value, str):
-        return value
+        return said(value)
     return cell(value, 1 if column == "daylight_factor" else quantity(column).digits)
 
 
@@ -178,18 +195,18 @@ def failures_table(study: StudyResult) -> tables.Table:
     """The cases without a result, and why."""
     pairs = enumerate(zip(study.plan.cases, study.results, strict=True), 1)
     columns = (
-        tables.Column("Case"),
-        tables.Column("What", numeric=False),
-        tables.Column("What went wrong", numeric=False),
+        tables.Column(said("Case")),
+        tables.Column(said("What"), numeric=False),
+        tables.Column(said("What went wrong"), numeric=False),
     )
     rows = [(str(i), case_label(study, c), r.error) for i, (c, r) in pairs if r.error]
-    return tables.Table("Cases without a result", columns, tuple(rows))
+    return tables.Table(said("Cases without a result"), columns, tuple(rows))
 
 
 def clock_table(study: StudyResult) -> tables.Table:
     """Time taken by the cases together, stage by stage."""
     stages = ("daylight_s", "glare_s", "thermal_s", "seconds")
-    names = ("Daylight", "Glare", "Heat", "All, with reading the files")
+    names = (said("Daylight"), said("Glare"), said("Heat"), said("All, with reading the files"))
     rows = []
     for stage, name in zip(stages, names, strict=True):
         values = [float(r.figures.get(stage, 0.0)) for r in study.results if not r.error]
@@ -197,7 +214,9 @@ def clock_table(study: StudyResult) -> tables.Table:
             mean, most = sum(values) / len(values), max(values)
             rows.append((name, rounded(sum(values), 1), rounded(mean, 1), rounded(most, 1)))
     columns = (
-        tables.Column("Part", numeric=False),
-        *(tables.Column(n, "s") for n in ("All cases", "Mean of a case", "Longest")),
+        tables.Column(said("Part"), numeric=False),
+        tables.Column(said("All cases"), "s"),
+        tables.Column(said("Mean of a case"), "s"),
+        tables.Column(said("Longest"), "s"),
     )
-    return tables.Table("Time taken", columns, tuple(rows))
+    return tables.Table(said("Time taken"), columns, tuple(rows))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
+from scenes.language.catalogue import decimal, in_language, said
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import page as run_page
@@ -15,6 +17,8 @@ from scenes.report import tables
 from scenes.report.names import glossary
 from scenes.report.numbers import counted, rounded, share
 from scenes.report.page_files import page_files
+from scenes.study.case import Case
+from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
 from scenes.study_report.case_page import case_page, room_of
 from scenes.study_report.comparison import (
@@ -45,6 +49,13 @@ def study_report_html(study: StudyResult, page: PageOptions = OWN_PAGE) -> str:
     done = finished(study)
     if not done:
         raise ValueError("a report needs at least one case with a result")
+    with in_language(page.language):
+        return _filled(study, page, done)
+
+
+def _filled(
+    study: StudyResult, page: PageOptions, done: Sequence[tuple[int, Case, CaseResult]]
+) -> str:
     rooms = {number: room_of(study, case, r) for number, case, r in done[:MOST_CASES]}
     every = tuple(rooms.values())
     pages = tuple(case_page(study, number, room, every) for number, room in rooms.items())
@@ -56,7 +67,7 @@ def study_report_html(study: StudyResult, page: PageOptions = OWN_PAGE) -> str:
     return run_page.environment(FILES).get_template("study.html.j2").render(
         study=study,
         page=page,
-        title=page.title or study.title or "Study of fenestration systems",
+        title=page.title or study.title or said("Study of fenestration systems"),
         facts=facts(study) + page.facts,
         verdict=study_verdict(study),
         beside=len(done) if len(done) <= MOST_BESIDE else 1,
@@ -92,28 +103,35 @@ def facts(study: StudyResult) -> tuple[tuple[str, str], ...]:
         return ", ".join(values) if len(values) <= 4 else f"{len(values)}"
 
     return (
-        *([("Run", NOTE)] if study.quick else []),
-        ("Cases", f"{len(cases)}" + (f", {study.failed} failed" if study.failed else "")),
-        ("Rooms", named(c.place for c in cases)),
-        ("Systems", named(c.system for c in cases)),
-        ("Climates", named(c.climate for c in cases)),
-        ("Turned by", named(f"{c.orientation_deg:g}°" for c in cases)),
-        ("Methods", named(c.options.method for c in cases)),
-        ("Computed in", f"{rounded(study.seconds, 0)} s" + _reused(study)),
+        *([(said("Run"), said(NOTE))] if study.quick else []),
+        (said("Cases"), f"{len(cases)}" + _failed(study)),
+        (said("Rooms"), named(c.place for c in cases)),
+        (said("Systems"), named(c.system for c in cases)),
+        (said("Climates"), named(c.climate for c in cases)),
+        (said("Turned by"), named(decimal(f"{c.orientation_deg:g}°") for c in cases)),
+        (said("Methods"), named(said(c.options.method) for c in cases)),
+        (said("Computed in"), f"{rounded(study.seconds, 0)} s" + _reused(study)),
     )
 
 
+def _failed(study: StudyResult) -> str:
+    return said(", {count} failed", count=study.failed) if study.failed else ""
+
+
 def _reused(study: StudyResult) -> str:
-    return f", {counted(study.reused, 'case')} from before" if study.reused else ""
+    if not study.reused:
+        return ""
+    return said(", {cases} from before", cases=counted(study.reused, "case"))
 
 
 def problems_table(study: StudyResult) -> tables.Table:
     """What is wrong with the building files and what was done about it."""
     columns = tuple(
-        tables.Column(label, numeric=False) for label in ("Where", "What", "Consequence and repair")
+        tables.Column(said(label), numeric=False)
+        for label in ("Where", "What", "Consequence and repair")
     )
     return tables.Table(
-        "By element", columns, tuple((p.where, p.what, p.consequence) for p in study.problems)
+        said("By element"), columns, tuple((p.where, p.what, p.consequence) for p in study.problems)
     )
 
 
@@ -122,14 +140,14 @@ def inputs_table(study: StudyResult) -> tables.Table:
     found = {}
     for case in study.plan.cases:
         for kind, source in (
-            ("Building", case.building),
-            ("Fenestration", case.bsdf),
-            ("Its thermal values", case.thermal),
-            ("Weather", case.weather),
-            ("Operation", case.operation),
+            (said("Building"), case.building),
+            (said("Fenestration"), case.bsdf),
+            (said("Its thermal values"), case.thermal),
+            (said("Weather"), case.weather),
+            (said("Operation"), case.operation),
         ):
             if path := getattr(source, "path", None):
                 found[kind, path] = source.sha256
-    columns = tuple(tables.Column(c, numeric=False) for c in ("Input", "File", "SHA-256"))
+    columns = tuple(tables.Column(said(c), numeric=False) for c in ("Input", "File", "SHA-256"))
     rows = tuple((kind, path.name, digest) for (kind, path), digest in found.items())
-    return tables.Table("Input files", columns, rows)
+    return tables.Table(said("Input files"), columns, rows)

@@ -9,6 +9,7 @@ import numpy as np
 
 from bim.model import Space
 from scenes.figures.scale import Tick, axis_ticks, round_limits
+from scenes.language.catalogue import said
 from scenes.report.numbers import rounded
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult
@@ -85,7 +86,8 @@ class _Asked:
         if not self.more_is_better:
             low, high = high, low
             ticks = tuple(replace(tick, at=100.0 - tick.at) for tick in ticks)
-        return ParallelAxis(self.name, self.words, self.unit, self.digits, low, high, x, ticks)
+        name, words = said(self.name), said(self.words)
+        return ParallelAxis(name, words, self.unit, self.digits, low, high, x, ticks)
 
 
 def parallel(study: StudyResult) -> Parallel:
@@ -105,12 +107,12 @@ def parallel(study: StudyResult) -> Parallel:
     lines = []
     for i, (number, case, _) in enumerate(cases):
         own = [(axis, values[i]) for axis, (_, values) in zip(axes, columns, strict=True)]
-        said = (
+        figures = (
             f"{axis.name.lower()} {rounded(value, axis.digits)} {axis.unit}"
             for axis, value in own
             if not np.isnan(value)
         )
-        words = f"{number}: {case_label(study, case)}: {', '.join(said)}"
+        words = f"{number}: {case_label(study, case)}: {', '.join(figures)}"
         at = tuple(axis.at(value) for axis, value in own)
         lines.append(CaseLine(number, looks[case.system][0], at, words))
     return Parallel(axes, tuple(lines))

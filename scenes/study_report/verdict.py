@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mitsuba_cfs.glare.classes import CLASSES
+from scenes.language.catalogue import said
 from scenes.report.headline import WARM_C, Card, cards, protection_card
 from scenes.report.limits import LimitTables, limits
 from scenes.report.numbers import counted, percent, rounded
@@ -26,20 +27,29 @@ def study_verdict(study: StudyResult) -> Verdict:
 
     def named(values: list[str], what: str) -> str:
         values = list(dict.fromkeys(values))
-        return _and(values) if len(values) <= 3 else f"{len(values)} {what}"
+        return _and(values) if len(values) <= 3 else counted(len(values), what)
 
-    asked = (
-        f"Daylight, glare and temperatures of {named([c.place for c in cases], 'rooms')} in a year "
-        f"of {named([c.climate for c in cases], 'climates')}, compared for "
-        f"{named([c.system for c in cases], 'systems')}: {counted(len(cases), 'case')}."
+    asked = said(
+        "Daylight, glare and temperatures of {rooms} in a year of {climates}, compared for "
+        "{systems}: {cases}.",
+        rooms=named([c.place for c in cases], "room"),
+        climates=named([c.climate for c in cases], "climate"),
+        systems=named([c.system for c in cases], "system"),
+        cases=counted(len(cases), "case"),
     )
-    found = (("Daylight", _daylight), ("Glare", _glare), ("Heat and energy", _heat))
+    found = (
+        (said("Daylight"), _daylight),
+        (said("Glare"), _glare),
+        (said("Heat and energy"), _heat),
+    )
     sentences = tuple((heading, sentence(study)) for heading, sentence in found)
     return Verdict(asked, sentences, _limits(study))
 
 
 def _and(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    if len(names) == 1:
+        return names[0]
+    return said("{names} and {last}", names=", ".join(names[:-1]), last=names[-1])
 
 
 def _extremes(
@@ -52,38 +62,65 @@ def _extremes(
 
 def _daylight(study: StudyResult) -> str:
     least, most = _extremes(study, lambda result: float(result.figures["da300"]))
-    text = f"{most[0]} has 300 lx of daylight in {percent(most[1])} % of the occupied hours, as a "
-    text += "mean over the work plane"
-    return text + (f"; {least[0]} in {percent(least[1])} %." if least[0] != most[0] else ".")
+    text = said(
+        "{case} has 300 lx of daylight in {share} % of the occupied hours, as a mean over the work "
+        "plane",
+        case=most[0],
+        share=percent(most[1]),
+    )
+    return text + _and_least(least, most)
+
+
+def _and_least(least: tuple[str, float], most: tuple[str, float]) -> str:
+    """The end of a sentence on the case with most: that with least."""
+    if least[0] == most[0]:
+        return "."
+    return said("; {case} in {share} %.", case=least[0], share=percent(least[1]))
 
 
 def _glare(study: StudyResult) -> str:
     done = [result for _, _, result in finished(study)]
     if any(f"glare_{CLASSES[0]}_h" not in result.figures for result in done):
-        return "Glare was not rated in every case."
+        return said("Glare was not rated in every case.")
     least, most = _extremes(study, glare_share)
-    text = f"{most[0]} has a DGP above 0.40 in {percent(most[1])} % of the occupied hours"
-    return text + (f", {least[0]} in {percent(least[1])} %." if least[0] != most[0] else ".")
+    text = said(
+        "{case} has a DGP above 0.40 in {share} % of the occupied hours",
+        case=most[0],
+        share=percent(most[1]),
+    )
+    return text + _and_least(least, most)
 
 
 def _heat(study: StudyResult) -> str:
     """Which case takes least for heat, cold and lamps; how warm the warmest gets."""
     cool, warm = _extremes(study, warm_share)
-    text = f"{warm[0]} is above {WARM_C:.0f} °C in {percent(warm[1])} % of the occupied hours"
-    text += f", {cool[0]} in {percent(cool[1])} %." if cool[0] != warm[0] else "."
+    text = said(
+        "{case} is above {limit} °C in {share} % of the occupied hours",
+        case=warm[0],
+        limit=f"{WARM_C:.0f}",
+        share=percent(warm[1]),
+    )
+    text += _and_least(cool, warm)
     if any(not set(ENERGIES) <= set(result.figures) for _, _, result in finished(study)):
-        return f"{text} Without heating and cooling in every case."
+        return f"{text} {said('Without heating and cooling in every case.')}"
     least, most = _extremes(study, lambda result: sum(result.figures[e] for e in ENERGIES))
     if most[1] <= 0:
-        return f"{text} Without heating and cooling."
-    parts = _parts(study, least[0])
-    text += (
-        f" Least heating, cooling and light together: {least[0]} with {rounded(least[1], 0)} kWh a "
+        return f"{text} {said('Without heating and cooling.')}"
+    text += " " + said(
+        "Least heating, cooling and light together: {case} with {energy} kWh a year ({parts})",
+        case=least[0],
+        energy=rounded(least[1], 0),
+        parts=_parts(study, least[0]),
     )
-    text += f"year ({parts})"
     if least[0] != most[0]:
-        text += f"; most: {most[0]} with {rounded(most[1], 0)} kWh ({_parts(study, most[0])})"
-    return text + ". That is heat and cold of the room and power of the lamps, added as they are."
+        text += said(
+            "; most: {case} with {energy} kWh ({parts})",
+            case=most[0],
+            energy=rounded(most[1], 0),
+            parts=_parts(study, most[0]),
+        )
+    added = said("That is heat and cold of the room and power of the lamps, added as they are.")
+    return f"{text}. {added}"
 
 
 def _parts(study: StudyResult, label: str) -> str:
@@ -101,7 +138,7 @@ def _limits(study: StudyResult) -> LimitTables:
         run = RunResult(building, times, np.empty((0, 3)), (room,), (), {})
         own = (*cards(run, room), *_protection(result))
         rows.append((case_label(study, case), room, own))
-    return limits(rows, "Case")
+    return limits(rows, said("Case"))
 
 
 def _protection(result: CaseResult) -> tuple[Card, ...]:

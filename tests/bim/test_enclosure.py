@@ -45,6 +45,27 @@ def test_room_between_walls_with_a_gap(gap):
     assert enclosed_volume(found) == pytest.approx(VOLUME * (1 + gap / HEIGHT), rel=2e-3)
 
 
+def test_a_wall_without_a_closed_body_bounds_a_room():
+    """Its long faces have holes without reveals; an open body that is not flat fills nothing."""
+    parts = room()
+    (x0, y, z0), (w, t, h) = WALLS["south"]
+    wall = box((x0, y, z0), (w, t, h))
+    outside, inside = wall[4:6], wall[8:10]  # its long faces, y low and y high
+    rest = np.concatenate([wall[:4], wall[6:8], wall[10:]])
+    holed = [
+        np.array([[(x, face[0, 0, 1], z) for x, z in corners]])
+        for face in (outside, inside)
+        for corners in (((x0, z0), (x0 + w, z0), (x0 + w, 0.9)), ((x0, h), (x0 + w, h), (x0, 2.4)))
+    ]
+    parts[2] = np.concatenate([rest, *holed])
+    assert solid_of(parts[2]) is None
+    found = rooms_enclosed_by(parts)
+    assert found.hulls == 1
+    assert enclosed_volume(found.rooms[0]) == pytest.approx(VOLUME, rel=2e-3)
+    tower = box((1.0, 1.0, 0.0), (2.0, 2.0, HEIGHT))[2:]  # open at its foot
+    assert rooms_enclosed_by([*room(), tower]).hulls == 0
+
+
 def test_gap_of_30_mm_stays_open_unless_asked_for():
     assert rooms_enclosed_by(room(0.03)).rooms == ()
     assert len(rooms_enclosed_by(room(0.03), gap=0.05).rooms) == 1

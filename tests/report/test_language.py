@@ -18,17 +18,20 @@ from mitsuba_cfs.errors import DataError
 from scenes.language import catalogue
 from scenes.language.catalogue import CATALOGUES, MONTHS, decimal, in_language, said, short_month
 from scenes.language.heard import HEARD, heard
-from scenes.page_options import PageOptions, RunSection, StudySection, read_page
+from scenes.page_options import DossierSection, PageOptions, RunSection, read_page
 from scenes.report.headline import PROTECTION
 from scenes.report.method import LIGHT, PATCHES, PICTURES, SCATTER
 from scenes.report.names import WORDS
 from scenes.report.numbers import rounded
 from scenes.report.operation_figures import RULES
 from scenes.report.page import report_html, summary
+from scenes.study_report.page import study_report_html
+from scenes.study_report.parallel import ASKED
 from tests.modules import MODULES
 from tests.report.browser import chromium, inspect
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
+from tests.report.test_study_report import study
 
 LANGUAGES = tuple(CATALOGUES)
 EVERYTHING = Account(  # that can be said of a model which is usable with care
@@ -137,13 +140,14 @@ def _asked_in_code() -> set[str]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "said" and node.args:
                 found |= set(_texts(node.args[0]))
-    for path in (ROOT / "scenes" / "report" / "templates").glob("*.j2"):
+    for path in (ROOT / "scenes").glob("*report/templates/*.j2"):
         found |= set(re.findall(r"""\bsay\("((?:[^"\\])*)\"""", path.read_text(encoding="utf-8")))
     for entry in (*WORDS["quantities"].values(), *WORDS["options"].values()):
         found |= {entry["label"], entry["meaning"], *entry.get("values", ())}
     found |= {*WORDS["glossary"], *WORDS["glossary"].values()}
     found |= {*RULES.values(), *PICTURES.values(), PATCHES, SCATTER, *LIGHT}
     found |= {sentence for sentences in LIGHT.values() for sentence in sentences}
+    found |= {text for one in ASKED for text in (one.name, one.words)}
     found |= {f"{level}: at most {dgp}" for level, dgp in PROTECTION.items()}
     found |= {*HEARD, *(title for title, _ in EVERYTHING.facts)}
     found |= {*MONTHS, *(month[:3] for month in MONTHS)}
@@ -189,7 +193,8 @@ def test_nothing_of_the_catalogue_is_asked_by_nobody(marked) -> None:
 ALONE = {  # classes, levels and counted nouns, chosen by a result
     "imperceptible", "perceptible", "disturbing", "intolerable", "High", "Medium", "Minimum",
     "None", "room", "rooms", "hour", "hours", "sensor", "sensors", "glare source", "glare sources",
-    "bright source", "bright sources", "system", "systems",
+    "bright source", "bright sources", "system", "systems", "case", "cases",
+    "climate", "climates",
     "acceptable (55 % or more)", "preferred (75 % or more)",
     "below the 55 % of LM-83", "within the 10 % of LM-83", "above the 10 % of LM-83",
     "Its thermal values", "Fenestration system", "Model file", "Weather", "Author", "S", "W",
@@ -246,7 +251,7 @@ def test_english_is_as_it_was(result) -> None:
     ("text", "sections", "translated", "words"),
     [
         ("language = 'it'", RunSection, True, "language: expected 'en', 'de' or 'fr', got 'it'"),
-        ("language = 'de'", StudySection, False, "language: de: this page is there in English"),
+        ("language = 'de'", DossierSection, False, "language: de: this page is there in English"),
     ],
 )
 def test_another_language_is_one_line(tmp_path, text, sections, translated, words) -> None:
@@ -294,3 +299,26 @@ def test_notes_are_translated_or_named_english(result) -> None:
     assert "<li>Fenster A, B: Blind 45, aus --cfs blind.xml.</li>" in page
     assert '<li lang="en">Nobody has translated this.</li>' in page
     assert heard(note) == note
+
+
+STUDY_NAMES = (  # of the made-up study, its rooms and the stages whose seconds are noted
+    r"Blinds & shades|broken\.xml: has <no> band|Open-plan office south|Meeting room west & archive"
+    r"|(?:View|Daylight) matrix s|Annual product s|Pictures s"
+)
+ENGLISH_STUDY = re.compile(
+    r"\b(the|of|with|hours?|daylight|glare|and|above|computed|rooms|every|which|year)\b",
+    re.I,
+)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_study_is_in_the_pages_language(language) -> None:
+    """What a reader sees of a study has no English word, but for names and problems."""
+    asked = study()
+    page = study_report_html(asked, PageOptions(language=language))
+    page = re.sub(r'<section id="problems">.*?</section>', "", page, flags=re.DOTALL)
+    assert f'<html lang="{language}">' in page
+    for text in shown(page):
+        found = ENGLISH_STUDY.search(re.sub(STUDY_NAMES, "", text))
+        assert not found, text
+    assert study_report_html(asked) == study_report_html(asked, PageOptions())

@@ -24,6 +24,7 @@ from scenes.room.room_year import compute_room
 from scenes.room.stated_use import stated_note, with_stated_uses
 from scenes.room_views import held_fisheyes, held_view
 from scenes.run.inputs import read_weather
+from scenes.run.notes import unused_notes
 from tests.bim.honeybee_models import used_model, write
 from tests.conftest import REPOSITORY
 
@@ -164,3 +165,11 @@ def test_cfs_thermal_has_the_files_set_points(tmp_path):
     assert hall.min() < 15 < office.min()
     assert any(note.startswith("Gains, air and set points of 2 of 2 room(s)") for note in notes)
     assert any(note.startswith("set points (Hall): not used") for note in notes)
+
+
+def test_commands_with_rules_of_their_own_say_what_they_leave_out(used):
+    """`cfs comply` has the uses, sensors and eyes of its rules."""
+    said = unused_notes(replace(used, grids=(HeldGrid("g", np.zeros((1, 3)), np.eye(3)[2:]),)))
+    assert said[-1] == "used.hbjson holds 2 uses of rooms, 1 sensor grids: not used here."
+    assert "set points (Hall): not used: the room has no system." in said
+    assert not unused_notes(read_honeybee(TWO_ROOMS))

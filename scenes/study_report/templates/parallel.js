@@ -11,7 +11,7 @@
   const axes = [...figure.querySelectorAll(".axis")].map((box, i) => axis(box, i));
 
   function axis(box, number) {
-    const { name, unit, digits, low, high } = box.dataset;
+    const { unit, digits, low, high } = box.dataset;
     const words = (at) => (Number(low) + (high - low) * at / 100).toFixed(digits) + " " + unit;
     const brush = document.createElement("div");
     brush.className = "brush";
@@ -21,7 +21,7 @@
       const handle = document.createElement("span");
       handle.className = "handle";
       handle.tabIndex = 0;
-      const said = { role: "slider", "aria-orientation": "vertical", "aria-label": name + ": " + end + " end",
+      const said = { role: "slider", "aria-orientation": "vertical", "aria-label": box.dataset[end],
         "aria-valuemin": 0, "aria-valuemax": 100 };
       for (const key in said) handle.setAttribute(key, said[key]);
       handle.addEventListener("keydown", (event) => move(event, k));
@@ -88,7 +88,7 @@
       count += inside;
     });
     status.hidden = !chosen.includes(true);
-    status.textContent = count + " of " + lines.length + " cases within the chosen ends.";
+    status.textContent = status.dataset.words.replace("##", lines.length).replace("#", count);
     enter(lines.find((line) => line.tabIndex === 0 && !line.classList.contains("out")));
   }
 
