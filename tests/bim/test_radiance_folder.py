@@ -135,19 +135,37 @@ def test_the_folder_gives_our_light(room, tmp_path):
     from scenes.evidence.validation import radiance_folder as folder
 
     files, blind = exported(room, tmp_path)
-    space, weather = room.spaces[0], folder.three_days(WEATHER, tmp_path)
-    both = folder.Room(room, space, blind, files, weather)
-    theirs = [folder.theirs(both, 20_000, 400) for _ in range(RUNS)]
-    ours = [folder.ours(both, seed) for seed in range(RUNS)]
+    weather = folder.three_days(WEATHER, tmp_path)
+    held_to_ours(folder.Room(room, room.spaces[0], blind, files, weather), 20_000, RUNS)
+
+
+@pytest.mark.slow
+@pytest.mark.peer
+def test_the_folder_of_a_real_room_gives_our_light(real_data, tmp_path):
+    """The FZK house's living room, 50 degrees from north, with a stair that reaches into it."""
+    pytest.importorskip("pyradiance")
+    from scenes.evidence.validation import radiance_folder as folder
+
+    house = real_data / "ifc" / "buildings" / "AC20-FZK-Haus.ifc"
+    room = folder.Room.exported(house, "5 Wohnen", tmp_path / "room", WEATHER)
+    held_to_ours(room, 2_000, 2)
+
+
+def held_to_ours(room, rays: int, runs: int) -> None:
+    """Both sides' light under skies that weigh directions, and in hours of sun."""
+    from scenes.evidence.validation import radiance_folder as folder
+
+    theirs = [folder.theirs(room, rays, 400) for _ in range(runs)]
+    ours = [folder.ours(room, seed) for seed in range(runs)]
     patches = np.arange(theirs[0][0].shape[1])
     skies = [np.ones(len(patches)), patches % 30 < 15, patches % 30 >= 15, patches == 0]
-    pairs = [[[whole @ sky for whole, _ in runs] for runs in (ours, theirs)] for sky in skies]
+    pairs = [[[whole @ sky for whole, _ in side] for side in (ours, theirs)] for sky in skies]
     bright = np.mean([hours for _, hours in theirs], axis=0) > folder.LEAST
     assert bright.sum() > 50
-    pairs.append([[hours[bright] for _, hours in runs] for runs in (ours, theirs)])
+    pairs.append([[hours[bright] for _, hours in side] for side in (ours, theirs)])
     for a, b in pairs:
         mean, spread = np.mean(b, axis=0), np.std(b, axis=0, ddof=1)
-        error = float(np.sqrt(np.mean((spread / mean) ** 2) / RUNS))
+        error = float(np.sqrt(np.mean((spread / mean) ** 2) / runs))
         rms = float(np.sqrt(np.mean((np.mean(a, axis=0) / mean - 1) ** 2)))
         # ours is within 1 % at these paths; three standard errors of Radiance's mean besides
         assert rms < 0.01 + 3 * error, (rms, error)
