@@ -20,6 +20,8 @@ HEARD = (
     "usable", "usable with care", "not usable", "no rooms", "no glass looks out",
     "none looks out of a room",
     "rooms found from geometry",
+    "none looks out of a room",
+    "none: the file has no spaces, and no room was found between its walls",
     "Model: {verdict}: {reasons}",
     "usable with care: {reasons}", "not usable: {reasons}",
     "THE FILE IS CUT OFF at its end: an unknown part of the building is lost",
