@@ -18,7 +18,6 @@ NUMBER = r"[\d.]+(?: %)?"  # what the other fields hold
 FIELD = re.compile(r"\\\{(\w+)\\\}")
 HEARD = (
     "usable", "usable with care", "not usable", "no rooms", "no glass looks out",
-    "none looks out of a room",
     "rooms found from geometry",
     "none looks out of a room",
     "none: the file has no spaces, and no room was found between its walls",
