@@ -98,6 +98,7 @@ def test_everything_imported_is_asked_for() -> None:
     asked += [line for lines in PROJECT["optional-dependencies"].values() for line in lines]
     known = {module for line in asked for module in modules.get(_name(line), {_name(line)})}
     known |= {"distributed", "pydantic_core"}  # an extra of dask; pydantic's own core
+    known |= {"bpy", "bonsai"}  # Blender, in which the panel of bim/bonsai runs
     imported = {name for name in _used(PACKAGES) if not name.startswith(".")}
     foreign = imported - set(sys.stdlib_module_names) - set(PACKAGES)
     assert not foreign - known

@@ -10,15 +10,28 @@ from pathlib import Path
 
 from mitsuba_cfs.files import write_bytes
 
-FILES = {"addon.py": "__init__.py", "blender_manifest.toml": "blender_manifest.toml"}
+MANIFEST = """\
+schema_version = "1.0.0"
+id = "cfs_bonsai"
+version = "1.0.0"
+name = "Daylight, glare and comfort of rooms (mitsuba-cfs)"
+tagline = "Runs cfs on the IFC file open in Bonsai and colours its rooms"
+maintainer = "mitsuba-cfs"
+type = "add-on"
+blender_version_min = "4.2.0"
+license = ["SPDX:MIT"]
+
+[permissions]
+files = "Reads the IFC file and the tables of results"
+"""
 DATE = (2026, 1, 1, 0, 0, 0)  # the same bytes every time
 
 
 def write_add_on(path: str | PathLike[str]) -> None:
     """Write the zip, for Blender's "Install from Disk"."""
-    folder = resources.files("bim.bonsai")
+    source = (resources.files("bim.bonsai") / "addon.py").read_bytes()
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, inside in FILES.items():
-            archive.writestr(zipfile.ZipInfo(inside, DATE), (folder / name).read_bytes())
+        for name, text in (("__init__.py", source), ("blender_manifest.toml", MANIFEST.encode())):
+            archive.writestr(zipfile.ZipInfo(name, DATE), text)
     write_bytes(Path(path), content.getvalue())

@@ -6,6 +6,7 @@ No tracer and no IFC reader is loaded for that: a mistake is named within a seco
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -18,8 +19,9 @@ from scenes.room.operation import Operation, check_states, check_systems, read_o
 from scenes.room.operation_hours import check_schedules
 from scenes.room.picture_hours import check_hours, wanted_hours
 from scenes.run.inputs import read_weather
-from scenes.run.netcdf import check_netcdf
 from scenes.run.options import JobOptions
+
+NETCDF = ("xarray", "h5netcdf")  # packages that write it
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,14 @@ class JobFiles:
     system: FenestrationSystem | None
     operation: Operation | None
     given: Given  # what fills the windows, by flag or operation file
+
+
+def check_netcdf() -> None:
+    """Raise `DataError` where the packages are missing that write netCDF."""
+    missing = [name for name in NETCDF if find_spec(name) is None]
+    if missing:
+        message = f"needs {' and '.join(missing)} (pip install 'mitsuba-cfs[netcdf]')"
+        raise DataError(message, field="--netcdf")
 
 
 def read_files(options: JobOptions) -> JobFiles:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from importlib import metadata
-from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,8 +19,8 @@ import numpy as np
 import pandas as pd
 
 from bim.names import folder_names
-from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import temporary_folder
+from scenes.run.files import check_netcdf
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     Variables = dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]
 
 NAME = "results.nc"
-NEEDED = ("xarray", "h5netcdf")
 UNITS = {"": "1", "°C": "degC", "%": "percent"}  # of UDUNITS, where they differ
 LABELS = {  # units and names of what no page shows
     "pmv": ("1", "predicted mean vote, ISO 7730"),
@@ -44,14 +42,6 @@ STANDARD = {  # names of the CF standard name table
     "relative_humidity_percent": "relative_humidity",
 }
 PLACES = {axis: {"units": "m", "long_name": f"{axis} of the sensor"} for axis in "xyz"}
-
-
-def check_netcdf() -> None:
-    """Raise `DataError` where the packages are missing that write netCDF."""
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        message = f"needs {' and '.join(missing)} (pip install 'mitsuba-cfs[netcdf]')"
-        raise DataError(message, field="--netcdf")
 
 
 def year_dataset(result: RunResult) -> Dataset:
@@ -105,7 +95,7 @@ def write_netcdf(result: RunResult, path: str | PathLike[str]) -> None:
 
 def attributes(key: str) -> dict[str, str]:
     """CF attributes of a quantity of the results: units, long_name, what it means."""
-    from scenes.report.names import quantity  # whose package draws; `check_netcdf` does not
+    from scenes.report.names import quantity  # whose package draws
 
     known = quantity(key)
     unit, label = UNITS.get(known.unit, known.unit).replace("²", "2"), known.label

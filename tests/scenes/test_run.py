@@ -125,7 +125,7 @@ def test_netcdf_holds_the_numbers_of_the_tables_with_their_units(results):
 
 
 def test_netcdf_without_its_packages_is_one_line_at_once(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("scenes.run.netcdf.NEEDED", ("xarray", "no_such_package"))
+    monkeypatch.setattr("scenes.run.files.NETCDF", ("xarray", "no_such_package"))
     assert call(tmp_path / "out", *QUICK, "--netcdf") == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "--netcdf" in line and "no_such_package" in line and "mitsuba-cfs[netcdf]" in line
