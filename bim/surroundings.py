@@ -191,8 +191,15 @@ def _spans(
     spans: list[Span] = []
     met = [int(around.element[triangle]) for _, triangle in crossings]
     vectors = area_vectors(around.elements.triangles[[triangle for _, triangle in crossings]])
-    for (t, triangle), element, vector in zip(crossings, met, vectors, strict=True):
-        starts_inside = met.count(element) % 2 == 1 and vector @ normal > 0
+    leaves = vectors @ normal > 0
+    layered = _layered(met, leaves)
+    for (t, triangle), element, leaving in zip(crossings, met, leaves, strict=True):
+        if element in layered:
+            first, last = layered[element]
+            if (t, triangle) == crossings[first]:
+                spans.append(Span(element, t - INSIDE, crossings[last][0] - INSIDE, triangle))
+            continue
+        starts_inside = met.count(element) % 2 == 1 and leaving
         if starts_inside and element not in {span.element for span in spans} | set(open_at):
             spans.append(Span(element, -INSIDE, t - INSIDE, triangle))
         elif element in open_at:
@@ -213,6 +220,20 @@ def _spans(
         kept.append(span)
         reach = max(reach, span.stop)
     return tuple(kept)
+
+
+def _layered(met: list[int], leaves: NDArray[np.bool_]) -> dict[int, tuple[int, int]]:
+    """The first and last crossings of elements whose layers are bodies that touch.
+
+    Where one body ends and the next begins a ray meets one surface, not two: from entry to exit
+    their number is odd.
+    """
+    found = {}
+    for element in set(met):
+        own = [number for number, other in enumerate(met) if other == element]
+        if len(own) > 1 and len(own) % 2 == 1 and leaves[own[-1]] and not leaves[own[0]]:
+            found[element] = own[0], own[-1]
+    return found
 
 
 def _open_or_ground(

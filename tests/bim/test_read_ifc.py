@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,17 @@ from bim.defaults import FRAME_FRACTION, ROOM_REFLECTANCE
 from bim.ifc.building import read_ifc
 from bim.shell import enclosed_volume, open_edges
 from mitsuba_cfs.errors import DataError
-from tests.bim.small_ifc import DEPTH, GLASS_AREA, GLASS_Y, HEIGHT, OPENING, WIDTH, box_room
+from tests.bim.small_ifc import (
+    DEPTH,
+    GLASS_AREA,
+    GLASS_Y,
+    HEIGHT,
+    OPENING,
+    WALLS,
+    WIDTH,
+    box_model,
+    box_room,
+)
 
 RECESS = -GLASS_Y  # from the room's south face to the middle of the pane [m]
 VOLUME = WIDTH * DEPTH * HEIGHT
@@ -44,6 +56,19 @@ def test_sound_room(tmp_path, schema, unit):
     np.testing.assert_allclose(window.normal, [0, -1, 0], atol=1e-9)
     np.testing.assert_allclose(window.centre, [2.0, GLASS_Y, 1.65], atol=1e-5)
     assert (building.latitude_deg, building.longitude_deg) == (48.5, -7.5)
+
+
+@pytest.mark.parametrize("ends", [(0.1,), (0.1, 0.2), (0.05, 0.1, 0.25)])
+def test_a_wall_whose_layers_are_bodies_that_touch_ends_outdoors(tmp_path, ends):
+    """Revit writes a body for each layer; where two touch a ray meets one surface."""
+    small, walls = box_model()
+    (x, y, z), (width, depth, height) = WALLS["north"]
+    edges = (0.0, *ends, depth)
+    layers = [((x, y + a, z), (width, b - a, height), None) for a, b in pairwise(edges)]
+    small.show(walls["north"], layers)
+    (space,) = read(tmp_path, small.model).spaces
+    north = next(face for face in space.faces if face.normal[1] > 0.9 and face.kind == "wall")
+    assert north.adjacency == "outside" and north.element == walls["north"].GlobalId
 
 
 def test_faces_know_what_lies_beyond_and_how_they_reflect(tmp_path):
