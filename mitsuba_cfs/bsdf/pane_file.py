@@ -80,12 +80,19 @@ def read_glazing_layers(path: str | PathLike[str]) -> list[PaneFile]:
     """The panes of a glazing system's JSON, whose `layers` hold spectra, the outer one first."""
     path = Path(path)
     panes = []
-    for number, layer in enumerate(_json(_text(path), path).get("layers") or [], start=1):
+    layers = _json(_text(path), path).get("layers") or []
+    if not isinstance(layers, list):
+        raise DataError("expected a list", file=path, field="layers")
+    for number, layer in enumerate(layers, start=1):
         where = f"layer {number}"
-        kind = layer.get("product_type")
+        kind = layer.get("product_type") if isinstance(layer, dict) else layer
         if kind != "glazing":
-            raise DataError(f"is no glass ({kind})", file=path, element=where)
-        rows = [[float(nm), *values] for nm, values in (layer.get("spectral_data") or {}).items()]
+            raise DataError(f"is no glass ({str(kind)[:40]})", file=path, element=where)
+        try:
+            rows = [[float(nm), *row] for nm, row in (layer.get("spectral_data") or {}).items()]
+        except (AttributeError, TypeError, ValueError):
+            message = "expected shares by wavelength"
+            raise DataError(message, file=path, element=where, field="spectral_data") from None
         coated = _is_coated(layer.get("coated_side"))
         turned = bool(layer.get("flipped"))
         panes.append(PaneFile(path, where, _spectrum(rows, path), coated, turned))
@@ -104,7 +111,7 @@ def _text(path: Path) -> str:
 def _json(text: str, path: Path) -> dict[str, Any]:
     try:
         data = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DataError(f"is not JSON: {error}", file=path) from None
     if not isinstance(data, dict):
         raise DataError("expected a table of a product", file=path)
@@ -127,18 +134,36 @@ def _product(product: dict[str, Any], path: Path) -> PaneFile:
     except (KeyError, TypeError, AttributeError) as error:
         message = f"expected rows of wavelength, T, Rf, Rb ({error})"
         raise DataError(message, file=path, field="spectral_data") from None
-    summary = (product.get("integrated_results_summary") or [{}])[0]
-    stated = tuple(summary.get(name) for name in ("tfvis", "rfvis", "rbvis"))
-    thickness = measured.get("thickness")
+    summaries = product.get("integrated_results_summary") or [{}]
+    if not isinstance(summaries, list) or not isinstance(summaries[0], dict):
+        raise DataError("expected a list of tables", file=path, field="integrated_results_summary")
+    stated = [_stated(summaries[0], name, path) for name in ("tfvis", "rfvis", "rbvis")]
+    tau, front, back = stated
+    thickness = _stated(measured, "thickness", path)
     return PaneFile(
-        path, product.get("name") or path.stem, _spectrum(rows, path),
+        path, str(product.get("name") or path.stem), _spectrum(rows, path),
         _is_coated(product.get("coated_side")),
         thickness=None if thickness is None else thickness / 1000.0,
-        conductivity=measured.get("conductivity"),
-        emissivity=(measured.get("emissivity_front"), measured.get("emissivity_back")),
-        infrared_transmittance=measured.get("tir_front"),
-        visible=None if None in stated else stated,
+        conductivity=_stated(measured, "conductivity", path),
+        emissivity=(
+            _stated(measured, "emissivity_front", path),
+            _stated(measured, "emissivity_back", path),
+        ),
+        infrared_transmittance=_stated(measured, "tir_front", path),
+        visible=None if tau is None or front is None or back is None else (tau, front, back),
     )  # fmt: skip
+
+
+def _stated(table: dict[str, Any], name: str, path: Path) -> float | None:
+    """The finite number that a table states, None where it does not."""
+    value = table.get(name)
+    try:
+        number = None if value is None else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = np.nan
+    if number is not None and not np.isfinite(number):
+        raise DataError(f"expected a number, got {str(value)[:40]!r}", file=path, field=name)
+    return number
 
 
 _HEADER = re.compile(r"^\{(?P<content>.*)\}(?P<value>.*)$")
@@ -161,7 +186,7 @@ def _optics(text: str, path: Path) -> PaneFile:
         raise DataError("expected rows of wavelength, T, Rf, Rb", file=path)
     if "nano" not in headers.get("units, wavelength units", "").lower():
         rows = [[1000.0 * row[0], *row[1:]] for row in rows]
-    numbers = re.findall(r"[\d.]+", headers.get("emissivity, front back", ""))
+    numbers = re.findall(r"\d+\.?\d*|\.\d+", headers.get("emissivity, front back", ""))
     front, back, *_ = [*(float(n) for n in numbers[:2]), None, None]
     millimetres = _number(headers.get("thickness"))
     return PaneFile(
@@ -191,7 +216,7 @@ def _spectrum(rows: Sequence[Sequence[float]], path: Path) -> FloatArray:
         return np.zeros((0, 4))
     try:
         table = np.array(rows, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         table = np.zeros(0)
     if table.ndim != 2 or table.shape[1] != 4 or not np.isfinite(table).all():
         raise DataError("expected rows of wavelength, T, Rf, Rb", file=path, field="spectral_data")
