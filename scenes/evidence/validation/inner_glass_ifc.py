@@ -63,7 +63,7 @@ def borrowing_scene(building: Building, space: Space) -> DaylightScene | None:
     if inner is None:
         return None
     windows = room_windows(space, systems)
-    scene = room_scene(building, space, windows, (SensorGrid(spacing=1.0),), 32, inner)
+    scene = room_scene(building, space, windows, (SensorGrid(spacing=1.0),), 32, inner=inner)
     few = np.linspace(0, len(scene.points) - 1, MOST_SENSORS).round().astype(int)
     few = np.unique(few)
     chosen = replace(scene, points=scene.points[few], normals=scene.normals[few], view=None)
