@@ -64,6 +64,21 @@ def room_features(space: Space) -> NDArray[np.float64]:
     return np.array(rows).reshape(-1, 13)
 
 
+def same_hues(a: Space, b: Space) -> bool:
+    """Whether two rooms alike have the same colours, not reflectances alone."""
+    return _same(_hues(a), _hues(b))
+
+
+def _hues(space: Space) -> NDArray[np.float64]:
+    """Rows [N, 6] of faces and furniture: place from the room's lowest corner [m], scaled hue."""
+    corner, scale = space.shell.reshape(-1, 3).min(axis=0), ALIKE / ALIKE_SHARE
+    rows = [
+        [*(centroid(part.triangles) - corner), *(scale * value for value in part.hue)]
+        for part in (*space.faces, *space.furniture)
+    ]
+    return np.array(rows).reshape(-1, 6)
+
+
 def _gloss(face: Face) -> tuple[float, float]:
     """Reflectance at normal incidence and roughness of a face's gloss."""
     return (0.0, 0.0) if face.gloss is None else (face.gloss.at_normal, face.gloss.roughness)

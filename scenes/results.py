@@ -27,6 +27,14 @@ class LuminancePicture:
 
 
 @dataclass(frozen=True, slots=True)
+class ColourPicture:
+    """One of the luminance pictures in its colours."""
+
+    hour: int  # index into the times of the result
+    radiance: NDArray[np.float32]  # [ny, nx, 3] linear sRGB [W/m2/sr]
+
+
+@dataclass(frozen=True, slots=True)
 class GridDaylight:
     """Daylight of a sensor grid that the building's file holds."""
 
@@ -71,6 +79,7 @@ class GlareResults:
     view: View
     pictures: tuple[LuminancePicture, ...]
     rule: str = ""  # what their glare sources are
+    colour: ColourPicture | None = None  # of the hour with most light at the eye, where asked for
 
     @property
     def worst(self) -> float:

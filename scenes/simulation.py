@@ -128,6 +128,7 @@ def simulate(
         operation=None if operation is None else operation.file,
         spaces=(room.space.guid,),
         cache=cache,
+        colour=False,  # a picture of the report
         quick=quick,
         room=RoomOptions.of(**options),
     )

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.colour import WHITE, relative_rgb
 from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
 from mitsuba_cfs.methods.path_light import PathSystems
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -28,6 +29,9 @@ LEAST_K, MOST_K = 4000.0, 25000.0  # that CIE's daylight is defined for
 NANOMETRES = np.arange(380.0, 781.0, 5.0)
 # Of the standard spectra of ASTM G173-03
 WATER_CM, OZONE_CM, AEROSOL_500NM, PRESSURE_PA = 1.42, 0.34, 0.084, 101325.0
+NEUTRAL = 0.02  # greatest share by which a band of what is called grey differs from its luminance
+SMOOTHING_STEPS = (1, 2, 4, 8)  # pixels between the places that are averaged
+ALIKE = 0.1  # of the logarithm of luminances that belong together
 LOWEST_SUN = 0.05  # sine of the altitude below which its colour stays as there (87 degrees zenith)
 
 
@@ -107,12 +111,30 @@ def _sky_of(patches: int) -> ReinhartSky:
     return next(sky for mf in (1, 2, 4, 6) if (sky := ReinhartSky(mf)).size == patches)
 
 
+def has_colour(bands: Sequence[DaylightScene], sky: AnnualSky, hour: int) -> bool:
+    """Whether a picture of the scenes by red, green and blue in one of the hours L is not grey.
+
+    It is where all surfaces reflect the bands alike and the hour's daylight is neutral all over.
+    """
+    first, *others = bands
+    for own, theirs in ((first, other) for other in others):
+        for one, two in ((own.interior, theirs.interior), (own.exterior, theirs.exterior)):
+            if not np.array_equal(one.reflectance, two.reflectance):
+                return True
+    shade = daylight_colour(sky, hour)
+    lights = [shade.patches[np.asarray(sky.without_sun(hour)) > 0]]
+    if sky.illuminance[hour] > 0:
+        lights.append(shade.sun[None])
+    return any(np.abs(light - 1).max(initial=0) > NEUTRAL for light in lights)
+
+
 def coloured_picture(
     luminance: NDArray[np.float32],
     bands: Sequence[PathSystems],
     sky: AnnualSky,
     hour: int,
     *,
+    state: Sequence[int] | None = None,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
     """Radiance [ny, nx, 3] of a luminance picture [cd/m2] of one hour, in its colours.
@@ -120,7 +142,9 @@ def coloured_picture(
     Each pixel keeps its luminance; its colour is that of three bands traced with an eighth of the
     paths each, which share their random numbers.
 
-    Args: bands: the scene with its view by red, green and blue, with the same systems.
+    Args:
+        bands: the scene with its view by red, green and blue, with the same systems.
+        state: of each window group [G]; the first by default.
     """
     shade = daylight_colour(sky, hour)
     patches, towards = np.asarray(sky.without_sun(hour)), sky.direction[hour]
@@ -129,12 +153,41 @@ def coloured_picture(
     chosen, view = bands[0].sampling, bands[0].scene.view
     if view is None:
         raise ValueError("a picture needs the scene's view")
-    rooms = [band.room([0] * len(band.systems)) for band in bands]
+    held = [0] * len(bands[0].systems) if state is None else state
+    rooms = [band.room(held) for band in bands]
     rgb = colour_picture(
         rooms, skies, view,
         samples=max(chosen.picture_samples // FEWER, 1), seed=chosen.seed, progress=progress,
     )  # fmt: skip
-    return with_luminance(rgb, luminance)
+    return with_luminance(smoothed_colour(rgb, luminance), luminance)
+
+
+def smoothed_colour(
+    rgb: NDArray[np.floating], luminance: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """The bands of a picture [ny, nx, 3], averaged where the picture's luminance is nearly alike.
+
+    Few paths leave blotches of colour, where the luminance, of many more paths, shows what belongs
+    together.
+
+    Source: Dammertz, Sewtz, Hanika, Lensch 2010, High Performance Graphics, 67-75 (edge-avoiding
+    a-trous wavelets).
+    """
+    spline = np.array([1, 4, 6, 4, 1]) / 16.0
+    guide = np.log(np.maximum(luminance, 1e-6))
+    found, (ny, nx) = np.asarray(rgb, dtype=float), guide.shape
+    for step in SMOOTHING_STEPS:
+        total, weights = np.zeros_like(found), np.zeros_like(guide)
+        for dy, dx in np.ndindex(5, 5):
+            y, x = (
+                np.clip(np.arange(n) + (d - 2) * step, 0, n - 1) for n, d in ((ny, dy), (nx, dx))
+            )
+            unlike = (guide[np.ix_(y, x)] - guide) / ALIKE
+            weight = spline[dy] * spline[dx] * np.exp(-(unlike**2)) * (luminance[np.ix_(y, x)] > 0)
+            total += weight[..., None] * found[np.ix_(y, x)]
+            weights += weight
+        found = total / np.maximum(weights, 1e-12)[..., None]
+    return found
 
 
 def with_luminance(

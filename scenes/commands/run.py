@@ -59,6 +59,10 @@ _DEFAULT = RoomOptions()
     help="Balance each room's heat alone, as if rooms of its own temperature lay around it.",
 )  # fmt: skip
 @click.option(
+    "--no-colour", is_flag=True,
+    help="Leave each room's picture in colour out; --quick does as well.",
+)  # fmt: skip
+@click.option(
     "--explore", is_flag=True,
     help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
 )  # fmt: skip
@@ -86,6 +90,7 @@ def command(
     no_cache: bool,
     inner_glass: bool,
     no_coupled_heat: bool,
+    no_colour: bool,
     explore: bool,
     netcdf: bool,
     quick: bool,
@@ -111,7 +116,7 @@ def command(
     options = JobOptions(
         building, weather, system, spaces, join, furniture, apertures, not no_cache, quick,
         RoomOptions.of(**chosen), operation=operation, explore=explore, inner_glass=inner_glass,
-        coupled_heat=not no_coupled_heat, netcdf=netcdf,
+        coupled_heat=not no_coupled_heat, netcdf=netcdf, colour=not (no_colour or quick),
         u_value=u_value, g_value=g_value, surroundings=surroundings,
         surroundings_offset=surroundings_offset,
     )  # fmt: skip

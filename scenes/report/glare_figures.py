@@ -15,7 +15,7 @@ from scenes.language.catalogue import said
 from scenes.pictures import tone_mapped
 from scenes.report.numbers import counted, rounded, significant
 from scenes.report.tables import glare_class, spoken
-from scenes.results import LuminancePicture, RoomYear, RunResult
+from scenes.results import GlareResults, LuminancePicture, RoomYear, RunResult
 
 MOST_PICTURES = 4  # the worst ones; the table has them all
 MOST_OF_A_RUN = 24  # shared by its rooms, so that the file stays small
@@ -43,6 +43,16 @@ class GlarePicture:
 
 
 @dataclass(frozen=True, slots=True)
+class ColourView:
+    """One of the pictures in its colours, and a few words."""
+
+    title: str
+    words: str
+    seen: str  # data URI, tone-mapped
+    round: bool  # a fisheye: only the disc is a picture
+
+
+@dataclass(frozen=True, slots=True)
 class GlareGallery:
     """The worst pictures of a room and the scale they share."""
 
@@ -50,6 +60,7 @@ class GlareGallery:
     scale: ColourScale
     left_out: int
     reduced_to: int = 0  # [px] at most, where the run has many rooms
+    colour: ColourView | None = None
 
 
 def gallery(result: RunResult, room: RoomYear) -> GlareGallery | None:
@@ -63,7 +74,27 @@ def gallery(result: RunResult, room: RoomYear) -> GlareGallery | None:
     side = SIDE_OF_MANY if many else LARGEST_SIDE
     shown = tuple(glare_picture(result, room.glare.view, p, scale, side) for p in chosen)
     cut = many and max(chosen[0].luminance.shape) > side
-    return GlareGallery(shown, scale, len(pictures) - len(chosen), side if cut else 0)
+    left, colour = len(pictures) - len(chosen), colour_view(result, room.glare, side)
+    return GlareGallery(shown, scale, left, side if cut else 0, colour)
+
+
+def colour_view(result: RunResult, glare: GlareResults, side: int) -> ColourView | None:
+    """The picture in colour reduced to `side` pixels at most; None where the room has none."""
+    if glare.colour is None:
+        return None
+    radiance = glare.colour.radiance
+    factor = int(np.ceil(max(radiance.shape) / side))
+    return ColourView(
+        title=spoken(result.times[glare.colour.hour]),
+        words=sun_words(result, glare.colour.hour),
+        seen=photo_uri(tone_mapped(reduced(radiance.astype(float), factor))),
+        round=is_round(glare.view),
+    )
+
+
+def is_round(view: View) -> bool:
+    """Whether only the disc of a view's picture is one."""
+    return view.kind in ("angular", "hemispherical") and view.horizontal_deg == 180
 
 
 def luminance_scale(pictures: list[LuminancePicture]) -> ColourScale:
@@ -104,7 +135,7 @@ def glare_picture(
         numbers=", ".join(part for part in (numbers, sources, brightest) if part),
         falsecolour=png_uri(scale.rgba(luminance)[..., :3]),
         seen=photo_uri(seen),
-        round=view.kind in ("angular", "hemispherical") and view.horizontal_deg == 180,
+        round=is_round(view),
     )
 
 

@@ -38,6 +38,7 @@ from scenes.results import (
     ThermalResult,
 )
 from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
+from scenes.room.colour import band_scenes, brightest_picture, with_colour
 from scenes.room.control import shading_states
 from scenes.room.daylight import NO_SENSORS, HeldSensors, room_daylight, room_scene
 from scenes.room.envelope import enveloped
@@ -248,6 +249,21 @@ class RoomSimulation:
             self.pictured, self.scene.view, self.lit_state, hours,
             rating=rating_of(self.outputs), progress=self.progress,
         )  # fmt: skip
+
+    def coloured(self, glare: GlareResults) -> GlareResults:
+        """The pictures with the brightest of them in colour."""
+        if not glare.pictures:
+            return glare
+        self.progress("colour", 0.0)
+        hour, groups = brightest_picture(glare).hour, self.windows.groups
+        sky = annual_sky(self.weather, self.sampling.subdivision, hours=[hour], **self.options.sky)
+        found = with_colour(
+            glare, band_scenes(self.building, self.space, groups, glare.view),
+            self.light.filled.systems[: len(groups)], sky, state=int(self.state[hour]),
+            sampling=self.sampling, progress=part(self.progress, 0.0, 1.0, "colour"),
+        )  # fmt: skip
+        self.progress("colour", 1.0)
+        return found
 
     @cached_property
     def outdoors(self) -> PhaseScene:

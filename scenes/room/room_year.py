@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -41,6 +42,7 @@ class RoomChoices(TypedDict, total=False):
     skies: AnnualSky | None
     cache: MatrixCache | None
     pictures: bool
+    colour: bool
     explore: bool
     rate: tuple[str, NDArray[np.int64]] | None
     inner: bool
@@ -80,6 +82,7 @@ def lit_room(
     skies: AnnualSky | None = None,
     cache: MatrixCache | None = None,
     pictures: bool = True,
+    colour: bool = False,
     explore: bool = False,
     rate: tuple[str, NDArray[np.int64]] | None = None,
     inner: bool = False,
@@ -98,6 +101,7 @@ def lit_room(
         cache: where traced matrices are kept and found again, `MatrixCache.of_user()`.  Systems
             and weather do not enter V and D: variants of them cost only algebra.
         pictures: False leaves the luminance pictures and their glare out.
+        colour: True gives the picture with most light at the eye in colour too.
         explore: True gives every hour's picture in every state, for the explorer.
         rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate by it.
         inner: True lets light of rooms with windows in through glass; phase methods only.
@@ -122,6 +126,8 @@ def lit_room(
         year = room.timed("annual glare", room.annual_glare)
     if pictures:
         rated = room.timed("glare", lambda: room.glare(hours, year))
+    if colour:
+        rated = room.timed("colour", partial(room.coloured, rated))
     dgp = None if rate is None else room.timed("glare", lambda: room.rated(*rate))
     explored = room.timed("explorer", room.explored) if explore else None
     heat = room.timed("thermal", room.heat_inputs)

@@ -39,6 +39,7 @@ class JobOptions(BuildingOptions):
     operation: Path | None = None
     inner_glass: bool = False  # light passes glass and open doorways between rooms
     coupled_heat: bool = True  # heat flows between the rooms that are computed
+    colour: bool = True  # each room's brightest picture in colour too
     explore: bool = False  # every hour's picture in every shading state, for the explorer
     netcdf: bool = False  # all numbers of the run as one netCDF file besides
     u_value: float | None = None  # of the system [W/(m2 K)]; None: what the files say, else a rule

@@ -12,7 +12,7 @@ import pandas as pd
 from bim.names import folder_names
 from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
-from scenes.pictures import write_falsecolour
+from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.result_folder import ResultFolder
 from scenes.results import GridDaylight, RoomYear, RunResult
 from scenes.room.daylight import illuminance_table
@@ -108,6 +108,11 @@ def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
         write_hdr(place / f"{name}.hdr", picture.luminance, room.glare.view)
         title = f"{result.times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
         write_falsecolour(place / f"{name}.png", picture.luminance, title=title)
+    if (colour := room.glare.colour) is not None:
+        name = f"view_{result.times[colour.hour]:%m-%d_%Hh}_colour"
+        write_hdr(place / f"{name}.hdr", colour.radiance, room.glare.view)
+        title = f"{result.times[colour.hour]:%d %B %H:%M}"
+        write_tone_mapped(place / f"{name}.png", colour.radiance, scale=True, title=title)
 
 
 def _write_grids(grids: Sequence[GridDaylight], place: Path) -> None:

@@ -48,7 +48,7 @@ class RoomWork(Generic[R]):
         return self.function(
             inputs.building, space, inputs.systems, inputs.weather, options.room,
             operation=inputs.operation, skies=self.skies, cache=cache, explore=options.explore,
-            inner=options.inner_glass, progress=progress,
+            colour=options.colour, inner=options.inner_glass, progress=progress,
         )  # fmt: skip
 
     def beside(

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from bim.model import Building, Problem, Space
 from bim.sensors import held_grids
+from bim.templates import same_hues
 from bim.to_thermal import same_surfaces
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -220,6 +221,7 @@ def _series(
             not borrows(one, other)
             and not any(held_grids(inputs.building, space) for space in (one, other))
             and _operated_alike(inputs, one, other)
+            and (not options.colour or same_hues(one, other))
             and alike(one, other)
         ),
         beside=None if workers is None else partial(work.beside, workers=workers),

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bim.model import COLOURS, Building, Space
-from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
@@ -15,6 +14,7 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.room.colour import band_scenes
 from scenes.room.drawn_shades import traced_building
 from scenes.room.holes import hole_notes
 from scenes.room.windows import room_windows
@@ -79,12 +79,9 @@ def read_viewed_room(
     filled = {guid: states[:1] for guid, states in fill_windows(room.windows, given, file).items()}
     windows = room_windows(room, filled)
     building = traced_building(building, filled)
-
-    def scene(band: str) -> DaylightScene:
-        inside, outside = furnished_surfaces(room, band), exterior_surfaces(building, room, band)
-        return DaylightScene(inside, outside, windows.groups, view=view)
-
     systems = tuple(system for (system,) in windows.systems)
-    bands = tuple(scene(band) for band in COLOURS) if colour else ()
+    visible, *bands = band_scenes(
+        building, room, windows.groups, view, ("visible", *(COLOURS if colour else ()))
+    )
     sources = window_sources(room.windows, filled)
-    return ViewedRoom(room, scene("visible"), systems, windows.optics(), sources, bands)
+    return ViewedRoom(room, visible, systems, windows.optics(), sources, tuple(bands))

@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from bim.model import Building, Element, Problem, Space
 from bim.sensors import sensor_grid, view_point
 from bim.shoebox import WindowRectangle, shoebox
+from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
 from mitsuba_cfs.images.view import View, fisheye, rays
 from scenes.results import (
+    ColourPicture,
     DaylightResult,
     GlareResults,
     LuminancePicture,
@@ -176,7 +179,15 @@ def glare_results(space: Space, hours, illuminance, size: int) -> GlareResults:
                  "cgi": 24.1 - rank, "sources": float(3 - min(rank, 2)),
                  "dgp_standard_error": 2e-5}  # fmt: skip
         pictures.append(LuminancePicture(int(hour), luminance, glare, mask))
-    return GlareResults(view, tuple(pictures))
+    shown = max(pictures, key=lambda picture: picture.glare["ev"], default=None)
+    colour = None if shown is None else ColourPicture(shown.hour, warm(shown.luminance))
+    return GlareResults(view, tuple(pictures), colour=colour)
+
+
+def warm(luminance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Radiance [ny, nx, 3] of a luminance picture, redder than grey."""
+    tint = np.array([1.3, 0.95, 0.6])
+    return luminance[..., None] / EFFICACY * (tint / (tint @ np.asarray(LUMINANCE_WEIGHTS)))
 
 
 def fisheye_luminance(space: Space, view: View, sky: float, seed: int):

@@ -177,3 +177,18 @@ def test_report_of_little(result) -> None:
 def test_no_room_is_a_wrong_call(result) -> None:
     with pytest.raises(ValueError, match="at least one room"):
         report_html(replace(result, spaces=()))
+
+
+def test_a_room_shows_one_picture_in_colour_where_it_has_one() -> None:
+    result = run_result(picture_size=64, pictures=2)
+    first, second = result.spaces
+    plain = replace(second, glare=replace(second.glare, colour=None))
+    html = report_html(replace(result, spaces=(first, plain)))
+    assert html.count("<figcaption><b>In colour: ") == 1
+    found = gallery(result, first).colour
+    assert first.glare.colour is not None and gallery(result, plain).colour is None
+    assert found.title in html and found.round
+    shown = Image.open(io.BytesIO(base64.b64decode(found.seen.partition(",")[2])))
+    assert shown.size == (64, 64)
+    red, _, blue = np.asarray(shown, dtype=float).reshape(-1, 3).mean(axis=0)
+    assert red > 1.2 * blue, "the made-up room is lit by a red light"

@@ -114,6 +114,14 @@ def test_without_quick_nothing_is_chosen(chosen: list) -> None:
     assert chosen == [JobOptions(OFFICE, WEATHER, VENETIAN_BLIND)]
 
 
+@pytest.mark.parametrize(
+    ("words", "colour"), [([], True), (["--no-colour"], False), (["--quick"], False)]
+)
+def test_a_quick_run_has_no_picture_in_colour(chosen: list, words: list[str], colour: bool) -> None:
+    run([*RUN, *words])
+    assert [options.colour for options in chosen] == [colour]
+
+
 def test_what_the_user_gives_holds_in_a_year_of_glare(chosen: list, tmp_path) -> None:
     out = ["--out", str(tmp_path / "dgp")]
     run(["dgp", *out, "--quick"])

@@ -105,6 +105,8 @@ def test_two_processes_give_what_one_gives(variant, weather, glass):
         np.testing.assert_array_equal(mine.heat.air_c, theirs.heat.air_c)
         (picture,), (same,) = mine.glare.pictures, theirs.glare.pictures
         np.testing.assert_array_equal(picture.luminance, same.luminance)
+        assert mine.glare.colour is not None and theirs.glare.colour is not None
+        np.testing.assert_array_equal(mine.glare.colour.radiance, theirs.glare.colour.radiance)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from mitsuba_cfs.methods.colour_view import (
     daylight_colour,
     daylight_rgb,
     sky_temperature,
+    smoothed_colour,
     sun_colour,
     with_luminance,
 )
@@ -66,6 +67,20 @@ def test_a_picture_keeps_its_luminance() -> None:
     assert luminance(found) == pytest.approx(grey, rel=1e-6)
     assert found[0, 0] / found[0, 0, 1] == pytest.approx([2.0, 1.0, 0.5])
     assert np.ptp(found[0, 1]) == 0.0
+
+
+def test_blotches_are_smoothed_and_edges_of_the_picture_stay() -> None:
+    """Noise of colour on two walls of other luminance: each gets its mean, none the other's."""
+    luminance = np.full((60, 80), 100.0)
+    luminance[:, 40:] = 200.0
+    wall = np.where((luminance > 150)[..., None], (2.0, 0.8, 0.5), (0.5, 1.1, 1.5))
+    noisy = wall * np.random.default_rng(0).gamma(4.0, 0.25, wall.shape)
+    found = smoothed_colour(noisy, luminance)
+    inner = found[10:-10, 10:-10] / wall[10:-10, 10:-10]
+    assert inner.mean() == pytest.approx(1.0, abs=0.02)
+    assert inner.std() < 0.1 * (noisy / wall).std()
+    edge = found[10:-10, 38:42] / wall[10:-10, 38:42]
+    assert edge.mean(axis=(0, 1)) == pytest.approx(np.ones(3), abs=0.1)
 
 
 @pytest.mark.usefixtures("variant")
