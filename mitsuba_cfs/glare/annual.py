@@ -181,7 +181,11 @@ class ThreePhasePictures:
         self, batch: NDArray[np.int64]
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """See `Pictures`; the sun is part of the patches."""
-        return self.values(batch), [None] * len(batch)
+        return self.values(batch), self.discs(batch)
+
+    def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
+        """See `Pictures`; none, for the sun is part of the patches."""
+        return [None] * len(batch)
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `Pictures`; none where the halves are not known."""

@@ -11,6 +11,7 @@ from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.picture_year import codes, low_rank
 from mitsuba_cfs.picture_year.year import PictureYear, picture_year
 from tests.explore.synthetic import MadeUpPictures
+from tests.glare.test_annual import made_up
 from tests.report.synthetic import sun_directions
 
 VIEW = fisheye((2.5, 3.0, 1.2), (0.2, -1.0, 0.0), 64)
@@ -39,6 +40,12 @@ def test_pictures_come_back(pictures, year) -> None:
         given, kept = _whole(pictures, hour), year.values(hour)
         # levels of the beam are 4 % apart, windows are corrected from 8 % of the logarithm on
         assert kept == pytest.approx(given, rel=0.085, abs=2.0)
+
+
+def test_pictures_whose_patches_hold_the_sun_have_no_disc() -> None:
+    year = picture_year(made_up())
+    assert year.discs == (None,) * 9
+    assert year.check is not None and year.check.kept == pytest.approx(year.check.dgp, abs=0.002)
 
 
 def test_illuminance_at_the_eye_is_kept(pictures, year) -> None:
