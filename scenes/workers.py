@@ -52,11 +52,8 @@ class Tasks(Generic[T, R]):
         elif processes > 1:
             yield from self._beside_each_other(processes)
         else:
-            yield from map(self.attempted, self.items)
-
-    def attempted(self, item: T) -> R:
-        """The result of a task, or what its failure gives."""
-        return _attempted(self.compute, self.failed, item)
+            for item in self.items:
+                yield _attempted(self.compute, self.failed, item)
 
     def _waves(self) -> tuple[list[T], dict[str, list[T]]]:
         """The first task of each scene, and by the key of that one those that follow it."""

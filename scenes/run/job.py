@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from bim.model import Building, Space
 from bim.to_thermal import shared_constructions
@@ -11,6 +12,7 @@ from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.thermal_file import files_beside
 from scenes.room.drawn_shades import traced_building
 from scenes.room.inner_glass import lending_rooms, opened
 from scenes.room.operation import Operation, check_states
@@ -88,6 +90,20 @@ def job_inputs(
         check_schedules(used.tables, weather, used.file)
     building = traced_building(building, systems)
     return JobInputs(building, spaces, weather, systems, used, stated, several)
+
+
+def input_files(options: JobOptions, inputs: JobInputs) -> dict[str, Path]:
+    """The files that a run is made of, by what they are."""
+    files = {"building": options.building, "weather": options.weather}
+    files = {name: path for name, path in files.items() if path is not None}
+    if options.system is not None:
+        files["system"] = options.system
+        for i, path in enumerate(files_beside(options.system)):
+            files[f"system_angular_{i}" if i else "system_thermal"] = path
+    if inputs.operation is not None and inputs.operation.file != options.building:
+        files["operation"] = inputs.operation.file
+        files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
+    return files | {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
 
 
 def balanced_together(inputs: JobInputs, options: JobOptions) -> bool:

@@ -6,18 +6,18 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Generic, TypeVar
 
 from bim.model import Space
 from mitsuba_cfs import variants
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.source_code import code_version
 from scenes.room.room import skies_for
 from scenes.run.inputs import sha256
-from scenes.run.job import JobInputs, read_inputs, run_spaces
+from scenes.run.job import JobInputs, input_files, read_inputs, run_spaces
 from scenes.run.options import JobOptions
 from scenes.workers import Tasks
 
@@ -38,6 +38,7 @@ class RoomWork(Generic[R]):
 
     function: Callable[..., R]  # `compute_room` or `lit_room`
     inputs: JobInputs
+    spaces: Sequence[Space]  # `run_spaces`
     skies: AnnualSky
     options: JobOptions
 
@@ -57,8 +58,8 @@ class RoomWork(Generic[R]):
         """Each room, in any order, with its result or with why it has none."""
         rooms = {space.guid: space for space in spaces}
         here = workers.scheduler is None
-        compute = _Here(self) if here else _FromFiles(self.function, self.options)
-        run = "" if here else _identity(self.options)
+        run = "" if here else _identity(self.options, self.inputs)
+        compute = _Here(self) if here else _FromFiles(self.function, self.options, run)
         tasks = Tasks(
             list(rooms), compute, _failed, key=lambda guid: f"{run}{guid}", scene=lambda guid: guid
         )
@@ -67,8 +68,7 @@ class RoomWork(Generic[R]):
 
     def of(self, guid: str) -> R:
         """What comes of the room with a GUID."""
-        spaces = run_spaces(self.inputs, self.options)
-        return self(next(space for space in spaces if space.guid == guid))
+        return self(next(space for space in self.spaces if space.guid == guid))
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,30 +84,36 @@ class _Here(Generic[R]):
 
 @dataclass(frozen=True, slots=True)
 class _FromFiles(Generic[R]):
-    """A room by its GUID, with inputs read where it is computed, once in each process."""
+    """A room by its GUID, with inputs read where it is computed, once in each process.
+
+    Raises: `DataError` where the files there, or the program, are not those of the command.
+    """
 
     function: Callable[..., R]
     options: JobOptions
+    run: str  # its identity
 
     def __call__(self, guid: str) -> tuple[str, R]:
         variants.activate()
-        return guid, RoomWork(self.function, *_read(self.options), self.options).of(guid)
+        return guid, RoomWork(self.function, *_read(self.options, self.run), self.options).of(guid)
 
 
 @lru_cache(maxsize=1)
-def _read(options: JobOptions) -> tuple[JobInputs, AnnualSky]:
+def _read(options: JobOptions, run: str) -> tuple[JobInputs, list[Space], AnnualSky]:
     inputs, room = read_inputs(options, silent), options.room
-    return inputs, skies_for(inputs.weather, room.method, room.sampling, **room.sky)
+    if _identity(options, inputs) != run:
+        message = "a worker has other input files or another version of the program"
+        raise DataError(message, field="--scheduler")
+    skies = skies_for(inputs.weather, room.method, room.sampling, **room.sky)
+    return inputs, run_spaces(inputs, options), skies
 
 
 def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:
     return guid, error
 
 
-def _identity(options: JobOptions) -> str:
-    """What tells the rooms of this run from those of others on the same cluster."""
+def _identity(options: JobOptions, inputs: JobInputs) -> str:
+    """What tells the rooms of this run from those of others: options, program, files' contents."""
     said = [repr(options), code_version(__name__)]
-    for path in options.named().values():
-        if isinstance(path, Path) and path.is_file():
-            said.append(sha256(path))
+    said += map(sha256, input_files(options, inputs).values())
     return hashlib.sha256("\n".join(said).encode()).hexdigest()[:16] + "-"

@@ -23,7 +23,6 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
 from scenes.fenestration.resolver import source_notes
 from scenes.fenestration.systems import FenestrationSystem
-from scenes.fenestration.thermal_file import files_beside
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
@@ -38,6 +37,7 @@ from scenes.run.inputs import sha256
 from scenes.run.job import (
     JobInputs,
     balanced_together,
+    input_files,
     read_inputs,
     run_spaces,
     used_sources,
@@ -160,7 +160,7 @@ def _rooms(
 ) -> tuple[list[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
     if not balanced_together(inputs, options):
-        alone = RoomWork(compute_room, inputs, skies, options)
+        alone = RoomWork(compute_room, inputs, run_spaces(inputs, options), skies, options)
         series = _series(alone, workers, alone, moved_result)
         return replace(series, on_room=on_room or (lambda room: None)).results(progress)
 
@@ -169,7 +169,7 @@ def _rooms(
         steps("heat", 1.0)
         return found
 
-    light = RoomWork(lit_room, inputs, skies, options)
+    light = RoomWork(lit_room, inputs, run_spaces(inputs, options), skies, options)
     together = _series(light, workers, compute_light, moved_light, same_surfaces)
     heard = on_light or (lambda room: None)
     together = replace(together, on_room=heard, given="daylight, glare and sun are")
@@ -210,7 +210,7 @@ def _series(
 
     return RoomSeries(
         inputs.building,
-        run_spaces(inputs, options),
+        work.spaces,
         inputs.systems,
         options.room.sampling,
         MatrixCache.of_user() if options.cache else None,
@@ -243,21 +243,12 @@ def _manifest(
     results: list[RoomYear],
 ) -> dict:
     """What a reader needs to make the same numbers again."""
-    files = {"building": options.building, "weather": options.weather}
-    files = {name: path for name, path in files.items() if path is not None}
-    if options.system is not None:
-        files["system"] = options.system
-        for i, path in enumerate(files_beside(options.system)):
-            files[f"system_angular_{i}" if i else "system_thermal"] = path
-    if inputs.operation is not None and inputs.operation.file != options.building:
-        files["operation"] = inputs.operation.file
-        files |= {f"state_{i}": path for i, path in enumerate(inputs.operation.files)}
-    files |= {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")
     return {
         "quick": options.quick,
         "inputs": {
-            name: {"path": str(path), "sha256": sha256(path)} for name, path in files.items()
+            name: {"path": str(path), "sha256": sha256(path)}
+            for name, path in input_files(options, inputs).items()
         },
         "building": inputs.building.name,
         "site": inputs.weather.site,

@@ -12,10 +12,12 @@ import pytest
 from bim.model import Building, Space
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.room.options import RoomOptions
 from scenes.run import rooms as series
-from scenes.run.job import JobInputs
+from scenes.run import rooms_apart
+from scenes.run.job import JobInputs, read_inputs
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import Workers
@@ -80,6 +82,27 @@ def test_what_is_no_fault_of_a_room_ends_the_run():
     broken = replace(rooms, beside=lambda some: iter([(some[0], DataError("file is gone"))]))
     with pytest.raises(DataError, match="file is gone"):
         broken.results()
+
+
+@pytest.mark.usefixtures("variant")
+def test_a_worker_with_other_files_than_the_command_has_computes_nothing(tmp_path):
+    """Nor does one that read them before they were changed."""
+    building = tmp_path / "rooms.hbjson"
+    text = (REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson").read_text()
+    building.write_text(text)
+    options = JobOptions(building, WEATHER, VENETIAN_BLIND, cache=False, room=SMALL)
+
+    def command() -> rooms_apart._FromFiles:
+        run = rooms_apart._identity(options, read_inputs(options, silent))
+        return rooms_apart._FromFiles(lambda building, space, *rest, **more: text, options, run)
+
+    before = command()
+    (name,) = {space.guid for space in read_inputs(options, silent).spaces if "Hall" in space.label}
+    assert before(name) == (name, text)
+    building.write_text(text + "\n")
+    assert command()(name) == (name, text)
+    with pytest.raises(DataError, match="--scheduler: a worker has other input files"):
+        before(name)
 
 
 @pytest.mark.slow
