@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from bim.model import Building, Element, Space
 from bim.rays import ray_mesh
 from bim.to_thermal import ThermalRoom
-from mitsuba_cfs.surfaces import points_on_triangles
+from mitsuba_cfs.surfaces import even_numbers, points_on_triangles
 
 DEEPEST_WALL = 1.2  # [m] from its face in the room
 TOUCHING = 0.05  # [m] wider gaps are outdoors: no cladding lies beyond them
 OFF_THE_WALL = 0.02  # [m] sensors stand this far before the outer face
 PLACES = 64  # on each surface, a power of two
 MOST_STEPS = 24  # surfaces that a ray is followed through
-ROBERTS = 0.7548776662466927, 0.5698402909980532  # steps of his low-discrepancy sequence R2
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +66,7 @@ def outer_faces(building: Building, space: Space, room: ThermalRoom) -> OuterFac
 
 def _places(triangles: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Points [PLACES, 3] spread over triangles by area, and the triangle of each."""
-    u = (0.5 + np.arange(PLACES)[:, None] * ROBERTS) % 1.0
-    return points_on_triangles(triangles, u)
+    return points_on_triangles(triangles, even_numbers(PLACES))
 
 
 class _NearElements:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 CLOCK, DAYS = 24, 366  # hours of a day; days of a leap year, so that every date is there
 KINDS = ("monday", "tuesday", "wednesday", "thursday", "friday", "saturday", "sunday", "holiday")
 LEAP = 2024
+VAPORISING = 2.43e6  # heat of vaporisation at skin temperature [J/kg]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +79,11 @@ def hourly_means(starts: Sequence[float], values: Sequence[float]) -> NDArray[np
     hours = np.arange(CLOCK)[:, None]
     within = np.clip(np.minimum(ends, hours + 1) - np.maximum(at, hours), 0.0, 1.0)
     return within @ np.asarray(values, dtype=float)
+
+
+def vapour_g_h(latent_w: float) -> float:
+    """The vapour [g/h] that carries a person's latent heat [W]."""
+    return latent_w / VAPORISING * 3.6e6
 
 
 @dataclass(frozen=True, slots=True)

@@ -127,6 +127,13 @@ class WindowGroup:
         return self.windows[0].frame
 
 
+def even_numbers(count: int) -> NDArray[np.float64]:
+    """Numbers [n, 2] in [0, 1), evenly spread: Roberts' low-discrepancy sequence R2 (2018)."""
+    root = 1.324717957244746  # of x^3 = x + 1
+    steps = np.arange(count)[:, None] * np.array([1 / root, 1 / root**2])
+    return np.mod(0.5 + steps, 1.0)
+
+
 def points_on_triangles(
     triangles: NDArray[np.float64], u: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

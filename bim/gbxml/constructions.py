@@ -23,8 +23,7 @@ class Constructions:
 
     @cached_property
     def _by_id(self) -> dict[str, dict[str, ElementTree.Element]]:
-        kinds = ("Construction", "Layer", "Material", "WindowType")
-        return {kind: {one.get("id", ""): one for one in self.document.all(kind)} for kind in kinds}
+        return self.document.by_id(("Construction", "Layer", "Material", "WindowType"))
 
     def finish(self, name: str | None) -> SurfaceFinish:
         """Layers and reflectances of a construction; what it does not state is None."""
@@ -63,10 +62,7 @@ class Constructions:
     def _referred(
         self, owner: ElementTree.Element, kind: str, name: str | None
     ) -> ElementTree.Element:
-        found = self._by_id[kind].get(name or "")
-        if found is None:
-            raise self.document.fault(f"no {kind} {name!r:.60}", owner)
-        return found
+        return self.document.referred(owner, kind, name, self._by_id)
 
     def _layer(self, material: ElementTree.Element) -> list[MaterialLayer]:
         """The layer of a material; none where it states no resistance."""

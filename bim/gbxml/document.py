@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
@@ -79,6 +79,23 @@ class Document:
             if not element.get("id"):
                 raise self.fault("has no id", element, "id")
             yield element
+
+    def by_id(self, kinds: Sequence[str]) -> dict[str, dict[str, ElementTree.Element]]:
+        """The elements of some paths by their id."""
+        return {kind: {one.get("id", ""): one for one in self.all(kind)} for kind in kinds}
+
+    def referred(
+        self, owner: ElementTree.Element, kind: str, name: str | None,
+        known: Mapping[str, Mapping[str, ElementTree.Element]],
+    ) -> ElementTree.Element:  # fmt: skip
+        """The element that another one refers to.
+
+        Args: known: of `by_id`.
+        """
+        found = known[kind].get(name or "")
+        if found is None:
+            raise self.fault(f"no {kind} {name!r:.60}", owner)
+        return found
 
     def number(
         self, element: ElementTree.Element, *, least: float = -math.inf, most: float = math.inf

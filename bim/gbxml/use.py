@@ -24,6 +24,7 @@ from bim.use import (
     YearSchedule,
     day_of_year,
     hourly_means,
+    vapour_g_h,
 )
 
 WEEKDAYS, WEEKEND = KINDS[:5], KINDS[5:7]
@@ -35,7 +36,6 @@ DAY_TYPES = {  # the kinds of days of each; those of design days are in no year
 DESIGN_DAYS = ("HeatingDesignDay", "CoolingDesignDay", "CustomDay1", "CustomDay2")
 CELSIUS = {"C": (0.0, 1.0), "F": (32.0, 1.8), "K": (273.15, 1.0), "R": (491.67, 1.8)}
 HELD = {"Heated": "heating_c", "Cooled": "cooling_c"}
-VAPORISING = 2.43e6  # heat of vaporisation at skin temperature [J/kg]
 PERSON_AREA = {"SquareMPerPerson": 1.0, "SquareFtPerPerson": 0.3048**2}
 
 
@@ -70,7 +70,7 @@ class UseReader:
     @cached_property
     def _by_id(self) -> dict[str, dict[str, ElementTree.Element]]:
         paths = ("Campus/Building/Space", "Zone", "Schedule", "WeekSchedule", "DaySchedule")
-        return {path: {one.get("id", ""): one for one in self.document.all(path)} for path in paths}
+        return self.document.by_id(paths)
 
     def _share(self, element: ElementTree.Element, field: str) -> YearSchedule | None:
         name = element.get(field) or element.get("scheduleIdRef")
@@ -97,7 +97,7 @@ class UseReader:
         if "Sensible" in heat:
             yield "person_w", heat["Sensible"]
         if "Latent" in heat:
-            yield "person_vapour_g_h", heat["Latent"] / VAPORISING * 3.6e6
+            yield "person_vapour_g_h", vapour_g_h(heat["Latent"])
         if set(heat) == {"Total"}:
             self._said["PeopleHeatGain that is total alone | not used: a person gives 75 W"] = None
 
@@ -193,10 +193,7 @@ class UseReader:
     def _referred(
         self, owner: ElementTree.Element, kind: str, name: str | None
     ) -> ElementTree.Element:
-        found = self._by_id[kind].get(name or "")
-        if found is None:
-            raise self.document.fault(f"no {kind} {name!r:.60}", owner)
-        return found
+        return self.document.referred(owner, kind, name, self._by_id)
 
     def _rules(self, schedule: ElementTree.Element) -> Iterator[DayRule]:
         """The days of a schedule; single kinds of days go before those of several."""

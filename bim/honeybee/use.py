@@ -18,7 +18,7 @@ from bim.honeybee.library import NamedObjects, listed
 from bim.honeybee.schedules import ScheduleLibrary
 from bim.honeybee.schema import HoneybeeRoom
 from bim.model import NOT_USED, Problem, Space
-from bim.use import ALWAYS, ScheduledValue, StatedUse, YearSchedule
+from bim.use import ALWAYS, ScheduledValue, StatedUse, YearSchedule, vapour_g_h
 
 LOADS = ("people", "lighting", "electric_equipment", "gas_equipment", "infiltration",
          "ventilation", "setpoint")  # fmt: skip
@@ -31,7 +31,6 @@ PASSED_OVER = {  # of a room's extension of energy, in words
 }
 INDOORS = 24.0  # at which a person's heat is split [degC]
 SEATED = 120.0  # heat of a person at light office work, which honeybee-energy takes [W]
-VAPORISING = 2.43e6  # heat of vaporisation at skin temperature [J/kg]
 IDEAL = "IdealAirSystem"
 
 
@@ -130,7 +129,7 @@ class _Parts:
         if dry is None:
             dry = heat * (1.0 - self.number(people, "latent_fraction", 0.0, most=1.0))
         yield "person_w", dry
-        yield "person_vapour_g_h", max(heat - dry, 0.0) / VAPORISING * 3.6e6
+        yield "person_vapour_g_h", vapour_g_h(max(heat - dry, 0.0))
 
     def _lamps(self) -> Iterator[tuple[str, Any]]:
         lamps = self._of("lighting")

@@ -55,7 +55,7 @@ def daylight_colour(sky: AnnualSky, hour: int) -> DaylightColour:
     frudawski.de/specsky; Bird and Riordan 1986 (`pvlib.spectrum.spectrl2`).
     """
     luminance = np.asarray(sky.without_sun(hour), dtype=float)
-    weights = _sky_of(len(luminance)).horizontal_weights
+    weights = ReinhartSky.of_size(len(luminance)).horizontal_weights
     height = max(float(sky.direction[hour][2]), 0.0)
     beam, diffuse = float(sky.illuminance[hour]) * height, luminance * weights
     share = beam / max(beam + diffuse.sum(), 1e-9)
@@ -105,10 +105,6 @@ def _rgb(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
     """Linear sRGB over luminance of X / Y and Z / Y."""
     x, z = np.asarray(x) / WHITE[0], np.asarray(z) / WHITE[2]
     return relative_rgb(x, np.ones_like(x), z)
-
-
-def _sky_of(patches: int) -> ReinhartSky:
-    return next(sky for mf in (1, 2, 4, 6) if (sky := ReinhartSky(mf)).size == patches)
 
 
 def has_colour(bands: Sequence[DaylightScene], sky: AnnualSky, hour: int) -> bool:

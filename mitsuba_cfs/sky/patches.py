@@ -29,6 +29,15 @@ class ReinhartSky:
     directions: NDArray[np.float64] = field(init=False)  # [P, 3] centres; straight down for 0
     solid_angles: NDArray[np.float64] = field(init=False)  # [P] [sr]; 2 pi for the ground
 
+    @classmethod
+    def of_size(cls, patches: int) -> ReinhartSky:
+        """The sky of so many patches, the ground included; `ValueError` where there is none."""
+        for subdivision in SUBDIVISIONS:
+            sky = cls(subdivision)
+            if sky.size == patches:
+                return sky
+        raise ValueError(f"a sky of {patches} patches is no Reinhart sky of MF 1, 2, 4, 6")
+
     def __post_init__(self) -> None:
         mf = self.subdivision
         if isinstance(mf, bool) or int(mf) != mf or mf < 1:

@@ -96,13 +96,8 @@ class Sky:
     def __init__(self, patches: ArrayLike, sun: ArrayLike, sun_radiance: float) -> None:
         """From patch radiances [P] (the ground first), sun direction [3] and disc radiance."""
         patches = np.asarray(patches, dtype=np.float32)
-        subdivision = next(
-            (mf for mf in (1, 2, 4, 6) if ReinhartSky(mf).size == len(patches)), None
-        )
-        if subdivision is None:
-            raise ValueError(f"a sky of {len(patches)} patches is no Reinhart sky of MF 1, 2, 4, 6")
-        towards = normalize(sun)
-        self.bins = SkyBins(ReinhartSky(subdivision))
+        reinhart, towards = ReinhartSky.of_size(len(patches)), normalize(sun)
+        self.bins = SkyBins(reinhart)
         self.radiance = mi.Float(patches)
         self.sun = mi.Vector3f(*(dr.opaque(mi.Float, float(v)) for v in towards))
         self.sun_radiance = dr.opaque(mi.Float, float(sun_radiance) if towards[2] > 0 else 0.0)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.images.view import View, pixel_rays
+from mitsuba_cfs.surfaces import even_numbers
 
 SHIFT_ROUNDS = 8
 PADDED = 1 << 21  # sums from which on their number is what is asked for
@@ -159,9 +160,7 @@ class DiscreteDistribution:
 
 def pixel_places(samples: int) -> NDArray[np.float64]:
     """Places [n, 2] within a pixel, evenly spread (R2 sequence)."""
-    root = 1.324717957244746  # of x^3 = x + 1
-    steps = np.arange(samples)[:, None] * np.array([1 / root, 1 / root**2])
-    return np.mod(0.5 + steps, 1.0)
+    return even_numbers(samples)
 
 
 def spread_rays(

@@ -40,7 +40,7 @@ from scenes.room.drawn_shades import traced_building
 from scenes.room.equal_rooms import corner
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomSimulation, skies_for
-from scenes.run.building import read_building
+from scenes.run.building import building_of
 from scenes.run.inputs import named_spaces
 from scenes.run.notes import unused_notes
 from scenes.run.rooms import RoomSeries
@@ -63,15 +63,7 @@ def check_building(
     if options.building is None:
         raise ValueError("a check of a file needs its building")
     start, steps = time.monotonic(), part(progress, 0.1, 1.0)
-    building = read_building(
-        options.building,
-        join=options.join,
-        furniture=options.furniture,
-        apertures=options.apertures,
-        surroundings=options.surroundings,
-        surroundings_offset=options.surroundings_offset,
-        progress=steps,
-    )
+    building = building_of(options, steps)
     reading = round(time.monotonic() - start, 1)
     result = check_rooms(building, options, files, progress)
     return replace(result, seconds={"reading": reading, **result.seconds})

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import colormaps
 from numpy.typing import ArrayLike, NDArray
 
+from bim.colours import linear_of_display, luminance
 from scenes.language.catalogue import decimal
 
 GRADIENT_STOPS = 16
@@ -96,9 +97,7 @@ class ColourScale:
 
 def relative_luminance(colour: ArrayLike) -> float:
     """Relative luminance 0..1 of an sRGB colour [3 or 4] of bytes (WCAG 2.2)."""
-    srgb = np.asarray(colour, dtype=float)[:3] / 255.0
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
+    return luminance(linear_of_display((np.asarray(colour, dtype=float)[:3] / 255.0).tolist()))
 
 
 def round_values(low: float, high: float, count: int = 6) -> NDArray[np.float64]:

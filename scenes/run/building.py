@@ -9,6 +9,7 @@ from pathlib import Path
 from bim.building_file import STAGES, ReadOptions, read_building_file
 from bim.model import Building
 from mitsuba_cfs.progress import Progress, silent, summed
+from scenes.run.options import BuildingOptions
 
 
 def read_building(
@@ -39,3 +40,16 @@ def read_building(
         surroundings_offset,
     )  # fmt: skip
     return read_building_file(path, options, steps)
+
+
+def building_of(options: BuildingOptions, progress: Progress = silent) -> Building:
+    """The building of a command's options; raises as `read_building`."""
+    return read_building(
+        options.building,
+        join=options.joined,
+        furniture=options.furniture,
+        apertures=options.apertures,
+        surroundings=options.surroundings,
+        surroundings_offset=options.surroundings_offset,
+        progress=progress,
+    )

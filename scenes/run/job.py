@@ -18,7 +18,7 @@ from scenes.room.inner_glass import lending_rooms, opened
 from scenes.room.operation import Operation, check_states
 from scenes.room.operation_hours import check_schedules
 from scenes.room.stated_use import stated_note, used_operation
-from scenes.run.building import read_building
+from scenes.run.building import building_of
 from scenes.run.files import JobFiles, read_files
 from scenes.run.inputs import chosen_spaces
 from scenes.run.options import JobOptions
@@ -44,15 +44,7 @@ def read_inputs(
     files = files or read_files(options)
     progress("inputs", 0.1)
     steps = part(progress, 0.1, 1.0)
-    building = read_building(
-        options.building,
-        join=options.joined,
-        furniture=options.furniture,
-        apertures=options.apertures,
-        surroundings=options.surroundings,
-        surroundings_offset=options.surroundings_offset,
-        progress=steps,
-    )
+    building = building_of(options, steps)
     inputs = job_inputs(building, options.spaces, files, inner=options.inner_glass)
     progress("inputs", 1.0)
     return inputs

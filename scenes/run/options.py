@@ -26,6 +26,11 @@ class BuildingOptions:
     surroundings: tuple[Path, ...] = ()  # files of what stands around
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
 
+    @property
+    def joined(self) -> tuple[str, ...]:
+        """The rooms to make one."""
+        return self.join
+
     def named(self) -> dict[str, Any]:
         """Every choice by its name, those of the rooms first."""
         own = [one.name for one in fields(self) if one.name != "room"]
