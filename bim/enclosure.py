@@ -18,7 +18,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from bim.mesh_repair import welded_mesh
-from bim.planes import area_vectors
+from bim.planes import area_vectors, principal_extents
 from bim.rays import ray_mesh
 from bim.shell import enclosed_volume
 from bim.solids import solid_of, triangles_of, union
@@ -113,8 +113,7 @@ def _flat_hull(triangles: NDArray[np.float64]) -> manifold3d.Manifold | None:
     corners = np.unique(triangles.reshape(-1, 3), axis=0)
     if not np.isfinite(corners).all():
         return None
-    _, _, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
-    if np.ptp(corners @ axes.T, axis=0).min() > THICKEST_WALL:
+    if principal_extents(corners)[0] > THICKEST_WALL:
         return None
     hull = manifold3d.Manifold.hull_points(corners)
     return hull if hull.volume() > 0 else None

@@ -14,6 +14,12 @@ GRID = 1e-6  # overlays of polygons are rounded to this: no zero-width strips [m
 SMALLEST_AREA = 1e-6  # polygons below one square millimetre are numerical dust [m2]
 
 
+def principal_extents(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Extents [3] of points [N, 3] along their principal axes, the least first [m]."""
+    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    return np.sort(np.ptp(points @ axes.T, axis=0))
+
+
 @dataclass(frozen=True, slots=True)
 class Plane:
     """A plane with its own right-handed axes: u, v in the plane, w = u x v the normal."""

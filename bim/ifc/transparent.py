@@ -40,7 +40,7 @@ from bim.ifc.materials import default_material
 from bim.ifc.shapes import NO_ELEMENTS, Shape
 from bim.model import Problem
 from bim.names import plain_text
-from bim.planes import area_vectors
+from bim.planes import area_vectors, principal_extents
 from bim.rays import RayMesh, ray_mesh
 
 JUDGED = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering", "IfcBuildingElementProxy")
@@ -206,8 +206,7 @@ def _material_texts(element: ifcopenshell.entity_instance) -> list[str]:
 def _is_bar(shape: Shape) -> bool:
     """Whether the body is narrow in two of its three directions."""
     corners = np.unique(shape.triangles.reshape(-1, 3).round(6), axis=0)
-    _, _, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
-    return bool(np.sort(np.ptp(corners @ axes.T, axis=0))[-2] <= BAR)
+    return bool(principal_extents(corners)[-2] <= BAR)
 
 
 def _thickness(shape: Shape) -> float:
