@@ -1,4 +1,4 @@
-"""SimQuality's TF09 by study files: their shapes by rays of its own, and (slow) their sun."""
+"""SimQuality by study files: steps through walls, shapes by rays of its own, (slow) their sun."""
 
 from __future__ import annotations
 
@@ -76,6 +76,13 @@ def test_sun_of_the_files_stands_where_the_suite_has_it(reference: Path) -> None
     assert np.degrees(np.arccos(np.einsum("hi,hi->h", ours, theirs))).max() < 0.06
     angles = simquality.sun_angles(reference)
     assert len(angles) > 3900 and angles.mean() < 0.5 and angles.max() < 1.5  # as gensky's formula
+
+
+def test_step_through_walls_is_the_suites() -> None:
+    """TF03, boxes without windows: 0.1 K; an interval of 10 minutes is up to 0.25 K of the step."""
+    found = simquality.step_response()
+    assert len(found) == 20
+    np.testing.assert_allclose(found["ours"], found["suite"], atol=0.1)
 
 
 @pytest.mark.slow

@@ -1,11 +1,11 @@
-"""SimQuality's shares of a sunlit window (TF09) by study files, and its sun positions (TF01).
+"""SimQuality's walls (TF03) and shaded windows (TF09) by study files; its sun positions (TF01).
 
     python -m scenes.evidence.validation.simquality ../shared/reference/simquality FOLDER
 
-Runs each file of docs/tutorials/simquality as `cfs thermal` does, and once more without what shades
-it: the sun that enters with over that without is the sunlit share of the window.  Values, bounds
-and sizes: ghorwin/SIM-VICUS, data/validation/SimQuality.  TF01's sun stands in no study: it is put
-beside the directions that every command takes.
+Runs each file of docs/tutorials/simquality as `cfs thermal` does, those of TF09 once more without
+what shades them: the sun that enters with over that without is the sunlit share of the window.
+Values, bounds and sizes: ghorwin/SIM-VICUS, data/validation/SimQuality.  TF01's sun stands in no
+study: it is put beside the directions that every command takes.
 """
 
 from __future__ import annotations
@@ -27,6 +27,14 @@ STUDIES = Path(__file__).parents[3] / "docs" / "tutorials" / "simquality"
 TABLE, LOWEST, HIGHEST = (f"TF09_Referenzwerte{end}.tsv" for end in ("", "_Min", "_Max"))
 ENTERS = ["inside_sun_w", "glass_sun_w"]  # what the room's faces and the panes absorb
 MINUTES = "Time [min]"  # of the year; the sun of the study stands there a quarter of an hour later
+STEP_DAY = 1  # day of step.csv that begins with the step
+STEP_HOURS = (2, 6, 12, 24, 120)  # after it
+STEP_AIR = {  # of TF03 [degC]: TF03/reference/Referenzwerte_minus8d.tsv of the same source
+    "1": (20.04, 21.26, 23.48, 26.37, 30.0),
+    "2": (25.09, 29.63, 30.0, 30.0, 30.0),
+    "3": (20.0, 20.26, 21.67, 24.9, 29.95),
+    "4": (20.0, 20.06, 20.25, 20.63, 23.17),
+}
 POSITIONS = "TF01_reference_states.tsv"
 LIMA = Weather(  # of PER_Lima.846280_IWEC, the place of TF01's table
     "Lima", -12.0, -77.12, -5.0, 13.0, 1.0,
@@ -76,6 +84,21 @@ def compare(reference: Path, folder: Path = STUDIES, only: Sequence[str] = ()) -
     return table
 
 
+def step_response(folder: Path = STUDIES) -> pd.DataFrame:
+    """A row a wall and hour after the step of TF03: air, ours and the suite's [degC]."""
+    rows = []
+    for number, theirs in STEP_AIR.items():
+        (year,), _ = run_study(read_study(folder / f"TF03.{number}.toml"), silent)
+        air = year.hours["air_c"]
+        start = air.index[0].normalize() + pd.Timedelta(days=STEP_DAY)
+        since = (air.index - start) / pd.Timedelta(hours=1)  # middles of the intervals
+        ours = np.interp(STEP_HOURS, since, air)
+        rows.append(
+            pd.DataFrame({"variant": number, "hours": STEP_HOURS, "ours": ours, "suite": theirs})
+        )
+    return pd.concat(rows, ignore_index=True)
+
+
 def sun_angles(reference: Path) -> np.ndarray:
     """Angles between the suite's sun and ours [deg], every full hour that it is up in Lima."""
     table = pd.read_csv(reference / POSITIONS, sep="\t")
@@ -87,12 +110,14 @@ def sun_angles(reference: Path) -> np.ndarray:
 
 
 def main(reference: Path, folder: Path, only: Sequence[str]) -> str:
-    """The table as text; written to FOLDER as CSV too."""
-    table, angles = compare(reference, only=only), sun_angles(reference)
+    """The tables as text; written to FOLDER as CSV too."""
+    tables = {"walls": step_response(), "sunlit": compare(reference, only=only)}
     folder.mkdir(parents=True, exist_ok=True)
-    table.to_csv(folder / "simquality.csv", index=False)
+    for name, table in tables.items():
+        table.to_csv(folder / f"{name}.csv", index=False)
+    angles = sun_angles(reference)
     said = f"TF01: {angles.mean():.2f} degrees in the mean, {angles.max():.2f} at most\n"
-    return table.round(3).to_string(index=False) + "\n" + said
+    return "\n".join([*(t.round(3).to_string(index=False) for t in tables.values()), said])
 
 
 if __name__ == "__main__":
