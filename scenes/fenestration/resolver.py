@@ -51,10 +51,14 @@ def held_systems(
 ) -> tuple[dict[str, States], dict[str, list[str]]]:
     """As `fill_windows`, and the names of the windows that nothing fills by what is missing."""
     windows = list(windows)
+    own = _by_name(windows, given, file)
+    windows = [window for window in windows if window.guid not in own]
     if given.states or not windows:
-        return {window.guid: given.states for window in windows}, {}
+        return own | {window.guid: given.states for window in windows}, {}
     if file is None:
-        raise DataError(f"a box holds no fenestration data: give {given.ask}", field="box")
+        element = f"window {_listed([window.name for window in windows])}" if own else None
+        message = f"a box holds no fenestration data: give {given.ask}"
+        raise DataError(message, element=element, field="box")
     from scenes.fenestration.attached import attached_systems
     from scenes.fenestration.stated import stated_systems, stated_values
 
@@ -67,7 +71,28 @@ def held_systems(
         if window.guid not in found:
             missing = stated_values(held, window, file, given).missing(given.light_only)
             unfilled.setdefault(missing, []).append(window.name or window.guid)
-    return found, unfilled
+    return own | found, unfilled
+
+
+def _by_name(windows: list[Window], given: Given, file: Path | None) -> dict[str, States]:
+    """The systems of the windows that the user names.
+
+    Raises: `DataError` for a name that no window has, or that two systems have.
+    """
+    found: dict[str, States] = {}
+    for names, states in given.named:
+        for name in names:
+            meant = [window.guid for window in windows if name in (window.guid, window.name)]
+            if not meant:
+                there = _listed([window.name or window.guid for window in windows])
+                message = f"no window of the rooms is called {name!r}; there are {there}"
+                raise DataError(message, file=file, field="system.windows")
+            twice = [guid for guid in meant if guid in found and found[guid] is not states]
+            if twice:
+                message = f"{name!r} is named with other windows too: name a window's states alike"
+                raise DataError(message, file=file, field="system.windows")
+            found |= dict.fromkeys(meant, states)
+    return found
 
 
 def stated_u_and_g(

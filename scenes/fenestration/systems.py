@@ -63,6 +63,7 @@ class Given:
     g_value: float | None = None  # of --g, at normal incidence
     ask: str = "--cfs FILE"  # how a system is given, for the error that none is
     light_only: bool = False  # neither U nor g is needed
+    named: tuple[tuple[tuple[str, ...], States], ...] = ()  # states of windows by name or GUID
 
 
 def given_light(path: Path | None) -> Given:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.systems import FenestrationSystem, Given, States
 from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.measured_weather import read_measured
 from scenes.heat.study_file import StudyFile
@@ -24,8 +24,8 @@ class HeatFiles:
     """What the files of a study hold, all but a building's."""
 
     weather: Weather
-    systems: tuple[FenestrationSystem, ...]  # by shading state
-    given: Given  # the same as what the study file gives for all windows
+    systems: tuple[FenestrationSystem, ...]  # of the study's tables
+    given: Given  # the same as states of the windows
 
 
 def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
@@ -50,7 +50,15 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
     systems = tuple(read_state(table, table.bsdf, by=by) for table in study.system)
     for one, table in zip(systems, study.system, strict=True):
         checked_system(one, table.bsdf or file)
-    return HeatFiles(weather, systems, Given(systems, ask="a [[system]]"))
+    return HeatFiles(weather, systems, _given(study, systems))
+
+
+def _given(study: StudyFile, systems: tuple[FenestrationSystem, ...]) -> Given:
+    """The systems as the states of the windows that their tables name."""
+    states: dict[tuple[str, ...], States] = {}
+    for table, system in zip(study.system, systems, strict=True):
+        states[table.windows] = (*states.get(table.windows, ()), system)
+    return Given(states.pop((), ()), named=tuple(states.items()), ask="a [[system]]")
 
 
 def _fits_measured(study: StudyFile, weather: Weather, file: Path | None) -> None:

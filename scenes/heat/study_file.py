@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -110,6 +111,12 @@ class DesignTable(TomlTable):
     outdoor_c: Annotated[float, plausible.OUTDOOR] | None = None  # cold day; None: the weather's
 
 
+class WindowStateTable(StateTable):
+    """A shading state of some windows, or without names of all that no other table names."""
+
+    windows: tuple[str, ...] = ()  # names or GUIDs
+
+
 class StudyFile(OperationTables):
     """A whole study; paths are relative to the file."""
 
@@ -124,7 +131,7 @@ class StudyFile(OperationTables):
     transfer: tuple[TransferTable, ...] = ()
     design: DesignTable | None = None  # loads of design days too
     box: BoxTable | None = None
-    system: tuple[StateTable, ...] = ()  # states; none: what the building's file holds
+    system: tuple[WindowStateTable, ...] = ()  # states; none: what the building's file holds
     trace: TraceTable = TraceTable()
     step_minutes: Literal[1, 2, 3, 4, 5, 6, 10, 12, 15, 20, 30, 60] = 10
 
@@ -153,7 +160,7 @@ class StudyFile(OperationTables):
                 raise ValueError("system: is missing; a box holds no fenestration data")
             return self
         for one in self.variants:
-            fault = one.control_fault(len(self.system))
+            fault = one.control_fault(max(Counter(s.windows for s in self.system).values()))
             if fault is not None:
                 raise ValueError("control.{}: {}".format(*fault))
         return self

@@ -1,16 +1,20 @@
-"""The living room of a measured house by `cfs thermal`: Twin House N2, experiment 2, one phase.
+r"""The living room of a measured house by `cfs thermal`: Twin House N2, both experiments.
 
-    python -m scenes.evidence.validation.twin_house ../shared/reference/twinhouse FOLDER
+    python -m scenes.evidence.validation.twin_house ../shared/reference/twinhouse FOLDER \
+        --experiment 2
 
 Writes into FOLDER weather, neighbours, heating and supply air as CSV, the BSDF of the panes and the
-study file (docs/tutorials/twin_house_living.toml), runs the study as `cfs thermal` does and puts
-its air beside the measured one.  Measured by Fraunhofer IBP, IEA EBC Annex 58.
+study file (docs/tutorials/twin_house_living.toml, of experiment 1 twin_house_shutters.toml), runs
+the study as `cfs thermal` does and puts its air beside the measured one, by phase.  Measured by
+Fraunhofer IBP, IEA EBC Annex 58.
 """
 
 from __future__ import annotations
 
+import argparse
 import shutil
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,17 +27,58 @@ from mitsuba_cfs.progress import silent
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 
-STUDY = Path(__file__).parents[3] / "docs" / "tutorials" / "twin_house_living.toml"
+STUDIES = Path(__file__).parents[3] / "docs" / "tutorials"
 FLOOR, VOLUME = 33.24, 86.42  # of the living room [m2], [m3]
-FIRST, LAST = "2014-04-21", "2014-05-13"  # whole days that are simulated
-PHASE = slice("2014-04-29 01:00", "2014-05-13 23:59")  # heater powers by a random sequence
 STEP = pd.Timedelta(minutes=10)
-DAY_0 = pd.Timestamp("2014-01-01")
-CHANNELS = {  # numbers in `validationdataExp2.txt`, time being 0
-    "cellar": [1], "kitchen": [2], "doorway": [3], "living": [5, 6, 9], "corridor": [10],
-    "child": [14, 15, 16], "attic": [17, 18, 19], "heater": [27], "supply_m3_h": [31],
-    "supply_c": [33], "T": [53], "G": [54], "D": [55], "L": [56], "south": [59],
-    "wind_from": [61], "wind": [62], "RH": [63],
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Where an experiment's data are, and what was done when."""
+
+    study: Path
+    table: str  # the file of all channels
+    year: str  # whose seconds its first column counts
+    first: str  # whole days that are simulated
+    last: str
+    phases: dict[str, slice]
+    channels: dict[str, list[int]]  # numbers of its columns, time being 0
+
+
+EXPERIMENTS = {
+    1: Experiment(
+        STUDIES / "twin_house_shutters.toml", "validationdataN2Exp1.txt",
+        "2013-01-01", "2013-08-21", "2013-09-30",
+        {  # the first week of 30 degC is given for a start
+            "30 degC held": slice("2013-08-28 00:10", "2013-08-29 17:40"),
+            "random heat": slice("2013-08-29 17:50", "2013-09-14 00:10"),
+            "25 degC held": slice("2013-09-14 00:20", "2013-09-20 00:10"),
+            "floating": slice("2013-09-20 00:20", "2013-09-30 23:59"),
+        },
+        {
+            "cellar": [3], "kitchen": [10], "doorway": [11], "living": [4, 5, 6], "corridor": [7],
+            "child": [9], "attic": [1, 2], "heater": [19], "supply_m3_h": [30],
+            "supply_c": [28], "T": [35], "G": [36], "D": [37], "L": [42], "south": [40],
+            "wind_from": [45], "wind": [44], "RH": [46],
+        },
+    ),
+    2: Experiment(
+        STUDIES / "twin_house_living.toml", "validationdataExp2.txt",
+        "2014-01-01", "2014-04-10", "2014-05-19",
+        {
+            "30 degC held": slice("2014-04-14 00:10", "2014-04-17 07:50"),
+            "floating": slice("2014-04-17 08:00", "2014-04-23 16:10"),
+            "30 degC held again": slice("2014-04-23 16:20", "2014-04-29 00:50"),
+            "random heat": slice("2014-04-29 01:00", "2014-05-13 23:59"),
+            "30 degC held at last": slice("2014-05-14 01:10", "2014-05-19 23:50"),
+        },
+        {
+            "cellar": [1], "kitchen": [2], "doorway": [3], "living": [5, 6, 9], "corridor": [10],
+            "child": [14, 15, 16], "attic": [17, 18, 19], "heater": [27], "supply_m3_h": [31],
+            "supply_c": [33], "T": [53], "G": [54], "D": [55], "L": [56], "south": [59],
+            "wind_from": [61], "wind": [62], "RH": [63],
+        },
+    ),
 }  # fmt: skip
 # solar values of the panes by EN 410's spectrum at each 10 degrees, as the house's description has
 # them: transmittance, absorptance of both panes together
@@ -43,19 +88,19 @@ ABSORBED = np.array([0.192, 0.195, 0.203, 0.212, 0.218, 0.227, 0.245, 0.257, 0.2
 NAME = "4/16/4 low-e of the Twin Houses"
 
 
-def measured(folder: Path) -> pd.DataFrame:
+def measured(folder: Path, experiment: Experiment) -> pd.DataFrame:
     """Channels of the experiment by name, ten-minute means by the end of their interval."""
-    path = folder / "validationdataExp2.txt"
-    rows = np.loadtxt(path, skiprows=2)
-    times = DAY_0 + pd.to_timedelta(rows[:, 0], unit="s")
-    data = {name: rows[:, numbers].mean(axis=1) for name, numbers in CHANNELS.items()}
+    rows = np.loadtxt(folder / experiment.table, skiprows=2)
+    times = pd.Timestamp(experiment.year) + pd.to_timedelta(rows[:, 0], unit="s")
+    data = {name: rows[:, numbers].mean(axis=1) for name, numbers in experiment.channels.items()}
     table = pd.DataFrame(data, index=times.round("min"))
-    start, end = pd.Timestamp(FIRST) + STEP, pd.Timestamp(LAST) + pd.Timedelta(days=1)
+    start = pd.Timestamp(experiment.first) + STEP
+    end = pd.Timestamp(experiment.last) + pd.Timedelta(days=1)
     every = pd.date_range(start, end, freq=STEP)  # some rows are missing: linear between others
     return table.reindex(table.index.union(every)).interpolate("time").loc[every]
 
 
-def write_inputs(data: pd.DataFrame, folder: Path) -> Path:
+def write_inputs(data: pd.DataFrame, folder: Path, study: Path) -> Path:
     """The study with its files; returns the study file."""
     inputs = folder / "twin_house"
     inputs.mkdir(parents=True, exist_ok=True)
@@ -70,7 +115,8 @@ def write_inputs(data: pd.DataFrame, folder: Path) -> Path:
             "attic": data["attic"].to_numpy(),
             "corridor": data["corridor"].to_numpy(),
             "east": (0.5 * (data["child"] + data["corridor"])).to_numpy(),
-            "north": (0.58 * data["kitchen"] + 0.42 * data["doorway"]).to_numpy(),
+            "north": north_c(data).to_numpy(),
+            "living": data["living"].to_numpy(),
             "heater_w_m2": (data["heater"].clip(lower=0) / FLOOR).to_numpy(),
             "supply_ach": (data["supply_m3_h"].clip(lower=0) / VOLUME).to_numpy(),
             "supply_c": data["supply_c"].to_numpy(),
@@ -79,34 +125,94 @@ def write_inputs(data: pd.DataFrame, folder: Path) -> Path:
     table.to_csv(inputs / "measured.csv", index=False, float_format="%.4f")
     reflected = 1.0 - PASSED - ABSORBED  # from the room too: that side is not told
     klems = specular_matrices(AngularTable(ANGLES, PASSED, reflected, reflected))
-    bands = {"Visible": klems, "Solar": klems}
-    write_bsdf_xml(BsdfFile(bands, name=NAME), inputs / "glass.xml")
-    return Path(shutil.copy(STUDY, folder / STUDY.name))
+    nothing = np.zeros_like(PASSED)
+    white = specular_matrices(AngularTable(ANGLES, nothing, nothing + 0.6, nothing + 0.6))
+    for name, matrices in (("glass", klems), ("shutter", white)):
+        bands = {"Visible": matrices, "Solar": matrices}
+        write_bsdf_xml(BsdfFile(bands, name=f"{NAME} {name}"), inputs / f"{name}.xml")
+    return Path(shutil.copy(study, folder / study.name))
 
 
-def compare(folder: Path, data: pd.DataFrame) -> pd.DataFrame:
-    """Ours and the measured air of the phase [degC]."""
-    (year,), _ = run_study(read_study(folder / STUDY.name), silent)
+def compare(study: Path, data: pd.DataFrame) -> pd.DataFrame:
+    """Ours and the measured air [degC]."""
+    (year,), _ = run_study(read_study(study), silent)
     ends = year.hours.index + pd.Timedelta(minutes=5)
     both = pd.DataFrame({"ours": year.hours["air_c"].to_numpy()}, index=ends)
-    return both.join(data["living"].rename("measured"), how="inner").loc[PHASE]
+    return both.join(data["living"].rename("measured"), how="inner")
 
 
-def main(source: Path, folder: Path) -> str:
+def heat_to_hold(study: Path, data: pd.DataFrame) -> pd.Series:
+    """The heater's power that holds the measured air in our room [W], by the intervals' ends."""
+    found = read_study(study)
+    column = found.schedules["heater"].model_copy(update={"column": "living"})
+    held = found.model_copy(update={
+        "gains": found.gains.model_copy(update={"equipment_w_m2": 0.0}),
+        "loads": found.loads.model_copy(update={
+            "heating_c": "living", "heating_radiant": found.gains.radiant_share
+        }),
+        "schedules": found.schedules | {"living": column},
+    })  # fmt: skip
+    (year,), _ = run_study(held, silent)
+    ends = year.hours.index + pd.Timedelta(minutes=5)
+    return pd.Series(year.hours["heating_w"].to_numpy(), index=ends).reindex(data.index)
+
+
+def north_c(data: pd.DataFrame) -> pd.Series:
+    """The air behind the north partition: kitchen and entrance by their shares of it [degC]."""
+    return 0.58 * data["kitchen"] + 0.42 * data["doorway"]
+
+
+def what_is_missing(data: pd.DataFrame, held: pd.Series) -> tuple[float, float]:
+    """By what the heater gives more than our room needs, daily means after four days.
+
+    Returns: least squares for each kelvin to the rooms in the north [W/K], and for each W/m2 of
+        sun measured on the south facade [m2]; positive: our room has too much of it.
+    """
+    days = pd.DataFrame({
+        "north": data["living"] - north_c(data),
+        "south": data["south"],
+        "more": data["heater"] - held,
+    }).resample("D").mean().iloc[4:-1]  # fmt: skip
+    of, *_ = np.linalg.lstsq(days[["north", "south"]].to_numpy(), days["more"].to_numpy())
+    return float(of[0]), float(of[1])
+
+
+def by_phase(
+    experiment: Experiment, study: Path, data: pd.DataFrame, held: pd.Series
+) -> pd.DataFrame:
+    """A row a phase: errors of the air [K]; the mean power that holds the measured air [W]."""
+    both = compare(study, data)
+    rows = []
+    for name, times in experiment.phases.items():
+        part = both.loc[times]
+        gap, daily = part["ours"] - part["measured"], part.resample("D").max()
+        rows.append({
+            "phase": name,
+            "intervals": len(part),
+            "RMSE [K]": np.sqrt((gap**2).mean()),
+            "bias [K]": gap.mean(),
+            "daily maxima [K]": (daily["ours"] - daily["measured"]).mean(),
+            "heat to hold [W]": held.loc[times].mean(),
+            "heater [W]": data.loc[times, "heater"].mean(),
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def main(source: Path, folder: Path, number: int) -> str:
     """Write, run, compare."""
-    data = measured(source)
-    write_inputs(data, folder)
-    both = compare(folder, data)
-    both.to_csv(folder / "compared.csv")
-    gap = both["ours"] - both["measured"]
-    daily = both.resample("D").max()
-    tops = (daily["ours"] - daily["measured"]).mean()
-    return (
-        f"{len(both)} intervals: RMSE {np.sqrt((gap**2).mean()):.2f} K, bias {gap.mean():+.2f} K, "
-        f"daily maxima {tops:+.2f} K; measured {both['measured'].min():.1f} to "
-        f"{both['measured'].max():.1f}, ours {both['ours'].min():.1f} to {both['ours'].max():.1f}\n"
-    )
+    experiment = EXPERIMENTS[number]
+    data = measured(source, experiment)
+    study = write_inputs(data, folder, experiment.study)
+    held = heat_to_hold(study, data)
+    north, south = what_is_missing(data, held)
+    table = by_phase(experiment, study, data, held).round(2).to_string(index=False)
+    return f"{table}\nmissing: {north:.1f} W/K to the north, {south:.2f} m2 of the south's sun\n"
 
 
 if __name__ == "__main__":
-    sys.stdout.write(main(Path(sys.argv[1]), Path(sys.argv[2])))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("source", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--experiment", type=int, choices=EXPERIMENTS, default=2)
+    chosen = parser.parse_args()
+    sys.stdout.write(main(chosen.source, chosen.folder, chosen.experiment))
