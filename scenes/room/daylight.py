@@ -39,7 +39,7 @@ class HeldSensors:
     @classmethod
     def of(cls, building: Building, space: Space) -> HeldSensors:
         """Those of a room."""
-        fisheyes = [one.view for one in held_views(building, space) if one.is_fisheye]
+        fisheyes = [one.view for one in held_views(building, space) if one.view.covers_hemisphere]
         return cls(tuple(held_grids(building, space)), fisheyes[0] if fisheyes else None)
 
 
