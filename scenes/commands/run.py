@@ -100,7 +100,10 @@ def command(
     scheduler: str | None,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
+    """Daylight, glare, temperatures and comfort of a building's rooms.
+
+    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    """
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
     if explore and chosen["method"] == "point-in-time":
