@@ -135,7 +135,7 @@ def simulate_zones(
     )
     weather = _weather(climate, steps)
     state = _start(net, len(zones), options.start_c)
-    work = _work(net, len(zones))
+    work = _work(net, state)
     rows = min(round(24 * HOUR / row_s), climate.hours)
     days = kernel.warm_up(net, state, work, weather, drive, method, rows=rows)
     means = kernel.hourly_means(climate.hours, state)
@@ -199,8 +199,8 @@ def _start(net: Network, zones: int, start_c: float) -> records.State:
     )
 
 
-def _work(net: Network, zones: int) -> records.Workspace:
-    n, m = net.faces.area.size, net.nodes.capacity.size
+def _work(net: Network, state: records.State) -> records.Workspace:
+    n, m, zones = state.inner.size, state.node.size, state.air.size
     return records.Workspace(
         diagonal=np.zeros(n + zones),
         below=np.zeros(net.system.rows.size),
@@ -219,9 +219,9 @@ def _work(net: Network, zones: int) -> records.Workspace:
         still=np.zeros(m),
         film=np.zeros(n),
         outdoor=np.zeros((n, 5)),
-        old_inner=np.zeros(n),
-        old_outer=np.zeros(n),
-        old_air=np.zeros(zones),
+        old_inner=state.inner.copy(),
+        old_outer=state.outer.copy(),
+        old_air=state.air.copy(),
     )
 
 
@@ -235,18 +235,18 @@ def _result(
     days: int,
     state: NDArray[np.int64],
 ) -> ZoneResult:
-    inner, outer, air = means.inner, means.outer, means.air[:, z]
+    air = means.air[:, z]
     mine = np.flatnonzero(net.faces.zone == z)
-    glass = mine[net.faces.window[mine] >= 0]
-    solid = mine[net.faces.window[mine] < 0]
+    inner, outer, windows = means.inner[:, mine], means.outer[:, mine], net.faces.window[mine]
+    glass, solid = np.flatnonzero(windows >= 0), np.flatnonzero(windows < 0)
     weight = net.faces.radiant_share[mine]
-    room = 0.5 * (air + inner[:, mine] @ weight)
+    room = 0.5 * (air + inner @ weight)
     seen = inner.copy()
     for column, window in zip(glass, zone.windows, strict=True):
         report = np.array([s.inner_report for s in window.states])
-        share = report[state[:, net.faces.window[column]]]
+        share = report[state[:, windows[column]]]
         seen[:, column] = room + share * (inner[:, column] - room)
-    mrt = seen[:, mine] @ weight
+    mrt = seen @ weight
     flows = {name: terms[:, i] for i, name in enumerate(records.TERMS)}
     load = flows["ideal loads"]
     return ZoneResult(

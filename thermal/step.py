@@ -48,6 +48,15 @@ def copy_into(source: NDArray[np.float64], target: NDArray[np.float64], first: i
 
 
 @inlined
+def _go_on(now: NDArray[np.float64], before: NDArray[np.float64]) -> None:
+    """Let temperatures change as in the step before, as the first iterate; `before`: the last."""
+    for i in range(now.size):
+        last = now[i]
+        now[i] = last + (last - before[i])
+        before[i] = last
+
+
+@inlined
 def _cube(a_c: float, b_c: float) -> float:
     a, b = a_c + 273.15, b_c + 273.15
     return (a * a + b * b) * (a + b)
@@ -310,10 +319,10 @@ def step(
     """One time step: iterate the coefficients, then move the walls' nodes."""
     faces, nodes = net.faces, net.nodes
     n = faces.area.size
-    copy_into(state.inner, work.old_inner, 0)
-    copy_into(state.outer, work.old_outer, 0)
-    copy_into(state.air, work.old_air, 0)
     set_air_flows(net, state, work, weather, drive, t, t // method.steps)
+    _go_on(state.inner, work.old_inner)
+    _go_on(state.outer, work.old_outer)
+    _go_on(state.air, work.old_air)
     _still_nodes(faces, nodes, state, work)
     for _ in range(method.iterations):
         for _ in range(MOST_CHANGES):
