@@ -188,11 +188,11 @@ def _weather(climate: Climate, steps: int) -> records.OutdoorConditions:
 
 
 def _start(net: Network, zones: int, start_c: float) -> records.State:
-    n, m = net.faces.area.size, net.nodes.capacity.size
+    n = net.faces.area.size
     return records.State(
         inner=np.full(n, start_c),
         outer=np.full(n, start_c),
-        node=np.full(m, start_c),
+        mode=net.modes.even * start_c,
         air=np.full(zones, start_c),
         load=np.zeros(zones),
         opened=np.zeros(zones, dtype=np.bool_),
@@ -200,7 +200,7 @@ def _start(net: Network, zones: int, start_c: float) -> records.State:
 
 
 def _work(net: Network, state: records.State) -> records.Workspace:
-    n, m, zones = state.inner.size, state.node.size, state.air.size
+    n, m, zones = state.inner.size, state.mode.size, state.air.size
     return records.Workspace(
         diagonal=np.zeros(n + zones),
         below=np.zeros(net.system.rows.size),
@@ -215,8 +215,9 @@ def _work(net: Network, state: records.State) -> records.Workspace:
         carried=np.zeros(zones),
         passed=np.zeros(zones),
         slab=np.zeros(zones),
-        source=np.zeros(m),
+        source=np.zeros(n),
         still=np.zeros(m),
+        ends=np.zeros((n, 2)),
         film=np.zeros(n),
         outdoor=np.zeros((n, 5)),
         old_inner=state.inner.copy(),
