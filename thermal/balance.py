@@ -140,7 +140,7 @@ def simulate_zones(
     days = kernel.warm_up(net, state, work, weather, drive, method, rows=rows)
     means = kernel.hourly_means(climate.hours, state)
     kernel.advance(net, state, work, weather, drive, method, climate.hours, means)
-    terms = means.terms / steps
+    terms = np.divide(means.terms, steps, out=means.terms)
     if progress:
         progress(1.0)
     return tuple(

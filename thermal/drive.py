@@ -138,15 +138,16 @@ def _beyond(zones: Sequence[Zone], climate: Climate, steps: int) -> FloatArray:
 def _hourly(
     values: Sequence[ArrayLike], hours: int, item: str, *, missing: bool = False
 ) -> NDArray[np.float64]:
-    columns = []
-    if not values:
-        return np.zeros((hours, 0))
-    for value in values:
-        array = np.asarray(value, dtype=float)
+    arrays = [np.asarray(value, dtype=float) for value in values]
+    for array in arrays:
         require(array.shape in ((), (hours,)), item, f"expected one value or {hours}")
         require(missing or not bool(np.any(np.isnan(array))), item, "missing values")
-        columns.append(np.broadcast_to(array, (hours,)))
-    return np.ascontiguousarray(np.stack(columns, axis=1))
+    table = np.empty((hours, len(arrays)))
+    table[:] = [array if array.ndim == 0 else 0.0 for array in arrays]  # most are
+    for column, array in enumerate(arrays):
+        if array.ndim:
+            table[:, column] = array
+    return table
 
 
 def _set_points(
