@@ -13,6 +13,7 @@ from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
     building_options,
+    explore_option,
     height_option,
     method_option,
     named_settings,
@@ -62,10 +63,7 @@ _DEFAULT = RoomOptions()
     "--no-colour", is_flag=True,
     help="Leave each room's picture in colour out; --quick does as well.",
 )  # fmt: skip
-@click.option(
-    "--explore", is_flag=True,
-    help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
-)  # fmt: skip
+@explore_option()
 @processes_option
 @scheduler_option
 @click.option(

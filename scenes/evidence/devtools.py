@@ -147,7 +147,8 @@ class Page:
     def place(self, selector: str, across: float = 0.5, down: float = 0.5) -> tuple[float, float]:
         """A place of an element in the window, scrolled into view."""
         text = json.dumps(selector)
-        self.value(f"document.querySelector({text}).scrollIntoView({{block: 'center'}})")
+        how = "{block: 'center', behavior: 'instant'}"  # pages scroll smoothly: the mouse is faster
+        self.value(f"document.querySelector({text}).scrollIntoView({how})")
         box = self.value(
             f"(({{x, y, width, height}}) => [x, y, width, height])"
             f"(document.querySelector({text}).getBoundingClientRect())"
