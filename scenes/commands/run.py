@@ -36,7 +36,7 @@ _DEFAULT = RoomOptions()
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @click.option(
-    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
+    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH[:MM]'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
 @size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
@@ -153,7 +153,8 @@ def run_to_folder(
     from scenes.explore.folder import write_explorer
     from scenes.report import write_report
     from scenes.report.numbers import counted
-    from scenes.run.outputs import EXPLORER, write_results
+    from scenes.result_folder import EXPLORER
+    from scenes.run.outputs import write_results
     from scenes.run.rooms_apart import Workers
     from scenes.run.run import run_job
 
