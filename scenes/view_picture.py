@@ -66,6 +66,7 @@ def room_picture(
         surroundings=options.surroundings,
         surroundings_offset=options.surroundings_offset,
         colour=options.colour,
+        month=int(weather.midpoints[hour].month),
     )  # fmt: skip
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)

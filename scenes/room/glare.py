@@ -13,6 +13,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.glare import rated_pictures
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.progress import Progress
 from scenes.results import GlareResults, LuminancePicture
 from scenes.room.options import Outputs
@@ -48,7 +49,7 @@ def default_hours(
 
 
 def room_glare(
-    light: PhaseLight | PathLight,
+    light: PhaseLight | PathLight | SeasonalLight,
     view: View,
     state: NDArray[np.int64],
     hours: list[int],

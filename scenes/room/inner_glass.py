@@ -26,6 +26,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.systems import AngularScattering
 from scenes.fenestration.stated import StatedValues, glazing_system
@@ -138,14 +139,20 @@ def _inner_glass(
     return InnerGlass(furnished_surfaces(rest), *groups, *areas, names)
 
 
-def borrowed_share(space: Space, light: PhaseLight, inner: InnerGlass | None) -> str:
+def borrowed_share(
+    space: Space, light: PhaseLight | SeasonalLight, inner: InnerGlass | None
+) -> str:
     """How much of the light of a room's sensors over the year its inner glass gives, in words."""
     if inner is None:
         return ""
     first = len(light.filled.traced.scene.outdoor_groups)
-    states = [one[0] for one in light.sensors]
+    lights = [own for own, _ in light.parts()] if isinstance(light, SeasonalLight) else [light]
     sums = [
-        one.diffuse[:-1].sum() + (0 if one.sun is None else one.sun[:-1].sum()) for one in states
+        sum(
+            one.diffuse[:-1].sum() + (0 if one.sun is None else one.sun[:-1].sum())
+            for (one, *_) in of_group
+        )
+        for of_group in zip(*(own.sensors for own in lights), strict=True)
     ]
     share = float(sum(sums[first:]) / max(sum(sums), 1e-9))
     return (
