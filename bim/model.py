@@ -29,6 +29,7 @@ FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "revea
 BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
 JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
+SHUT_ADVICE = "cfs run --inner-glass lets daylight through"  # glass and doorways as they are read
 NOT_USED = "not used"  # kind of a problem: what the file states and no result depends on
 TREES = "trees"  # kind of a problem: trees outdoors, and how much light passes them by month
 COLOURS = ("red", "green", "blue")  # bands of colour pictures
