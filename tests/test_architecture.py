@@ -36,9 +36,10 @@ TRACING = (
 SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
-        "by_name", "colour_view", "exact_sun", "glare", "group_light", "optics", "path_light",
-        "phase_error",
-        "phase_light", "phase_scene", "reflected_sun", "straight_views", "view_cache",
+        "borrowed_pictures", "by_name", "colour_view", "exact_sun", "glare", "group_light",
+        "optics", "path_light", "phase_error",
+        "phase_light", "phase_scene", "reflected_sun", "seasonal_light", "straight_views",
+        "view_cache",
         "window_reflection",
     )
 )  # fmt: skip

@@ -230,16 +230,17 @@ class PhaseLight:
                 in_sun = self._in_sun(rows, hours) if traced.five_phase else None
                 luminance = luminance + mirrored.windows(optics, luminance, in_sun)
         if not traced.five_phase:
-            return matrices.three_phase(luminance)
+            found = matrices.three_phase(luminance)
+            return found if direct else traced.looked_through(found, sky.whole[:, hours])
         sun, seen = self.filled.seen_sun(tuple(int(j) for j in state))
-        found = FivePhasePictures(
+        five = FivePhasePictures(
             matrices, sun, luminance, self._window_luminance("sun", rows, hours),
             sky.direction[hours], sky.illuminance[hours],
             beam=self._window_luminance("beam", rows, hours),
         )  # fmt: skip
         outdoors = daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
-        found.show_outdoors(seen, *outdoors, light=self.filled.beam_light(tuple(map(int, state))))
-        return found
+        five.show_outdoors(seen, *outdoors, light=self.filled.beam_light(tuple(map(int, state))))
+        return five if direct else traced.looked_through(five, sky.whole[:, hours])
 
     def _in_sun(self, rows: NDArray[np.int64], hours: NDArray[np.int64]) -> list[NDArray]:
         """The windows' beams [Q, K, h], and what meets them of these from the room [Q * K, h]."""

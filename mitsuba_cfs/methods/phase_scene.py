@@ -10,9 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems_peak import matrix_beam
+from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.methods.borrowed_pictures import BorrowedPictures
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, subdivided
@@ -21,6 +25,7 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
 from mitsuba_cfs.trace.borrowed_daylight import borrowed_daylight
+from mitsuba_cfs.trace.borrowed_picture import RoomShown, borrowed_picture
 from mitsuba_cfs.trace.borrowed_view import LendingRoom, RoomBehind, borrowed_view
 from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.cell_daylight import cell_daylight
@@ -73,10 +78,24 @@ class PhaseScene:
             cache=self.cache,
             progress=self.progress if progress is None else progress,
         )
-        outdoors = ("daylight", "direct_daylight", "straight_daylight", "outdoor_exchange")
+        outdoors = (
+            "daylight", "direct_daylight", "straight_daylight", "outdoor_exchange", "beyond",
+        )  # fmt: skip
         for name in ("parts", *outdoors):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
+        return other
+
+    def before(self, scene: DaylightScene) -> PhaseScene:
+        """The same room before other outdoors, its windows cut in the same parts.
+
+        So that what is indoors is found in the cache.
+        """
+        other = PhaseScene(
+            scene, self.sampling, five_phase=self.five_phase, cache=self.cache,
+            progress=self.progress,
+        )  # fmt: skip
+        other.__dict__["parts"] = self.parts
         return other
 
     def trace(self, metric: str) -> None:
@@ -219,17 +238,47 @@ class PhaseScene:
 
     def lit(self, transmission: Sequence[NDArray[np.float64]]) -> LendingRoom:
         """The room with T of its groups [G][K, K], as a room beside it sees it."""
+        daylight, of_group = self.daylight.values, self.parts.group
+        pairs = zip(of_group, daylight, strict=True)
+        through = np.stack([transmission[n] @ d for n, d in pairs])
+        outdoors = self.parts.outdoors(self.scene)
+        beam = np.zeros((len(of_group), KLEMS_FULL.size))
+        for q, n in enumerate(of_group[:outdoors]):
+            beam[q] = matrix_beam(transmission[n], KLEMS_FULL)
+        return LendingRoom(
+            self.scene.interior, self.parts.groups, through, self.scene.exterior, beam, daylight,
+            self._behind(),
+        )  # fmt: skip
+
+    def _behind(self) -> tuple[RoomBehind, ...]:
+        """The rooms behind the parts of the groups that look into them."""
         scene, parts = self.scene, self.parts
-        pairs = zip(parts.group, self.daylight.values, strict=True)
-        behind = [
+        return tuple(
             RoomBehind(int(parts.of(g)[0]), len(parts.of(g)), one.beam, room)
             for g, one, room in zip(
                 range(len(scene.outdoor_groups), len(scene.groups)), scene.beyond, self.beyond,
                 strict=True,
             )
-        ]  # fmt: skip
-        through = np.stack([transmission[n] @ d for n, d in pairs])
-        return LendingRoom(scene.interior, parts.groups, through, tuple(behind))
+        )  # fmt: skip
+
+    @cached_property
+    def borrowed_picture(self) -> list[RoomShown]:
+        """The other rooms that the view's pixels show straight through glass."""
+        scene, chosen = self.scene, self.sampling
+        return borrowed_picture(
+            scene.interior, self.parts.groups, self._behind(), scene.view,
+            subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
+            max_depth=INDOOR_DEPTH, seed=chosen.seed,
+        )  # fmt: skip
+
+    def looked_through(self, pictures: Pictures, sky: NDArray[np.floating]) -> Pictures:
+        """Pictures under skies [P, h] with other rooms seen through glass, not by its patches."""
+        if not self.scene.beyond:
+            return pictures
+        behind, seen = self._behind(), self.view.seen
+        return BorrowedPictures(
+            pictures, self.borrowed_picture, seen, behind, self.daylight.values, sky
+        )
 
     def borrowed_view(self, g: int, samples: int, stopping: Stopping) -> Estimate:
         """B [S, P] of a group that looks into another room."""

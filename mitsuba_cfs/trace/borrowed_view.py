@@ -39,6 +39,9 @@ class LendingRoom:
     surfaces: Surfaces
     groups: tuple[WindowGroup, ...]  # axis G
     luminance: NDArray[np.float64]  # T D of these [G, K, P], towards the room
+    exterior: Surfaces  # what those of them see that look outdoors, the first ones
+    beam: NDArray[np.float64]  # [G, K] what goes straight on through them; 0 of those to rooms
+    daylight: NDArray[np.float64]  # D of these [G, K, P]
     onward: tuple[RoomBehind, ...] = ()  # where some of the groups look into other rooms
 
     def rooms(self) -> Iterator[LendingRoom]:

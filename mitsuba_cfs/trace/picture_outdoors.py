@@ -85,52 +85,71 @@ def outdoors(
     outside = kept_scene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
-    faces = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])
     rays_at_once = max(256, RAYS // samples)
-    free, shown, rough = [], [], []
+    seen = SeenOutdoors(outside, sky, Tiles(tile, view.width))
     for start in range(0, len(pixels), rays_at_once):
         block = pixels[start : start + rays_at_once]
-        lanes = _through_windows(inside, scattering, view, block, samples)
-        if not len(lanes.row):
-            free.append(sparse.csr_array((len(block), sky.size), dtype=np.float32))
-            continue
-        rows = sparse.csr_array((len(block), sky.size), dtype=np.float32)
+        lanes = through_windows(inside, scattering, view_lanes(inside, view, block, samples))
+        seen.add(lanes, block, start)
+    shown, smooth, reflected = seen.faces(seed)
+    return OutdoorCoefficients(
+        seen.sky(), reflected, _beams(scattering, basis),
+        OutdoorSun(outside, shown, smooth, view, seed), seen.rough(),
+    )  # fmt: skip
+
+
+class SeenOutdoors:
+    """What rays of a view's pixels find outdoors, block by block."""
+
+    def __init__(self, outside: TracedScene, sky: SkyBins, tiles: Tiles) -> None:
+        """Nothing yet."""
+        self._outside, self._sky, self._tiles = outside, sky, tiles
+        self._face = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])
+        self._free: list[sparse.csr_array] = []
+        self._shown: list[ShownFaces] = []
+        self._rough: list[RoughFaces] = []
+
+    def add(self, lanes: Lanes, block: NDArray[np.int64], start: int) -> None:
+        """Add what rays of a block of pixels, the first of them number `start`, find."""
+        rows = sparse.csr_array((len(block), self._sky.size), dtype=np.float32)
         for bounce in range(MOST_MIRRORS + 1):
             if not len(lanes.row):
                 break
-            seen, met, lanes = _looked_at(outside, sky, lanes, len(block), bounce)
+            seen, met, lanes = _looked_at(self._outside, self._sky, lanes, len(block), bounce)
             rows = rows + seen
-            shown.append(_with_faces(met, block, start, faces, Tiles(tile, view.width)))
-            rough += _rough_faces(outside, met, start)
-        free.append(rows)
-    found, keys = _joined(shown)
-    count = np.bincount(found.tile, minlength=len(keys))
-    smooth = smoothing(Tiles(tile, view.width), keys, count)
-    sun = OutdoorSun(outside, found, smooth, view, seed)
-    reflected = smooth @ _reflected(outside, sky, found, len(keys), seed)
-    return OutdoorCoefficients(
-        sparse.csr_array(sparse.vstack(free)),
-        sparse.csr_array(reflected.astype(np.float32)),
-        _beams(scattering, basis),
-        sun,
-        RoughSun(outside, RoughFaces.joined(rough)) if rough else None,
-    )
+            self._shown.append(_with_faces(met, block, start, self._face, self._tiles))
+            self._rough += _rough_faces(self._outside, met, start)
+        self._free.append(rows)
+
+    def sky(self) -> sparse.csr_array:
+        """Sky and ground that each pixel shows itself [n, P]."""
+        return sparse.csr_array(sparse.vstack(self._free))
+
+    def faces(self, seed: int) -> tuple[ShownFaces, sparse.csr_array, sparse.csr_array]:
+        """The faces by tile, what smooths them [C, C], and their irradiance [C, P], smoothed."""
+        found, keys = _joined(self._shown)
+        count = np.bincount(found.tile, minlength=len(keys))
+        smooth = smoothing(self._tiles, keys, count)
+        reflected = smooth @ _reflected(self._outside, self._sky, found, len(keys), seed)
+        return found, smooth, sparse.csr_array(reflected.astype(np.float32))
+
+    def rough(self) -> RoughSun | None:
+        """The sun on rough gloss; None without any."""
+        return RoughSun(self._outside, RoughFaces.joined(self._rough)) if self._rough else None
 
 
-def _through_windows(
-    inside: TracedScene,
-    scattering: Sequence[Scattering],
-    view: View,
-    pixels: NDArray[np.int64],
-    samples: int,
-) -> Lanes:
-    """Rays of a block's pixels that meet a window and go straight on."""
+def view_lanes(inside: TracedScene, view: View, pixels: NDArray[np.int64], samples: int) -> Lanes:
+    """Rays of a block's pixels from the eye."""
     eye = np.asarray(view.position) - inside.centre
     row = np.repeat(np.arange(len(pixels)), samples)
     directions, exists = spread_rays(view, pixels, samples)
     start = np.tile(eye[:, None], len(row)).astype(np.float32)
     share = np.full(len(row), 1.0 / samples)
-    lanes = Lanes(row, start, directions.T.astype(np.float32), share).some(np.flatnonzero(exists))
+    return Lanes(row, start, directions.T.astype(np.float32), share).some(np.flatnonzero(exists))
+
+
+def through_windows(inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes) -> Lanes:
+    """Those of a block's rays in a room that meet a window, and go straight on, at the window."""
     found = []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):

@@ -195,7 +195,7 @@ def _print_plan(plan: StudyPlan) -> None:
 def _print_outcome(result: StudyResult, out: Path) -> None:
     """How many cases there are, what they took, and the pages."""
     from scenes.report.numbers import counted
-    from scenes.run.outputs import EXPLORER
+    from scenes.result_folder import EXPLORER
 
     click.echo(
         f"{counted(len(result.results), 'case')}: {result.reused} were there, "

@@ -16,8 +16,8 @@ from scenes.explore.packing import read_data, write_data
 from scenes.explore.room_files import write_room
 from scenes.figures.scale import ColourScale
 from scenes.report.page_files import page_files
+from scenes.result_folder import EXPLORER
 from scenes.results import RunResult
-from scenes.run.outputs import EXPLORER
 
 CASE = "case.js"
 FILES = page_files("scenes.explore") | {"style.css": page_files("scenes.report")["style.css"]}

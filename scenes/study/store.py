@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.files import opened_arrays, write_bytes, write_table, write_text
 from mitsuba_cfs.matrices.cache import UNREADABLE
-from scenes.result_folder import ResultFolder
-from scenes.run.outputs import EXPLORER
+from scenes.result_folder import EXPLORER, ResultFolder
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from scenes.explore.folder import moved_entry, write_joined
-from scenes.run.outputs import EXPLORER
+from scenes.result_folder import EXPLORER
 from scenes.study.case import Case
 from scenes.study.explored import PHASED
 from scenes.study.study import StudyResult

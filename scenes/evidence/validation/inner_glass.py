@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -130,9 +131,14 @@ def by_phases(rooms: int, seed: int = 0, sampling: Sampling = SAMPLING) -> NDArr
 
 def by_paths(rooms: int, samples: int, seed: int = 0) -> NDArray[np.float64]:
     """The same [S] by Mitsuba's integrator `path` in all rooms, panes as masks."""
+    return illuminance_by_path(*whole_rooms(rooms), sensors(rooms), samples, seed=seed)
+
+
+def whole_rooms(rooms: int) -> tuple[Quads, Quads]:
+    """All rooms' surfaces with their reflectance, all panes with their transmittance."""
     opaque = [(triangles, rho) for i in range(rooms) for triangles, rho in room(i, rooms)]
     panes = [(group(i, rooms).windows[0].triangles, INNER_TAU if i else TAU) for i in range(rooms)]
-    return illuminance_by_path(opaque, panes, sensors(rooms), samples, seed=seed)
+    return opaque, panes
 
 
 def illuminance_by_path(
@@ -143,15 +149,39 @@ def illuminance_by_path(
     Args: opaque, panes: triangles with their reflectance, and with their transmittance.
     """
     whole, result = _mitsuba_scene(opaque, panes), []
-    integrator = mi.load_dict({"type": "path", "max_depth": 64, "rr_depth": 16})
     for number, point in enumerate(points):
         sampler = mi.load_dict({"type": "independent"})
         sampler.seed(seed * len(points) + number, samples)
         local = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
-        ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(*map(float, point)), local))
-        seen, _, _ = integrator.sample(whole, sampler, ray)
-        result.append(float(np.pi * dr.mean(seen.x).array[0]))
+        seen = _radiance(whole, sampler, mi.Point3f(*map(float, point)), local)
+        result.append(float(np.pi * dr.mean(seen).array[0]))
     return np.array(result)
+
+
+def luminance_by_path(
+    opaque: Quads,
+    panes: Quads,
+    eye: Sequence[float],
+    ways: NDArray[np.float64],
+    samples: int,
+    *,
+    seed: int = 0,
+) -> NDArray[np.float64]:
+    """Luminance [n] [cd/m2] that an eye in the rooms sees along directions [n, 3], the same way."""
+    whole, sampler = _mitsuba_scene(opaque, panes), mi.load_dict({"type": "independent"})
+    sampler.seed(seed, len(ways) * samples)
+    directions = mi.Vector3f(np.repeat(ways, samples, axis=0).T.astype(np.float32))
+    seen = _radiance(whole, sampler, mi.Point3f(*map(float, eye)), directions)
+    return seen.numpy().reshape(len(ways), samples).mean(axis=1)
+
+
+def _radiance(
+    whole: mi.Scene, sampler: mi.Sampler, start: mi.Point3f, direction: mi.Vector3f
+) -> mi.Float:
+    """What a path finds from a point along each direction."""
+    integrator = mi.load_dict({"type": "path", "max_depth": 64, "rr_depth": 16})
+    ray = mi.RayDifferential3f(mi.Ray3f(start, direction))
+    return integrator.sample(whole, sampler, ray)[0].x
 
 
 def _mitsuba_scene(opaque: Quads, panes: Quads):

@@ -34,6 +34,7 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.demo import VENETIAN_BLIND
 from scenes.evidence.benchmarks.radiance import polygon, write_surfaces
+from scenes.evidence.validation.cut_groups import Quads
 from scenes.evidence.validation.inner_glass import (
     INNER_TAU,
     TAU,
@@ -96,6 +97,11 @@ def by_phases(scene: DaylightScene, seed: int) -> NDArray[np.float64]:
 
 def by_paths(scene: DaylightScene, samples: int, seed: int) -> NDArray[np.float64]:
     """The same [S] by Mitsuba's integrator `path` in all rooms."""
+    return illuminance_by_path(*whole_rooms(scene), scene.points, samples, seed=seed)
+
+
+def whole_rooms(scene: DaylightScene) -> tuple[Quads, Quads]:
+    """All rooms' surfaces with their reflectance, all panes with their transmittance."""
     rooms = list(_all_behind([scene]))
     walls = [_without_panes(room, scene) for room in rooms]
     opaque = [
@@ -111,7 +117,7 @@ def by_paths(scene: DaylightScene, samples: int, seed: int) -> NDArray[np.float6
         ]
         if room is not scene and room.outdoor_groups:
             panes.append((_triangles(room.outdoor_groups), TAU))
-    return illuminance_by_path(opaque, panes, scene.points, samples, seed=seed)
+    return opaque, panes
 
 
 def by_radiance(scene: DaylightScene, folder: Path) -> NDArray[np.float64]:
