@@ -10,7 +10,9 @@ whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,7 @@ from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.images.view import View
+from mitsuba_cfs.matrices.cache import CacheEntry, kept_or_found
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
@@ -40,6 +43,7 @@ def hourly_glare(
     hours: ArrayLike | None = None,
     options: GlareOptions | None = None,
     keep: Path | None = None,
+    kept: Callable[[NDArray[np.int64]], CacheEntry] | None = None,
     progress: Progress = silent,
 ) -> AnnualGlare:
     """Glare of the view in some hours [n] of the light's sky, all by default.
@@ -49,6 +53,8 @@ def hourly_glare(
         state: of the windows in each of the sky's hours.
         options: what a source is, and the rest of how glare is rated.
         keep: file of the ratings so far, see `annual_glare`.
+        kept: the place of these hours' ratings with each window group in a state [G].  They are
+            kept where that state holds in all hours, and read where it holds in some.
     """
     chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
     rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, chosen]
@@ -63,17 +69,26 @@ def hourly_glare(
     geometry = light.filled.traced.geometry
     table = np.full((len(FIGURES), len(chosen)), np.nan)
     kinds, kind = np.unique(rows, axis=1, return_inverse=True)
-    for i, combination in enumerate(kinds.T):
-        columns = np.flatnonzero(kind.ravel() == i)
+
+    def found(i: int, columns: NDArray[np.int64]) -> NDArray[np.float64]:
         rated = annual_glare(
-            light.pictures(chosen[columns], combination, direct=metric == "eDGP"),
+            light.pictures(chosen[columns], kinds[:, i], direct=metric == "eDGP"),
             geometry=geometry,
             options=options,
             illuminance=None if own is None else own[columns],
             keep=keep if keep is None or i == 0 else keep.with_stem(f"{keep.stem}-{i}"),
             progress=part(progress, i / kinds.shape[1], (i + 1) / kinds.shape[1], "glare"),
         )
-        table[:, columns] = [getattr(rated, name) for name in FIGURES]
+        return np.array([getattr(rated, name) for name in FIGURES])
+
+    for i, combination in enumerate(kinds.T):
+        columns = np.flatnonzero(kind.ravel() == i)
+        entry = None if kept is None else kept(combination)
+        if len(columns) == len(chosen):
+            table[:, columns] = kept_or_found(entry, partial(found, i, columns))
+        else:
+            known = None if entry is None else entry.load()
+            table[:, columns] = found(i, columns) if known is None else known.mean[:, columns]
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
 
 

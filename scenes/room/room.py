@@ -49,6 +49,7 @@ from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.heated import HeatInputs, heat_alone
 from scenes.room.holes import hole_problems
 from scenes.room.inner_glass import InnerGlass, inner_glass
+from scenes.room.kept_glare import kept_glare
 from scenes.room.kept_sun import kept_sun
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
@@ -249,10 +250,12 @@ class RoomSimulation:
         """A glare metric in some hours of the year with the sun up [n]."""
         columns = np.searchsorted(self.skies.lit, hours)
         steps = part(self.progress, 0.0, 1.0, "annual glare")
+        light, rating, kept = self.pictured, rating_of(self.outputs), None
+        if isinstance(light, PhaseLight) and self.inner is None:
+            kept = kept_glare(light, self.windows, metric, columns, rating)
         return hourly_glare(
-            self.pictured, metric, self.lit_state, hours=columns,
-            options=rating_of(self.outputs), progress=steps,
-        )  # fmt: skip
+            light, metric, self.lit_state, hours=columns, options=rating, kept=kept, progress=steps
+        )
 
     def explored(self) -> ExploredRoom:
         """Every hour in every state, of outdoors that do not change over the year."""
