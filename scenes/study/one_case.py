@@ -36,6 +36,7 @@ from scenes.room.room import skies_for
 from scenes.room.room_year import RoomChoices, compute_room
 from scenes.room.stated_use import used_operation
 from scenes.run.inputs import read_weather
+from scenes.run.notes import tree_notes
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
 from scenes.study.straight_view import straight_view
@@ -126,6 +127,8 @@ def _computed(case: Case) -> CaseResult:
     used = [state for states in systems.values() for state in states]
     heats = {id(system): thermal_system(system).named_model for system in used}
     figures["window_model"] = " ".join(dict.fromkeys(heats.values()))
+    if trees := tree_notes(held.building):
+        figures["trees"] = " ".join(trees)
     figures["seconds"] = round(time.monotonic() - start, 3)
     return CaseResult(case.key, figures, arrays)
 

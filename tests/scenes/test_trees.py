@@ -175,3 +175,19 @@ def test_a_year_of_glare_behind_trees(variant, tmp_path, capfd):
     ratio = found["deciduous"] / found["evergreen"]
     np.testing.assert_allclose(ratio[5:10], 1.0, rtol=0.02)
     assert (ratio.drop(range(5, 11)) > 1.2).all()
+
+
+@pytest.mark.slow
+def test_a_study_says_what_trees_let_pass(variant, tmp_path, capfd):
+    (tmp_path / "trees.toml").write_text(LIST)
+    model = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
+    study = tmp_path / "study.toml"
+    study.write_text(
+        f'surroundings = ["trees.toml"]\n[[room]]\nbuilding = "{model.as_posix()}"\n'
+        f'spaces = ["Office"]\n[[climate]]\nweather = "{WEATHER.as_posix()}"\n'
+    )
+    out = tmp_path / "out"
+    assert cli.run(["study", str(study), "--quick", "--out", str(out)]) == 0, capfd.readouterr().err
+    (table,) = out.glob("*.csv")
+    (said,) = pd.read_csv(table)["trees"]
+    assert "3 % from May to October, 46 % from November to April" in said
