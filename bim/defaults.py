@@ -31,6 +31,7 @@ FACADE_REFLECTANCE = 0.3
 FURNITURE_REFLECTANCE = 0.5
 SITE_REFLECTANCE = 0.2  # EN 17037:2018, B.3: ground outdoors
 GLASS_REFLECTANCE = 0.15
+TREE_LAYER = "tree crown"  # of elements that are leaves
 CLEAR_GLAZING = pane(transmissivity=0.985, panes=2)  # what that glazing mirrors, 0.15 straight on
 EMISSIVITY = 0.9
 FRAME_FRACTION = 0.3  # of the opening: EN ISO 10077-1:2017, annex (typical window, 30 % frame)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.defaults import TREE_LAYER
 from bim.energyplus_operation import (
     FILE,
     HOURS,
@@ -120,6 +121,9 @@ class EnergyPlusTwin:
         self._air_between(air or TwinAir())
         own = {window.guid for room in rooms for window in room.space.windows}
         others = [element for element in building.elements if element.guid not in own]
+        if any(element.layer == TREE_LAYER for element in others):
+            self.notes["EnergyPlus has no trees"] = None
+            others = [element for element in others if element.layer != TREE_LAYER]
         shades(self.model, others, *_lookouts(rooms, outer))
         if others:
             self.notes["what stands outdoors shades, but reflects nothing"] = None

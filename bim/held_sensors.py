@@ -29,10 +29,3 @@ class HeldView:
 
     name: str
     view: View
-
-    @property
-    def is_fisheye(self) -> bool:
-        """Whether glare can be rated in it: a fisheye of the whole hemisphere."""
-        view = self.view
-        whole = min(view.horizontal_deg, view.vertical_deg) >= 180
-        return view.kind in ("angular", "hemispherical") and whole

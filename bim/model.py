@@ -29,7 +29,9 @@ FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "revea
 BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
 JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
+SHUT_ADVICE = "cfs run --inner-glass lets daylight through"  # glass and doorways as they are read
 NOT_USED = "not used"  # kind of a problem: what the file states and no result depends on
+TREES = "trees"  # kind of a problem: trees outdoors, and how much light passes them by month
 COLOURS = ("red", "green", "blue")  # bands of colour pictures
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
@@ -235,6 +237,7 @@ class Element:
     is_kept: bool = False  # the corrections say so, whatever stands behind it
     gloss: Gloss | None = None  # what it reflects like a mirror besides, in both bands
     hue: Colour = GREY  # of what it reflects diffusely: linear sRGB of luminance 1
+    months: tuple[int, ...] = ()  # 1 to 12 in which it stands; all of them where empty
 
     def reflectance(self, band: str) -> float:
         """Diffuse reflectance in the band "visible", "solar", "red", "green" or "blue"."""

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-import pandas as pd
-
 from bim.building_file import check_building_file
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import Given, given_light
 from scenes.picture_options import PictureOptions
-from scenes.room.picture_hours import PictureHourError
+from scenes.room.picture_hours import hour_of
 from scenes.room_views import NamedView, given_views
 from scenes.run.files import check_names
 from scenes.run.inputs import read_weather
@@ -37,23 +34,8 @@ def read_files(options: PictureOptions) -> PictureFiles:
     check_names(() if options.space is None else (options.space,))
     view = None if options.view is None else given_view(options.view)
     weather = read_weather(options.weather)
-    hour = hour_of(weather, options.at)
+    hour = hour_of(options.at, weather.midpoints, "--at")
     return PictureFiles(weather, hour, view, given_light(options.system))
-
-
-def hour_of(weather: Weather, at: str) -> int:
-    """The hour of the year that holds a month, day and time of day."""
-    try:
-        asked = pd.to_datetime(f"2000-{at}", format="%Y-%m-%d %H:%M")
-    except ValueError:
-        message = f"--at {at}: expected month-day hour:minute, as 06-21 12:00"
-        raise PictureHourError(message) from None
-    middles = weather.midpoints
-    same_day = (middles.month == asked.month) & (middles.day == asked.day)
-    found = np.flatnonzero(same_day & (middles.hour == asked.hour))
-    if not len(found):
-        raise PictureHourError(f"--at {at}: the weather of {weather.site} has no such hour")
-    return int(found[0])
 
 
 def given_view(text: str) -> NamedView:

@@ -25,6 +25,7 @@ from mitsuba_cfs.files import (
 )
 
 MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
+EXPLORER = "explore"  # folder of the explorer, inside that of the results
 
 
 @dataclass(frozen=True, slots=True)

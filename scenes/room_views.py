@@ -55,7 +55,7 @@ def given_views(text: str, size: int = 800) -> list[NamedView]:
 
 def held_fisheyes(building: Building, space: Space, size: int) -> list[NamedView]:
     """The fisheye views of a room that the building's file holds, in which glare can be rated."""
-    views = [held for held in held_views(building, space) if held.is_fisheye]
+    views = [held for held in held_views(building, space) if held.view.covers_hemisphere]
     return [NamedView(held.name, fitted(held.view, size)) for held in views]
 
 

@@ -66,6 +66,7 @@ def room_picture(
         surroundings=options.surroundings,
         surroundings_offset=options.surroundings_offset,
         colour=options.colour,
+        month=int(weather.midpoints[hour].month),
     )  # fmt: skip
     variants.activate()
     sampling = Sampling(picture_samples=options.samples, seed=options.seed)
@@ -74,7 +75,7 @@ def room_picture(
     light = PathSystems(viewed.scene, viewed.optics, sampling).light(sky)
     end = 0.7 if options.colour else 1.0
     view, steps, rated = viewed.scene.view, part(progress, 0.4, end, "picture"), None
-    if rates_glare(view):
+    if view.covers_hemisphere:
         rating = GlareOptions(grouping=options.glare_sources, sun=options.glare_sun)
         [(luminance, rated)] = rated_pictures(light, [0], options=rating, progress=steps)
     else:
@@ -87,12 +88,6 @@ def room_picture(
         radiance = coloured_picture(luminance, bands, sky, 0, progress=steps)
     middle = weather.midpoints[hour]
     return RoomPicture(luminance, view, viewed.space.label, middle, notes, rated, radiance)
-
-
-def rates_glare(view: View) -> bool:
-    """Whether a view is a fisheye of the whole hemisphere, which glare needs."""
-    whole = view.horizontal_deg == view.vertical_deg == 180
-    return view.kind in ("angular", "hemispherical") and whole
 
 
 def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False) -> None:

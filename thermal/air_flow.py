@@ -30,7 +30,7 @@ def set_air_flows(
             exceeds = (state.air[z] - drive.slab_c[t, z, 1]) / band + 0.5
             power = full_heat * min(max(lacks, 0.0), 1.0) - full_cold * min(max(exceeds, 0.0), 1.0)
             work.slab[z] = power
-            work.source[net.emitters.node[z]] = power / net.faces.area[face]
+            work.source[face] = power / net.faces.area[face]
 
 
 @inlined

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.conduction import wall_grid
 from thermal.convection import local_wind_factor
 from thermal.errors import require
 from thermal.ventilation import AirTransfer, SupplyAir, WindowAiring
@@ -39,7 +38,6 @@ class Emitters(NamedTuple):
 
     radiant: NDArray[np.float64]  # [Z, 2] share of heating and cooling
     slab: NDArray[np.int64]  # [Z] face, -1 without
-    node: NDArray[np.int64]  # [Z] node of the pipes
     power: NDArray[np.float64]  # [Z, 3] of the slab: heating, cooling [W], band [K]
 
 
@@ -72,50 +70,35 @@ def air_paths(zones: Sequence[Zone], transfers: Sequence[AirTransfer], terrain: 
     )  # fmt: skip
 
 
-def emitters(
-    zones: Sequence[Zone],
-    first_node: NDArray[np.int64],
-    node_count: NDArray[np.int64],
-    *,
-    cell: float,
-) -> Emitters:
-    """The emitters of the zones; first_node, node_count: [N] inner nodes of the faces' walls."""
-    face, slab, node, power = 0, [], [], []
+def slab_faces(zones: Sequence[Zone]) -> list[int]:
+    """The face of each zone's heated slab among the faces of all, -1 without one."""
+    face, found = 0, []
     for zone in zones:
-        here = zone.slab
-        if here is None:
-            slab.append(-1)
-            node.append(-1)
-            power.append((0.0, 0.0, 1.0))
-        else:
-            own = zone.index_of(here.surface)
-            at = face + own
-            item = f"heated slab {here.surface}"
-            require(node_count[at] > 0, item, "its layers belong to the zone at its other side")
-            slab.append(at)
-            node.append(first_node[at] + _node(zone, own, here.depth, cell))
-            power.append((here.heating_limit, here.cooling_limit, here.band))
+        found.append(-1 if zone.slab is None else face + zone.index_of(zone.slab.surface))
         frames = sum(window.frame_area > 0 for window in zone.windows)
         face += len(zone.surfaces) + len(zone.windows) + frames
+    return found
+
+
+def emitters(
+    zones: Sequence[Zone], slabs: Sequence[int], mode_count: NDArray[np.uint64]
+) -> Emitters:
+    """The emitters of the zones; slabs: their faces; mode_count: [N] of the faces' own walls."""
+    power = []
+    for zone, face in zip(zones, slabs, strict=True):
+        here = zone.slab
+        if here is None:
+            power.append((0.0, 0.0, 1.0))
+            continue
+        item = f"heated slab {here.surface}"
+        require(mode_count[face] > 0, item, "its layers belong to the zone at its other side")
+        power.append((here.heating_limit, here.cooling_limit, here.band))
     loads = [zone.loads for zone in zones]
     return Emitters(
         radiant=np.array([(x.heating_radiant, x.cooling_radiant) for x in loads]),
-        slab=np.array(slab, dtype=np.int64),
-        node=np.array(node, dtype=np.int64),
+        slab=np.array(slabs, dtype=np.int64),
         power=np.array(power),
     )
-
-
-def _node(zone: Zone, surface: int, depth: float, cell: float) -> int:
-    """The inner node of a surface's wall nearest to a depth below its inside face."""
-    wall = zone.surfaces[surface]
-    require(
-        depth < sum(layer.thickness for layer in wall.layers),
-        f"heated slab {wall.name}",
-        f"{depth:g} m lies below its layers",
-    )
-    below = -np.cumsum(wall_grid(wall.layers, cell=cell).width[::-1])[::-1][1:]
-    return int(np.argmin(np.abs(below + depth)))
 
 
 def _height(zone: Zone) -> float:

@@ -135,12 +135,12 @@ def simulate_zones(
     )
     weather = _weather(climate, steps)
     state = _start(net, len(zones), options.start_c)
-    work = _work(net, len(zones))
+    work = _work(net, state)
     rows = min(round(24 * HOUR / row_s), climate.hours)
     days = kernel.warm_up(net, state, work, weather, drive, method, rows=rows)
     means = kernel.hourly_means(climate.hours, state)
     kernel.advance(net, state, work, weather, drive, method, climate.hours, means)
-    terms = means.terms / steps
+    terms = np.divide(means.terms, steps, out=means.terms)
     if progress:
         progress(1.0)
     return tuple(
@@ -188,19 +188,19 @@ def _weather(climate: Climate, steps: int) -> records.OutdoorConditions:
 
 
 def _start(net: Network, zones: int, start_c: float) -> records.State:
-    n, m = net.faces.area.size, net.nodes.capacity.size
+    n = net.faces.area.size
     return records.State(
         inner=np.full(n, start_c),
         outer=np.full(n, start_c),
-        node=np.full(m, start_c),
+        mode=net.modes.even * start_c,
         air=np.full(zones, start_c),
         load=np.zeros(zones),
         opened=np.zeros(zones, dtype=np.bool_),
     )
 
 
-def _work(net: Network, zones: int) -> records.Workspace:
-    n, m = net.faces.area.size, net.nodes.capacity.size
+def _work(net: Network, state: records.State) -> records.Workspace:
+    n, m, zones = state.inner.size, state.mode.size, state.air.size
     return records.Workspace(
         diagonal=np.zeros(n + zones),
         below=np.zeros(net.system.rows.size),
@@ -215,13 +215,14 @@ def _work(net: Network, zones: int) -> records.Workspace:
         carried=np.zeros(zones),
         passed=np.zeros(zones),
         slab=np.zeros(zones),
-        source=np.zeros(m),
+        source=np.zeros(n),
         still=np.zeros(m),
+        ends=np.zeros((n, 2)),
         film=np.zeros(n),
         outdoor=np.zeros((n, 5)),
-        old_inner=np.zeros(n),
-        old_outer=np.zeros(n),
-        old_air=np.zeros(zones),
+        old_inner=state.inner.copy(),
+        old_outer=state.outer.copy(),
+        old_air=state.air.copy(),
     )
 
 
@@ -235,18 +236,18 @@ def _result(
     days: int,
     state: NDArray[np.int64],
 ) -> ZoneResult:
-    inner, outer, air = means.inner, means.outer, means.air[:, z]
+    air = means.air[:, z]
     mine = np.flatnonzero(net.faces.zone == z)
-    glass = mine[net.faces.window[mine] >= 0]
-    solid = mine[net.faces.window[mine] < 0]
+    inner, outer, windows = means.inner[:, mine], means.outer[:, mine], net.faces.window[mine]
+    glass, solid = np.flatnonzero(windows >= 0), np.flatnonzero(windows < 0)
     weight = net.faces.radiant_share[mine]
-    room = 0.5 * (air + inner[:, mine] @ weight)
+    room = 0.5 * (air + inner @ weight)
     seen = inner.copy()
     for column, window in zip(glass, zone.windows, strict=True):
         report = np.array([s.inner_report for s in window.states])
-        share = report[state[:, net.faces.window[column]]]
+        share = report[state[:, windows[column]]]
         seen[:, column] = room + share * (inner[:, column] - room)
-    mrt = seen[:, mine] @ weight
+    mrt = seen @ weight
     flows = {name: terms[:, i] for i, name in enumerate(records.TERMS)}
     load = flows["ideal loads"]
     return ZoneResult(

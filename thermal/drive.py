@@ -29,18 +29,14 @@ def drive_of(
     rows, hours = len(solar[0].inside), climate.hours
     fits = rows in (hours, hours * steps)
     require(fits, "solar", f"expected {hours} or {hours * steps} rows, got {rows}")
-    inner, outer, states = [], [], []
-    for zone, sun in zip(zones, solar, strict=True):
-        zone_inner, zone_outer = _zone_sun(zone, sun, rows)
-        inner.append(zone_inner)
-        outer.append(zone_outer)
-        states.append(_states(zone, sun, hours))
+    suns = [_zone_sun(zone, sun, rows) for zone, sun in zip(zones, solar, strict=True)]
+    states = [_states(zone, sun, hours) for zone, sun in zip(zones, solar, strict=True)]
     fans = [zone.supply or SupplyAir(0.0) for zone in zones]
     slabs = [zone.slab or HeatedSlab("", 1.0) for zone in zones]
     beside = [one for zone in zones for one in zone.beside]
     drive = records.Drive(
-        inner=np.ascontiguousarray(np.concatenate(inner, axis=1)),
-        outer=np.ascontiguousarray(np.concatenate(outer, axis=1)),
+        inner=np.concatenate([part for inner, _ in suns for part in inner], axis=1),
+        outer=np.concatenate([part for _, outer in suns for part in outer], axis=1),
         state=np.ascontiguousarray(np.concatenate(states, axis=1)),
         convective=_hourly([z.gains.convective for z in zones], hours, "convective gains"),
         radiant=_hourly([z.gains.radiant for z in zones], hours, "radiant gains"),
@@ -73,8 +69,8 @@ def drive_of(
     return drive, steps if rows == hours else 1
 
 
-def _zone_sun(zone: Zone, sun: Solar, rows: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sun at the inside [W] and the outside [W/m2] of the zone's faces [R, N]."""
+def _zone_sun(zone: Zone, sun: Solar, rows: int) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Sun at the inside [W] and the outside [W/m2] of walls, windows and frames, each [R, ...]."""
     walls, windows = len(zone.surfaces), len(zone.windows)
     item = f"solar of zone {zone.name}"
     for name, width in (
@@ -99,7 +95,7 @@ def _zone_sun(zone: Zone, sun: Solar, rows: int) -> tuple[NDArray[np.float64], N
         at_frames = at_frames * np.array([w.frame_absorptance for w in frames])
     inner = [sun.inside, glass_inside * area, np.zeros((rows, len(frames)))]
     outer = [sun.facade * (absorptance * outdoor), sun.absorbed_outer, at_frames]
-    return np.concatenate(inner, axis=1), np.concatenate(outer, axis=1)
+    return inner, outer
 
 
 def _states(zone: Zone, sun: Solar, hours: int) -> NDArray[np.int64]:
@@ -142,15 +138,16 @@ def _beyond(zones: Sequence[Zone], climate: Climate, steps: int) -> FloatArray:
 def _hourly(
     values: Sequence[ArrayLike], hours: int, item: str, *, missing: bool = False
 ) -> NDArray[np.float64]:
-    columns = []
-    if not values:
-        return np.zeros((hours, 0))
-    for value in values:
-        array = np.asarray(value, dtype=float)
+    arrays = [np.asarray(value, dtype=float) for value in values]
+    for array in arrays:
         require(array.shape in ((), (hours,)), item, f"expected one value or {hours}")
         require(missing or not bool(np.any(np.isnan(array))), item, "missing values")
-        columns.append(np.broadcast_to(array, (hours,)))
-    return np.ascontiguousarray(np.stack(columns, axis=1))
+    table = np.empty((hours, len(arrays)))
+    table[:] = [array if array.ndim == 0 else 0.0 for array in arrays]  # most are
+    for column, array in enumerate(arrays):
+        if array.ndim:
+            table[:, column] = array
+    return table
 
 
 def _set_points(

@@ -16,20 +16,25 @@ from thermal.records import inlined
 
 
 class Elimination(NamedTuple):
-    """Columns below the diagonal in the order of elimination; E entries, fill included."""
+    """Columns below the diagonal in the order of elimination; E entries, fill included.
+
+    What the compiled elimination looks up is unsigned: a signed index would be asked each time
+    whether it counts from the end.
+    """
 
     place: NDArray[np.int64]  # [U] position of each unknown in the order
     start: NDArray[np.int64]  # [U + 1] first entry of each column
-    rows: NDArray[np.int64]  # [E] positions of the rows, ascending in each column
+    rows: NDArray[np.uint64]  # [E] positions of the rows, ascending in each column
     # [M] entry that each product of two entries of a column is taken from, in the order of their
     # making: column by column, the first of the two, the second after it
-    target: NDArray[np.int64]
+    target: NDArray[np.uint64]
 
     def entries(self, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
         """Entry of each pair of unknowns [P, 2]: [P]."""
         low, high = np.sort(self.place[pairs], axis=1).T
+        rows = self.rows.astype(np.int64)
         found = [
-            start + np.searchsorted(self.rows[start:end], row)
+            start + np.searchsorted(rows[start:end], row)
             for start, end, row in zip(self.start[low], self.start[low + 1], high, strict=True)
         ]
         return np.array(found, dtype=np.int64)
@@ -62,7 +67,8 @@ def elimination(unknowns: int, pairs: Iterable[tuple[int, int]]) -> Elimination:
     for column in columns:
         for number, row in enumerate(column):
             target.append(start[row] + np.searchsorted(columns[row], column[number + 1 :]))
-    return Elimination(place=place, start=start, rows=rows, target=np.concatenate(target))
+    targets = np.concatenate(target).astype(np.uint64)
+    return Elimination(place=place, start=start, rows=rows.astype(np.uint64), target=targets)
 
 
 @inlined

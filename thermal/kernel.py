@@ -19,6 +19,7 @@ from thermal.records import (
     State,
     Workspace,
     inlined,
+    summed,
 )
 from thermal.step import step
 
@@ -34,7 +35,7 @@ def _account(
     method: Method,
     terms: NDArray[np.float64],
 ) -> None:
-    """Add the step's heat flows to terms [Z, 14] [W] (order of TERMS); move the walls' nodes."""
+    """Add the step's heat flows to terms [Z, 14] [W] (order of TERMS); move the walls' modes."""
     faces = net.faces
     hour, sun = t // method.steps, t // method.solar_every
     heat = weather.density[t] * AIR_HEAT
@@ -64,12 +65,12 @@ def _account(
             terms[z, on.GLASS_SUN] += area * drive.outer[sun, i]
             terms[z, on.WINDOWS] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
             continue
-        stored = _move_nodes(net, i, state, work)
+        stored = _move_modes(net, i, state, work)
         if kind == OUTDOOR:
             terms[z, on.FACADE_SUN] += area * drive.outer[sun, i]
             terms[z, on.FACADE] += area * (work.outdoor[i, 4] - work.outdoor[i, 3] * t_o)
         elif kind == KNOWN:
-            first = state.node[faces.first_node[i]]
+            first = _end_node(net, i, 0, state, work)
             terms[z, on.KNOWN_FACES] += area * faces.port[i, 2] * (t_o - first)
         terms[z, on.STORAGE] += area * stored
     for i in range(faces.area.size):
@@ -77,8 +78,8 @@ def _account(
         if kind == TWIN or kind == PARTITION or kind == PARTNER:
             own = faces.partner[i] if kind == PARTNER else i
             side = 0 if kind == PARTNER else 1
-            m = faces.first_node[own] + (0 if kind == PARTNER else faces.node_count[own] - 1)
-            inward = faces.port[own, 2 + side] * (state.node[m] - state.inner[i])
+            near = _end_node(net, own, side, state, work)
+            inward = faces.port[own, 2 + side] * (near - state.inner[i])
             stored = faces.port[own, side] * (state.inner[i] - work.old_inner[i])
             terms[faces.zone[i], on.PARTITIONS] += faces.area[i] * inward
             terms[faces.zone[i], on.STORAGE] += faces.area[i] * stored
@@ -88,24 +89,30 @@ def _account(
             terms[z, on.SLAB] += work.slab[z]
 
 
-@inlined
-def _move_nodes(net: Network, i: int, state: State, work: Workspace) -> float:
-    """Move the inner nodes of face i's wall; returns what the wall stored [W/m2]."""
-    faces, nodes = net.faces, net.nodes
-    first, count, kind = faces.first_node[i], faces.node_count[i], faces.kind[i]
-    stored = 0.0
-    for m in range(first, first + count):
-        fresh = (
-            work.still[m] + nodes.from_out[m] * state.outer[i] + nodes.from_in[m] * state.inner[i]
-        )
-        stored += nodes.capacity[m] * (fresh - state.node[m])
-        state.node[m] = fresh
+@summed
+def _move_modes(net: Network, i: int, state: State, work: Workspace) -> float:
+    """Move the modes of face i's wall; returns what the wall stored [W/m2]."""
+    faces, modes = net.faces, net.modes
+    first, kind, stored = faces.first_mode[i], faces.kind[i], 0.0
+    outer, inner = state.outer[i], state.inner[i]
+    for m in range(first, first + faces.mode_count[i]):
+        fresh = work.still[m] + modes.from_out[m] * outer + modes.from_in[m] * inner
+        stored += modes.heat[m] * (fresh - state.mode[m])
+        state.mode[m] = fresh
     if kind == TWIN or kind == PARTITION or kind == PARTNER:
         return 0.0
-    stored += faces.port[i, 1] * (state.inner[i] - work.old_inner[i])
+    stored += faces.port[i, 1] * (inner - work.old_inner[i])
     if kind != KNOWN:
-        stored += faces.port[i, 0] * (state.outer[i] - work.old_outer[i])
+        stored += faces.port[i, 0] * (outer - work.old_outer[i])
     return stored
+
+
+@inlined
+def _end_node(net: Network, i: int, side: int, state: State, work: Workspace) -> float:
+    """Temperature of the outermost (0) or innermost (1) inner node of face i's wall."""
+    port = net.faces.port[i]
+    from_faces = port[4 + 2 * side] * state.outer[i] + port[5 + 2 * side] * state.inner[i]
+    return work.ends[i, side] + from_faces
 
 
 @compiled(**ENTRY)
@@ -149,10 +156,10 @@ def warm_up(
 ) -> int:
     """Repeat the first day, of so many rows, until it ends as it began; how many days that took."""
     for day in range(method.warm_days):
-        before = np.concatenate([state.node, state.inner])
+        before = np.concatenate([state.mode, state.inner])
         unused = hourly_means(rows, state)
         advance(net, state, work, weather, drive, method, rows, unused)
-        change = np.abs(np.concatenate([state.node, state.inner]) - before).max()
+        change = np.abs(np.concatenate([state.mode, state.inner]) - before).max()
         if change < method.warm_tolerance:
             return day + 1
     return method.warm_days

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.air_paths import AirPaths, Emitters, air_paths, emitters
+from thermal.air_paths import AirPaths, Emitters, air_paths, emitters, slab_faces
 from thermal.conduction import WallGrid, wall_grid
 from thermal.convection import DOE2_LEEWARD, DOE2_WINDWARD, local_wind_factor
 from thermal.elimination import Elimination, elimination
@@ -43,19 +43,22 @@ class Faces(NamedTuple):
     roughness: NDArray[np.float64]  # [N] DOE-2 multiplier
     wind: NDArray[np.float64]  # [N, 2] a (local wind factor)^b, windward and leeward
     radiant_share: NDArray[np.float64]  # [N] of the zone's radiant gains
-    first_node: NDArray[np.int64]  # [N] of the wall's inner nodes, -1 without
-    node_count: NDArray[np.int64]  # [N]
+    first_mode: NDArray[np.uint64]  # [N] of the wall's inner nodes
+    mode_count: NDArray[np.uint64]  # [N]; 0: the wall's layers are not its own
     port: NDArray[np.float64]  # [N, 8] C_out, C_in, G_out, G_in, u_o, v_o, u_i, v_i
 
 
-class Nodes(NamedTuple):
-    """Inner nodes (axis M) of all walls, factored for the fixed step."""
+class Modes(NamedTuple):
+    """Modes (axis M) of the inner nodes of all walls, for the fixed step; see `WallModes`."""
 
-    capacity: NDArray[np.float64]  # [M] over the step [W/(m2 K)]
-    below: NDArray[np.float64]  # [M] conductance to the node before, 0 at the first
-    pivot: NDArray[np.float64]  # [M] inverse pivots of the forward sweep
-    from_out: NDArray[np.float64]  # [M] share of the outer face's temperature
-    from_in: NDArray[np.float64]  # [M] share of the inner face's temperature
+    decay: NDArray[np.float64]  # [M]
+    at_out: NDArray[np.float64]  # [M]
+    at_in: NDArray[np.float64]  # [M]
+    from_out: NDArray[np.float64]  # [M]
+    from_in: NDArray[np.float64]  # [M]
+    heat: NDArray[np.float64]  # [M] [W/(m2 K)]
+    even: NDArray[np.float64]  # [M]
+    from_pipes: NDArray[np.float64]  # [M] amplitude of heat at a heated slab's pipes [K per W/m2]
 
 
 class Glass(NamedTuple):
@@ -83,7 +86,7 @@ class Network(NamedTuple):
     """All that the compiled loop needs of the building."""
 
     faces: Faces
-    nodes: Nodes
+    modes: Modes
     glass: Glass
     couplings: Couplings
     system: Elimination
@@ -124,7 +127,9 @@ def network(
     """The network of coupled zones; link: [Z, Z] air exchange [m3/s], symmetric."""
     elements = [(z, e) for z, zone in enumerate(zones) for e in _elements(zone)]
     partners = _partners(zones, elements)
-    ports, nodes = _walls([e for _, e in elements], partners, step_s, cell)
+    slabs = slab_faces(zones)
+    pipes = {face: zones[z].slab.depth for z, face in enumerate(slabs) if face >= 0}
+    ports, modes = _walls([e for _, e in elements], partners, step_s, cell, pipes)
     faces = _faces(zones, elements, partners, ports, terrain)
     found = [np.empty((3, 0))]
     for z, zone in enumerate(zones):
@@ -135,8 +140,8 @@ def network(
     couplings, system = _couplings(faces, np.concatenate(found, axis=1), link)
     capacity = np.array([zone.volume * zone.air_capacity_factor for zone in zones])
     paths = air_paths(zones, transfers, terrain)
-    heated = emitters(zones, faces.first_node, faces.node_count, cell=cell)
-    return Network(faces, nodes, _glass(elements), couplings, system, capacity, paths, heated)
+    heated = emitters(zones, slabs, faces.mode_count)
+    return Network(faces, modes, _glass(elements), couplings, system, capacity, paths, heated)
 
 
 def _couplings(
@@ -221,36 +226,41 @@ def _partners(
 
 
 def _walls(
-    elements: list[OpaqueSurface | WindowElement], partners: list[int], step_s: float, cell: float
-) -> tuple[list[tuple[int, int, NDArray[np.float64]]], Nodes]:
+    elements: list[OpaqueSurface | WindowElement],
+    partners: list[int],
+    step_s: float,
+    cell: float,
+    pipes: dict[int, float],
+) -> tuple[list[tuple[int, int, NDArray[np.float64]]], Modes]:
+    """What the walls show to their faces, and their modes; pipes: depth of those in a face's."""
     ports, rows = [], []
     count = 0
     for i, e in enumerate(elements):
         if isinstance(e, WindowElement) or 0 <= partners[i] < i:
-            ports.append((-1, 0, np.zeros(8)))
+            ports.append((0, 0, np.zeros(8)))
             continue
-        port, node_rows = _two_port(wall_grid(e.layers, cell=cell), step_s)
-        ports.append((count, node_rows.shape[1], port))
-        rows.append(node_rows)
-        count += node_rows.shape[1]
-    table = np.concatenate(rows, axis=1) if rows else np.zeros((5, 0))
-    return ports, Nodes(*(np.ascontiguousarray(row) for row in table))
+        grid = wall_grid(e.layers, cell=cell)
+        modes = grid.modes(step_s)
+        at_pipes = np.zeros_like(modes.decay)
+        if i in pipes:
+            at_pipes = modes.from_nodes[grid.node_at(pipes[i], f"heated slab {e.name}")]
+        ports.append((count, len(modes.decay), _two_port(grid, step_s)))
+        rows.append(
+            (modes.decay, modes.at_out, modes.at_in, modes.from_out, modes.from_in, modes.heat,
+             modes.even, at_pipes)
+        )  # fmt: skip
+        count += len(modes.decay)
+    if not rows:
+        return ports, Modes(*np.zeros((len(Modes._fields), 0)))
+    return ports, Modes(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def _two_port(grid: WallGrid, step_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _two_port(grid: WallGrid, step_s: float) -> NDArray[np.float64]:
     g, capacity = grid.conductance, grid.capacity / step_s
-    inner = capacity[1:-1]
-    n = len(inner)
-    below = np.concatenate([[0.0], g[1:-1]])
-    pivot = np.zeros(n)
-    for m in range(n):
-        diagonal = inner[m] + g[m] + g[m + 1]
-        pivot[m] = 1.0 / (diagonal - (below[m] ** 2 * pivot[m - 1] if m else 0.0))
     inverse = grid.inner_inverse(step_s)
     from_out, from_in = inverse[:, 0] * g[0], inverse[:, -1] * g[-1]
     ends = [from_out[0], from_in[0], from_out[-1], from_in[-1]]
-    port = np.array([capacity[0], capacity[-1], g[0], g[-1], *ends])
-    return port, np.stack([inner, below, pivot, from_out, from_in])
+    return np.array([capacity[0], capacity[-1], g[0], g[-1], *ends])
 
 
 def _faces(
@@ -291,8 +301,8 @@ def _faces(
         roughness=np.array([ROUGHNESS[getattr(e, "roughness", "very smooth")] for e in solid]),
         wind=np.array([[a * f**b for a, b in forms] for f in factor]),
         radiant_share=weight / totals[zone],
-        first_node=np.array([p[0] for p in ports]),
-        node_count=np.array([p[1] for p in ports]),
+        first_mode=np.array([p[0] for p in ports], dtype=np.uint64),
+        mode_count=np.array([p[1] for p in ports], dtype=np.uint64),
         port=np.array([p[2] for p in ports]),
     )
 

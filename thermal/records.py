@@ -1,6 +1,6 @@
 """What the compiled time loop is given and fills: records of arrays, one entry per axis letter.
 
-N inside faces, M inner nodes of walls, Z zones, W windows, H hours, T time steps; U = N + Z
+N inside faces, M modes of walls, Z zones, W windows, H hours, T time steps; U = N + Z
 unknowns of a step's linear system, E entries below its diagonal.
 """
 
@@ -24,10 +24,12 @@ KNOWN_FACES, SUPPLY, BRIDGES, SLAB, STORAGE = range(9, 14)
 # references, and functions called from one cache file to another are not inlined by LLVM; together
 # that is nine tenths of a run.  So nothing that is compiled allocates, and all but the entry point
 # in `kernel` is inlined: by LLVM, which takes half as long as numba's `inline="always"`, where a
-# function is typed anew wherever it is called; and without what Python would call it by.
-ENTRY = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+# function is typed anew wherever it is called; and without what Python would call it by.  Products
+# and sums are one instruction where the processor has it (a tenth of a run).
+ENTRY = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "fastmath": {"contract"}}
 INLINED = ENTRY | {"forceinline": True, "no_cpython_wrapper": True}
 inlined = njit(**INLINED)
+summed = njit(**INLINED | {"fastmath": {"contract", "reassoc"}})  # sums in any order: by vectors
 
 
 class OutdoorConditions(NamedTuple):
@@ -70,7 +72,7 @@ class State(NamedTuple):
 
     inner: NDArray[np.float64]  # [N] inside faces
     outer: NDArray[np.float64]  # [N] outside faces
-    node: NDArray[np.float64]  # [M] inner nodes of the walls
+    mode: NDArray[np.float64]  # [M] amplitudes of the modes of the walls' inner nodes [K]
     air: NDArray[np.float64]  # [Z]
     load: NDArray[np.float64]  # [Z] ideal load of the step [W], heating positive
     opened: NDArray[np.bool_]  # [Z] whether the windows are open
@@ -93,8 +95,9 @@ class Workspace(NamedTuple):
     carried: NDArray[np.float64]  # [Z] heat of the air from other zones and neighbours [W]
     passed: NDArray[np.float64]  # [Z] conductance of the air to the neighbours [W/K]
     slab: NDArray[np.float64]  # [Z] power of the slab [W]
-    source: NDArray[np.float64]  # [M] heat set free at the nodes [W/m2]
-    still: NDArray[np.float64]  # [M] node temperatures that the step before alone would give
+    source: NDArray[np.float64]  # [N] heat set free at the pipes in the face's wall [W/m2]
+    still: NDArray[np.float64]  # [M] amplitudes that the step before alone would give
+    ends: NDArray[np.float64]  # [N, 2] what these give the outermost and innermost inner node
     film: NDArray[np.float64]  # [N] inside film plus extra conductance [W/(m2 K)]
     # [N, 5] outer face: diagonal, right side, coupling to inside, film sum, sum of film times T
     outdoor: NDArray[np.float64]

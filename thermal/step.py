@@ -31,11 +31,20 @@ from thermal.network import (
     TWIN,
     WINDOW,
     Faces,
+    Modes,
     Network,
-    Nodes,
 )
 from thermal.plant import close_air, is_held, plants_agree, radiant_load, set_point
-from thermal.records import AIR_HEAT, Drive, Method, OutdoorConditions, State, Workspace, inlined
+from thermal.records import (
+    AIR_HEAT,
+    Drive,
+    Method,
+    OutdoorConditions,
+    State,
+    Workspace,
+    inlined,
+    summed,
+)
 
 MOST_CHANGES = 50  # of the plants in an iterate; each changes a few times at the most
 
@@ -45,6 +54,15 @@ def copy_into(source: NDArray[np.float64], target: NDArray[np.float64], first: i
     """Copy an array into another, from an index on."""
     for i in range(source.size):
         target[first + i] = source[i]
+
+
+@inlined
+def _go_on(now: NDArray[np.float64], before: NDArray[np.float64]) -> None:
+    """Let temperatures change as in the step before, as the first iterate; `before`: the last."""
+    for i in range(now.size):
+        last = now[i]
+        now[i] = last + (last - before[i])
+        before[i] = last
 
 
 @inlined
@@ -99,18 +117,17 @@ def _outside_exchange(
     return h_sky + h_out, h_sky * sky + h_out * out
 
 
-@inlined
-def _still_nodes(faces: Faces, nodes: Nodes, state: State, work: Workspace) -> None:
-    """Inner nodes with both faces at zero: the part that comes from the step before."""
+@summed
+def _still_modes(faces: Faces, modes: Modes, state: State, work: Workspace) -> None:
+    """Modes with both faces at zero, the part that comes from the step before, and their ends."""
     for i in range(faces.area.size):
-        first, count = faces.first_node[i], faces.node_count[i]
-        for m in range(first, first + count):
-            carried = nodes.capacity[m] * state.node[m] + work.source[m]
-            if m > first:
-                carried += nodes.below[m] * work.still[m - 1]
-            work.still[m] = carried * nodes.pivot[m]
-        for m in range(first + count - 2, first - 1, -1):
-            work.still[m] += nodes.below[m + 1] * nodes.pivot[m] * work.still[m + 1]
+        first, source, at_out, at_in = faces.first_mode[i], work.source[i], 0.0, 0.0
+        for m in range(first, first + faces.mode_count[i]):
+            still = modes.decay[m] * state.mode[m] + modes.from_pipes[m] * source
+            at_out += modes.at_out[m] * still
+            at_in += modes.at_in[m] * still
+            work.still[m] = still
+        work.ends[i, 0], work.ends[i, 1] = at_out, at_in
 
 
 @inlined
@@ -128,8 +145,8 @@ def _wall_row(
     """Diagonal and right side [per m2] of an opaque face, its outer face eliminated."""
     faces = net.faces
     c_o, c_i, g_o, g_i, u_o, v_o, u_i, v_i = faces.port[i]
-    first, count, kind = faces.first_node[i], faces.node_count[i], faces.kind[i]
-    y_o, y_i = work.still[first], work.still[first + count - 1]
+    kind = faces.kind[i]
+    y_o, y_i = work.ends[i]
     diagonal = c_i + g_i * (1.0 - v_i)
     right = c_i * work.old_inner[i] + g_i * y_i
     if kind == KNOWN:
@@ -211,7 +228,7 @@ def _assemble(
             p = faces.partner[i]
             c_o, _, g_o, _, u_o, v_o, _, _ = faces.port[p]
             own = c_o + g_o * (1.0 - u_o)
-            r = c_o * work.old_inner[i] + g_o * work.still[faces.first_node[p]]
+            r = c_o * work.old_inner[i] + g_o * work.ends[p, 0]
             e[pairs.at_partner[i]] -= area * g_o * v_o
         else:
             beyond = drive.beyond[t, faces.beyond[i]]
@@ -307,14 +324,13 @@ def step(
     t: int,
     method: Method,
 ) -> None:
-    """One time step: iterate the coefficients, then move the walls' nodes."""
-    faces, nodes = net.faces, net.nodes
-    n = faces.area.size
-    copy_into(state.inner, work.old_inner, 0)
-    copy_into(state.outer, work.old_outer, 0)
-    copy_into(state.air, work.old_air, 0)
+    """One time step: iterate the coefficients."""
+    n = net.faces.area.size
     set_air_flows(net, state, work, weather, drive, t, t // method.steps)
-    _still_nodes(faces, nodes, state, work)
+    _go_on(state.inner, work.old_inner)
+    _go_on(state.outer, work.old_outer)
+    _go_on(state.air, work.old_air)
+    _still_modes(net.faces, net.modes, state, work)
     for _ in range(method.iterations):
         for _ in range(MOST_CHANGES):
             _assemble(net, state, work, weather, drive, t, method)

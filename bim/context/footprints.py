@@ -1,4 +1,4 @@
-"""GeoJSON: footprints with heights, as blocks on the ground.
+"""GeoJSON: footprints with heights, as blocks on the ground, and points of trees.
 
 Source: RFC 7946; the fields of heights are those of OpenStreetMap and of usual exports.
 """
@@ -14,7 +14,8 @@ import shapely.errors
 import shapely.geometry
 
 from bim.context.objects import ContextFile, ContextObject, is_number, read_object
-from bim.georeference import LONGITUDE_LATITUDE, crs_name
+from bim.context.trees import tree_of
+from bim.georeference import LONGITUDE_LATITUDE, crs_name, local_metres
 from bim.planes import plane_through, polygons_of
 from bim.solids import prism, triangles_of
 from mitsuba_cfs.errors import DataError
@@ -22,11 +23,14 @@ from mitsuba_cfs.errors import DataError
 HEIGHTS = ("height", "building:height", "measuredHeight", "measuredheight", "Height", "HEIGHT")
 LEVELS = ("building:levels", "levels", "num_floors")
 BASES = ("min_height", "building:min_height", "base")
+SMALL_DEG = 1e-4  # of which the metres at a place are taken
 STOREY = 3.0  # height of one, where only their number is stated [m]
 
 
 def read_footprints(path: Path) -> ContextFile:
     """The polygons of a GeoJSON file that state a height, their corners in its coordinates.
+
+    Points that state a `crown_radius` are trees, with the fields of `bim.context.trees`.
 
     Raises: `DataError` that names file, feature and field; a file without any height.
     """
@@ -35,16 +39,17 @@ def read_footprints(path: Path) -> ContextFile:
     if content.get("type") != "FeatureCollection" or not isinstance(features, list):
         raise DataError("expected a FeatureCollection of GeoJSON", file=path, field="type")
     objects: list[ContextObject] = []
-    without = 0
+    without, crs = 0, _crs(content)
     for number, feature in enumerate(features):
-        found = _block(feature, f"feature {number}", path)
+        element = f"feature {number}"
+        found = _block(feature, element, path) or _tree(feature, crs, element, path)
         without += not found
         objects += found
     if not objects:
         message = f"no polygon states a height ({', '.join(HEIGHTS[:3])}, or {LEVELS[0]})"
         raise DataError(message, file=path, field="properties")
     left_out = (("feature(s) without a polygon or a height", without),) if without else ()
-    return ContextFile(path, tuple(objects), _crs(content), True, left_out)
+    return ContextFile(path, tuple(objects), crs, True, left_out)
 
 
 def _crs(content: dict[str, Any]) -> str:
@@ -81,6 +86,30 @@ def _block(feature: Any, name: str, path: Path) -> list[ContextObject]:
         for polygon in shapely.get_parts(shape)
         if polygon.geom_type == "Polygon" and len(triangles := _prism(polygon, base, top))
     ]
+
+
+def _tree(feature: dict[str, Any], crs: str, name: str, path: Path) -> list[ContextObject]:
+    """A point that states a crown."""
+    fields, geometry = feature.get("properties") or {}, feature.get("geometry") or {}
+    if not isinstance(geometry, dict) or geometry.get("type") != "Point":
+        return []
+    if "crown_radius" not in fields:
+        return []
+    at = geometry.get("coordinates")
+    on_globe = crs == LONGITUDE_LATITUDE
+    if (
+        not isinstance(at, list)
+        or len(at) not in (2, 3)
+        or not all(map(is_number, at))
+        or (on_globe and not abs(at[1]) < 89)
+    ):
+        raise DataError("is no point", file=path, element=name, field="geometry.coordinates")
+    scale: Any = 1.0
+    if on_globe:
+        step = np.array([[at[0] + SMALL_DEG, at[1]], [at[0], at[1] + SMALL_DEG]])
+        scale = SMALL_DEG / np.diag(local_metres(step, at[0], at[1]))
+    # heights of a footprint's file start at the ground
+    return [tree_of(fields, at[:2], name, path, scale=scale)]
 
 
 def _number(fields: dict[str, Any], names: tuple[str, ...], name: str, path: Path) -> float | None:

@@ -14,6 +14,7 @@ from mitsuba_cfs.errors import DataError
 
 MOST_BYTES = 512 << 20
 BODY, TERRAIN = "IfcBuildingElementProxy", "IfcGeographicElement"
+Foliage = str | tuple[float, ...]  # a kind of tree, or what its crown passes in each month [12]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,8 @@ class ContextObject:
     name: str
     triangles: NDArray[np.float64]  # [T, 3, 3] in the file's coordinates
     ifc_class: str = BODY
+    nodes: NDArray[np.float64] | None = None  # [R, C, 3] of a grid, in place of triangles
+    foliage: Foliage | None = None  # of a crown that passes light; None: a body
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +37,8 @@ class ContextFile:
     crs: str | None = None  # None: a local system in metres
     from_ground: bool = False  # heights start at the ground, not at the sea
     left_out: tuple[tuple[str, int], ...] = ()  # what, and how many of it
+    on_own_map: bool = False  # that of the building, which the file does not name
+    crowns: tuple[tuple[str, Foliage], ...] = ()  # objects of other files that are crowns
 
 
 def read_bytes(path: Path) -> bytes:

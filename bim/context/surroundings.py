@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from calendar import month_name
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -13,17 +14,22 @@ from numpy.typing import NDArray
 
 from bim.coarser import coarser_mesh
 from bim.context.cityjson import read_cityjson
+from bim.context.crowns import crown_elements
 from bim.context.footprints import read_footprints
 from bim.context.horizon import horizon_wall, read_horizon
 from bim.context.meshes import SUFFIXES, read_meshes
-from bim.context.objects import ContextFile, ContextObject
+from bim.context.objects import ContextFile, ContextObject, Foliage
+from bim.context.terrain import SUFFIXES as GRIDS
+from bim.context.terrain import graded, read_terrain
+from bim.context.trees import monthly_transmittance, read_trees
 from bim.defaults import FACADE_REFLECTANCE, SITE_REFLECTANCE
 from bim.georeference import LONGITUDE_LATITUDE, local_metres, transformed
-from bim.model import Building, Element, Problem
+from bim.model import TREES, Building, Element, Problem
 from bim.outdoors import lifted_sites, unblinded
 from mitsuba_cfs.errors import DataError
 
-READ = (*SUFFIXES, ".city.json", ".geojson", ".json", ".csv")
+READ = (*SUFFIXES, ".city.json", ".geojson", ".json", ".csv", ".toml", *GRIDS)
+TERRAIN_DEG = 1.0  # between nodes of terrain next to each other
 SEEN_DEG = 0.2  # by which corners may move as seen from the building: less than the sun's disc
 PLAIN = 100  # triangles that an object may keep whatever its distance
 FARTHEST = 20_000.0  # objects further from the building are left out [m]
@@ -37,7 +43,8 @@ def with_surroundings(
 ) -> Building:
     """The building with what files hold of its surroundings.
 
-    OBJ, STL, PLY, glTF, CityJSON, GeoJSON footprints with heights; the horizon of PVGIS.  Objects
+    OBJ, STL, PLY, glTF, CityJSON, GeoJSON footprints with heights, terrain as a grid; the horizon
+    of PVGIS; trees as leaves (`bim.context.crowns`), some of them in some months only.  Objects
     on a map are placed by the building's map conversion, else by its latitude and longitude, which
     are then taken as those of its origin; others lie in the building's own metres.  What the
     surroundings hold of the building itself is left out.  Corners of far objects are merged by
@@ -54,7 +61,9 @@ def with_surroundings(
     centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
     elements: list[Element] = []
+    trees: list[tuple[ContextObject, str]] = []  # each with its GUID
     problems: list[Problem] = []
+    named = _named_crowns([Path(file) for file in files])
     for file in map(Path, files):
         if _is_horizon(file):
             walls, radius = horizon_wall(read_horizon(file), centre, size)
@@ -63,7 +72,15 @@ def with_surroundings(
             elements.append(_element(ContextObject("horizon", walls), file, len(elements)))
             continue
         context = read_context(file)
-        placed = _placed(context, building, offset)
+        placed = [
+            replace(one, foliage=named.get(one.name, one.foliage))
+            for one in _placed(context, building, offset)
+        ]
+        crowns = [one for one in placed if one.foliage is not None]
+        trees += [(one, f"{file.stem}-tree-{n}") for n, one in enumerate(crowns)]
+        placed = [one for one in placed if one.foliage is None]
+        placed, more = _meshed(placed, centre, file)
+        problems += more
         kept, more = _beside(placed, context, building, centre)
         problems += more
         kept, more = _as_seen(kept, centre, size, file)
@@ -72,8 +89,13 @@ def with_surroundings(
     windows = list(building.windows)
     free, more = lifted_sites(elements, windows)
     outdoors = unblinded([*building.elements, *free], building.spaces)
-    problems += [*more, *outdoors.problems]
-    return replace(building, elements=outdoors.elements, problems=(*building.problems, *problems))
+    leaves, told = _leaves(trees, building, centre, size)
+    problems += [*more, *outdoors.problems, *told]
+    return replace(
+        building,
+        elements=(*outdoors.elements, *leaves),
+        problems=(*building.problems, *problems),
+    )
 
 
 def read_context(path: Path) -> ContextFile:
@@ -88,7 +110,69 @@ def read_context(path: Path) -> ContextFile:
         return read_footprints(path)
     if ending == ".json":
         return read_cityjson(path)
+    if ending == ".toml":
+        return read_trees(path)
+    if ending in GRIDS:
+        return read_terrain(path)
     raise DataError(f"expected a file of {', '.join(READ)}", file=path, field="--surroundings")
+
+
+def _named_crowns(files: Sequence[Path]) -> dict[str, Foliage]:
+    """What lists of trees say of objects of the other files, by their names."""
+    lists = [file for file in files if file.suffix.lower() == ".toml"]
+    bodies = [file for file in files if file not in lists and not _is_horizon(file)]
+    found: dict[str, Foliage] = {}
+    for file in lists:
+        found |= dict(read_trees(file).crowns)
+    if found:
+        known = {one.name for file in bodies for one in read_context(file).objects}
+        missing = next((name for name in found if name not in known), None)
+        if missing is not None:
+            message = f"{missing!r} is no object of the other files of --surroundings"
+            raise DataError(message, file=lists[0], field="object")
+    return found
+
+
+def _leaves(
+    trees: Sequence[tuple[ContextObject, str]],
+    building: Building,
+    centre: NDArray[np.float64],
+    size: float,
+) -> tuple[list[Element], list[Problem]]:
+    """The leaves of crowns, and what is to be said of them at the head of every result."""
+    elements: list[Element] = []
+    stated: list[tuple[float, ...]] = []
+    far = 0
+    for one, guid in trees:
+        corners = one.triangles.reshape(-1, 3)
+        gap = float(np.linalg.norm(corners - centre, axis=1).min() - size / 2)
+        if gap > FARTHEST:
+            far += 1
+            continue
+        shares = monthly_transmittance(one.foliage or (), building.latitude_deg)
+        elements += crown_elements(one, shares, guid, max(gap, 0.0))
+        stated.append(shares)
+    problems = []
+    if far:
+        what = f"{far} tree(s) further than {FARTHEST / 1000:.0f} km"
+        problems.append(Problem(trees[0][0].name, what, "left out: is the file placed rightly?"))
+    for shares in dict.fromkeys(stated):
+        what = f"{stated.count(shares)} tree(s) outdoors"
+        done = f"of the sun {_by_month(shares)} passes their crowns, traced by month as leaves"
+        problems.append(Problem(trees[0][0].name, what, done, kind=TREES))
+    return elements, problems
+
+
+def _by_month(shares: Sequence[float]) -> str:
+    """Transmittances of the months [12] in words: 3 % from May to October, 46 % from ..."""
+    if len(set(shares)) == 1:
+        return f"{100 * shares[0]:.0f} %"
+    starts = [month for month in range(12) if shares[month] != shares[month - 1]]
+    ends = [(month - 1) % 12 for month in (*starts[1:], starts[0])]
+    return ", ".join(
+        f"{100 * shares[first]:.0f} % from {month_name[first + 1]} to {month_name[last + 1]}"
+        for first, last in zip(starts, ends, strict=True)
+    )
 
 
 def _is_horizon(path: Path) -> bool:
@@ -104,27 +188,59 @@ def _placed(
     """The file's objects in the building's world."""
     if offset is not None:
         moved = np.asarray(offset, dtype=float)
-        return [replace(one, triangles=one.triangles + moved) for one in context.objects]
-    if context.crs is None:
+        return [_each(one, lambda points: points + moved) for one in context.objects]
+    if context.on_own_map and building.georeference is None:
+        message = "lies on a map, and the building has none: give --surroundings-offset"
+        raise DataError(message, file=context.path)
+    if context.crs is None and not context.on_own_map:
         return list(context.objects)
     return [
-        replace(one, triangles=_to_world(one.triangles, context, building))
-        for one in context.objects
+        _each(one, lambda points: _to_world(points, context, building)) for one in context.objects
     ]
 
 
+def _each(
+    one: ContextObject, move: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> ContextObject:
+    """An object with its points [N, 3] moved."""
+    triangles = move(one.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
+    if one.nodes is None:
+        return replace(one, triangles=triangles)
+    holes = np.isnan(one.nodes[..., 2])
+    nodes = move(np.nan_to_num(one.nodes).reshape(-1, 3)).reshape(one.nodes.shape)
+    nodes[holes, 2] = np.nan
+    return replace(one, triangles=triangles, nodes=nodes)
+
+
+def _meshed(
+    objects: Sequence[ContextObject], centre: NDArray[np.float64], file: Path
+) -> tuple[list[ContextObject], list[Problem]]:
+    """Grids as triangles, the further the coarser."""
+    found, problems = [], []
+    for one in objects:
+        if one.nodes is not None:
+            triangles, worst = graded(one.nodes, centre, TERRAIN_DEG)
+            count = int(np.isfinite(one.nodes[..., 2]).sum())
+            one = replace(one, triangles=triangles, nodes=None)
+            done = f"{len(triangles)} triangles, heights moved by {worst:.2f} degrees at the most"
+            problems.append(Problem(file.name, f"{count} heights", f"{done} as seen from here"))
+            if not len(triangles):
+                continue
+        found.append(one)
+    return found, problems
+
+
 def _to_world(
-    triangles: NDArray[np.float64], context: ContextFile, building: Building
+    points: NDArray[np.float64], context: ContextFile, building: Building
 ) -> NDArray[np.float64]:
-    points, file = triangles.reshape(-1, 3), str(context.path)
-    place = building.georeference
+    file, place = str(context.path), building.georeference
     if place is not None:
-        flat = transformed(points[:, :2], context.crs, place.crs, file=file)
+        flat = transformed(points[:, :2], context.crs or place.crs, place.crs, file=file)
         heights = points[:, 2]
         if context.from_ground:
             heights = heights - place.to_world[2, 3] / place.to_world[2, 2]
         whole = np.column_stack([flat, heights, np.ones(len(flat))])
-        return (whole @ place.to_world.T)[:, :3].reshape(-1, 3, 3)
+        return (whole @ place.to_world.T)[:, :3]
     if building.latitude_deg is None or building.longitude_deg is None:
         message = (
             f"lies on the map {context.crs}, and the building has neither a map conversion nor"
@@ -134,7 +250,7 @@ def _to_world(
     degrees = transformed(points[:, :2], context.crs, LONGITUDE_LATITUDE, file=file)
     flat = local_metres(degrees, building.longitude_deg, building.latitude_deg)
     heights = points[:, 2] if context.from_ground else points[:, 2] - building.elevation
-    return np.column_stack([flat, heights]).reshape(-1, 3, 3)
+    return np.column_stack([flat, heights])
 
 
 def _beside(

@@ -23,7 +23,7 @@ from bim.ifc.project import storey_of
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.ifc.transparent import PHANTOM, is_phantom
-from bim.model import Problem
+from bim.model import SHUT_ADVICE, Problem
 from bim.names import plain_text
 from bim.planes import plane_through, polygons_of, triangulated
 from bim.rays import RayMesh
@@ -208,7 +208,7 @@ def _said(
     if inner:
         what = f"{label}: glass between {' and '.join(inner)}"
         kind = "glass between rooms"
-        done = "taken as opaque; cfs run --inner-glass lets daylight through"
+        done = f"taken as opaque; {SHUT_ADVICE}"
         problems.append(Problem(filling.guid, what, done, "window", kind=kind))
     rooms = sorted({names[a.room] for a in found if a.neighbour is None})
     if len(rooms) > 1:

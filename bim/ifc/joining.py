@@ -15,7 +15,7 @@ from bim.ifc.corrections import corrections_file
 from bim.ifc.passages import LARGEST_DOOR, Passage, passages
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
-from bim.model import JOINED, Problem
+from bim.model import JOINED, SHUT_ADVICE, Problem
 from bim.names import JOINT, found_by_name
 from bim.rooms import room_solid
 from bim.solids import packed, unpacked
@@ -132,7 +132,7 @@ def _how_to_join(
     listed = ", ".join(f'"{name}"' for name in names)
     file = corrections_file(source.path).name
     return (
-        "closed by a wall face; cfs run --inner-glass lets daylight through; one room with "
+        f"closed by a wall face; {SHUT_ADVICE}; one room with "
         f"--join '{' + '.join(names)}', or join = [[{listed}]] in {file}"
     )
 

@@ -65,6 +65,21 @@ class View:
             if not 0 < size <= widest or (open_end and size == widest):
                 raise ValueError(f"{self.kind} view with {name} {size:g}: illegal size")
 
+    @property
+    def is_fisheye(self) -> bool:
+        """Whether equal angles, or equal projected areas, have equal sizes in the picture."""
+        return self.kind in ("angular", "hemispherical")
+
+    @property
+    def covers_hemisphere(self) -> bool:
+        """Whether it is a fisheye of all before the eye, the least that glare can be rated in."""
+        return self.is_fisheye and min(self.horizontal_deg, self.vertical_deg) >= 180
+
+    @property
+    def is_disc(self) -> bool:
+        """Whether it is a fisheye of the hemisphere and nothing else, whose picture is a disc."""
+        return self.is_fisheye and self.horizontal_deg == self.vertical_deg == 180
+
 
 def _triple(vector: ArrayLike, name: str) -> Triple:
     vector = np.asarray(vector, dtype=float)

@@ -25,6 +25,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.progress import Progress, part, silent
 
 DIRECT_DEPTH = 2  # segments of a direct-only path behind what the eye sees: to window, to sky
@@ -32,7 +33,7 @@ State = ArrayLike | None  # [G, L] of each window group in each hour, or [L] of 
 
 
 def hourly_glare(
-    light: PhaseLight | PathLight,
+    light: PhaseLight | PathLight | SeasonalLight,
     metric: str = "DGP",
     state: State = None,
     *,
@@ -52,6 +53,8 @@ def hourly_glare(
     chosen = np.arange(len(light.sky.lit)) if hours is None else np.asarray(hours, dtype=np.int64)
     rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, chosen]
     options = options or GlareOptions()
+    if isinstance(light, SeasonalLight):
+        return _of_seasons(light, metric, chosen, rows, options, progress, keep=keep)
     if isinstance(light, PathLight):
         return _of_paths(light, metric, chosen, rows, options, progress)
     if metric == "sDGP":
@@ -74,8 +77,43 @@ def hourly_glare(
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
 
 
-def light_seen_from(light: PhaseLight, view: View, progress: Progress = silent) -> PhaseLight:
+def _of_seasons(
+    light: SeasonalLight,
+    metric: str,
+    chosen: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    options: GlareOptions,
+    progress: Progress,
+    *,
+    keep: Path | None,
+) -> AnnualGlare:
+    """Glare of some hours [n] in their states [G, n], season by season."""
+    table = np.full((len(FIGURES), len(chosen)), np.nan)
+    done = 0
+    for i, (own, hours) in enumerate(light.parts()):
+        columns = np.flatnonzero(np.isin(chosen, hours))
+        if not len(columns):
+            continue
+        among = np.searchsorted(hours, chosen[columns])
+        states = np.zeros((len(rows), len(hours)), dtype=np.int64)
+        states[:, among] = rows[:, columns]
+        end = (done + len(columns)) / len(chosen)
+        rated = hourly_glare(
+            own, metric, states, hours=among, options=options,
+            keep=keep and keep.with_stem(f"{keep.stem}-season-{i}"),
+            progress=part(progress, done / len(chosen), end, "glare"),
+        )  # fmt: skip
+        table[:, columns] = [getattr(rated, name) for name in FIGURES]
+        done += len(columns)
+    return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
+
+
+def light_seen_from(
+    light: PhaseLight | SeasonalLight, view: View, progress: Progress = silent
+) -> PhaseLight | SeasonalLight:
     """The same light seen from another eye: that of the windows is not computed again."""
+    if isinstance(light, SeasonalLight):
+        return light.changed(lambda own: light_seen_from(own, view, progress))
     traced = light.filled.traced.seen_from(view, progress)
     found = PhaseSystems(traced, light.filled.systems).light(light.sky)
     found.__dict__["windows"] = light.windows
@@ -117,7 +155,7 @@ def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
 
 
 def rated_pictures(
-    light: PhaseLight | PathLight,
+    light: PhaseLight | PathLight | SeasonalLight,
     hours: ArrayLike,
     state: State = None,
     *,
@@ -127,6 +165,12 @@ def rated_pictures(
     """Luminance pictures of some hours as of `pictures`, and the glare of each."""
     hours, options = np.asarray(hours, dtype=np.int64), options or GlareOptions()
     rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, hours]
+    if isinstance(light, SeasonalLight):
+        return [
+            one
+            for hour, now in zip(hours.tolist(), rows.T, strict=True)
+            for one in _rated_in_season(light, hour, now, options, progress)
+        ]
     found, geometry = [], GlareView(_view(light))
     for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
         steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
@@ -156,6 +200,20 @@ def rated_pictures(
         found.append((shown, rated))
         steps("pictures", 1.0)
     return found
+
+
+def _rated_in_season(
+    light: SeasonalLight,
+    hour: int,
+    state: NDArray[np.int64],
+    options: GlareOptions,
+    progress: Progress,
+) -> list[tuple[NDArray[np.float32], GlareResult]]:
+    """The picture of one hour with each window group in a state [G], and its glare."""
+    own, hours = next((own, hours) for own, hours in light.parts() if hour in hours)
+    states = np.tile(state[:, None], len(hours))
+    at = np.searchsorted(hours, [hour])
+    return rated_pictures(own, at, states, options=options, progress=progress)
 
 
 def _view(light: PhaseLight | PathLight) -> View | None:

@@ -86,6 +86,18 @@ class PhaseScene:
                 other.__dict__[name] = self.__dict__[name]
         return other
 
+    def before(self, scene: DaylightScene) -> PhaseScene:
+        """The same room before other outdoors, its windows cut in the same parts.
+
+        So that what is indoors is found in the cache.
+        """
+        other = PhaseScene(
+            scene, self.sampling, five_phase=self.five_phase, cache=self.cache,
+            progress=self.progress,
+        )  # fmt: skip
+        other.__dict__["parts"] = self.parts
+        return other
+
     def trace(self, metric: str) -> None:
         """Trace now what a metric needs (`mitsuba_cfs.methods.METRICS`)."""
         wanted = ["daylight"]

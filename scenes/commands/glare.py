@@ -171,7 +171,7 @@ def _view(picture: Picture, request: Request, path: Path) -> View:
 def _warn_of_crop(view: View, request: Request, path: Path) -> None:
     """Say where a picture does not show the hemisphere, or shows it out of shape."""
     across, along = view.horizontal_deg / view.width, view.vertical_deg / view.height
-    if view.kind in ("angular", "hemispherical") and abs(across / along - 1) > 0.02:
+    if view.is_fisheye and abs(across / along - 1) > 0.02:
         click.echo(
             f"warning: {path}: {view.width} x {view.height} pixels for {view.horizontal_deg:g} x "
             f"{view.vertical_deg:g} degrees: cropped without a change of its VIEW?",

@@ -37,7 +37,7 @@ from scenes.picture_options import SUFFIXES, PictureOptions
 @weather_option
 @system_option
 @click.option(
-    "--at", required=True, metavar="'MM-DD HH:MM'", help="The hour of the weather that holds it."
+    "--at", required=True, metavar="'MM-DD HH[:MM]'", help="The hour of the weather that holds it."
 )
 @space_option("space", "default: the first with a window", several=False)
 @join_option

@@ -233,6 +233,15 @@ def samples_option(default: int, why: str) -> Option:
     )  # fmt: skip
 
 
+def explore_option(rest: str = "") -> Option:
+    """`--explore`; the `rest`: what this command's explorer holds."""
+    return click.option(
+        "--explore", is_flag=True,
+        help="Write the explorer: any hour's picture, plan and temperatures in a browser"
+        + (f"; {rest}." if rest else "."),
+    )  # fmt: skip
+
+
 def write_ifc_option(sets: str) -> Option:
     """`--write-ifc`; which `sets` there are."""
     return click.option(

@@ -13,6 +13,7 @@ from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
     building_options,
+    explore_option,
     height_option,
     method_option,
     named_settings,
@@ -35,7 +36,7 @@ _DEFAULT = RoomOptions()
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g at normal incidence.")
 @click.option(
-    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH'",
+    "--picture", "picture_hours", multiple=True, metavar="'MM-DD HH[:MM]'",
     help="Hour to show and rate for glare; default: nine hours and the brightest.",
 )  # fmt: skip
 @size_option("picture_size", _DEFAULT.outputs.picture_size, "of up to ten in each room's report")
@@ -62,10 +63,7 @@ _DEFAULT = RoomOptions()
     "--no-colour", is_flag=True,
     help="Leave each room's picture in colour out; --quick does as well.",
 )  # fmt: skip
-@click.option(
-    "--explore", is_flag=True,
-    help="Write the explorer: any hour's picture, plan and temperatures in a browser.",
-)  # fmt: skip
+@explore_option()
 @processes_option
 @scheduler_option
 @click.option(
@@ -100,7 +98,10 @@ def command(
     scheduler: str | None,
     **chosen,
 ) -> None:
-    """Daylight, glare, temperatures and comfort of a building's rooms: IFC, or a Radiance scene."""
+    """Daylight, glare, temperatures and comfort of a building's rooms.
+
+    BUILDING is an IFC file, a honeybee model (.hbjson), gbXML or a Radiance scene (.rad).
+    """
     if chosen["annual_glare"] and chosen["method"] == "point-in-time":
         raise click.UsageError("--annual-glare needs --method three-phase or five-phase")
     if explore and chosen["method"] == "point-in-time":
@@ -152,7 +153,8 @@ def run_to_folder(
     from scenes.explore.folder import write_explorer
     from scenes.report import write_report
     from scenes.report.numbers import counted
-    from scenes.run.outputs import EXPLORER, write_results
+    from scenes.result_folder import EXPLORER
+    from scenes.run.outputs import write_results
     from scenes.run.rooms_apart import Workers
     from scenes.run.run import run_job
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import quick_option
 from scenes.commands.room_options import (
+    explore_option,
     method_option,
     out_folder_option,
     page_option,
@@ -23,6 +25,8 @@ from scenes.commands.room_options import (
 )
 
 if TYPE_CHECKING:
+    from scenes.study.case import Case
+    from scenes.study.explored import ExploredCase
     from scenes.study.plan import StudyPlan
     from scenes.study.store import Store
     from scenes.study.study import StudyResult
@@ -37,6 +41,7 @@ if TYPE_CHECKING:
 @method_option(["auto"], "auto: by cost and error, in place of the file's")
 @click.option("--time-budget", metavar="TIME", help="Of the whole study for auto: 90s, 20min, 2h.")
 @click.option("--dgp-error", metavar="PERCENT", help="Relative error of DGP for auto: 10%.")
+@explore_option("of 12 cases at most, which the report's marks then open")
 @write_ifc_option("one for each case of a study of one file")
 @surroundings_option
 @surroundings_offset_option
@@ -51,6 +56,7 @@ def command(
     method: str | None,
     time_budget: str | None,
     dgp_error: str | None,
+    explore: bool,
     write_ifc: Path | None,
     surroundings: tuple[Path, ...],
     surroundings_offset: tuple[float, float, float] | None,
@@ -69,7 +75,7 @@ def command(
     asked = {key: text for key, text in asked.items() if text is not None}
     parsed = read_study(study, automatic=method is not None, quick=quick, **asked)
     parsed = with_flags(parsed, surroundings, surroundings_offset)
-    study_to_folder(study, parsed, out, processes, scheduler, write_ifc, page=page)
+    study_to_folder(study, parsed, out, processes, scheduler, write_ifc, page=page, explore=explore)
 
 
 def study_to_folder(
@@ -81,6 +87,7 @@ def study_to_folder(
     write_ifc: Path | None = None,
     *,
     page: Path | None = None,
+    explore: bool = False,
 ) -> None:
     """Compute a study with a progress bar, say what comes out case by case, write its files."""
     from scenes.page_options import StudySection, read_page
@@ -92,36 +99,61 @@ def study_to_folder(
     from scenes.commands.progress_bar import ProgressBar
     from scenes.study.automatic import settled
     from scenes.study.plan import plan_of
-    from scenes.study.study import run_study, write_study
+    from scenes.study.study import run_study, with_explorers, write_study
     from scenes.study.write_ifc import write_study_ifc
     from scenes.study_report import write_study_report
+    from scenes.study_report.explorer import explorable, write_study_explorer
 
     if parsed.quick:
         click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
+    chosen: dict[int, Case] = {}
+    _check_explorable(plan, explore)
     _print_plan(plan)
     with ProgressBar() as progress, compiled_beside():
         result = run_study(
             parsed, store, plan=plan, processes=processes, scheduler=scheduler,
             progress=progress, on_case=_print_case,
         )  # fmt: skip
-    nothing = result.failed == len(result.results)
+        nothing = result.failed == len(result.results)
+        if explore and not nothing:
+            chosen = explorable(result)
+            result = with_explorers(
+                result, chosen, store, processes=processes, scheduler=scheduler,
+                progress=progress, on_case=_print_explorer,
+            )  # fmt: skip
     report = None if nothing else lambda path: write_study_report(result, path, page_options)
-    write_study(parsed, result, store, report)
+    page_of_cases = partial(write_study_explorer, result) if result.explored else None
+    write_study(parsed, result, store, report, page_of_cases)
     _print_outcome(result, out)
-    failed, total = result.failed, len(result.results)
-    if nothing:
-        raise click.ClickException(f"{failed} of {total} cases failed: {result.first_error}")
-    click.echo(f"report: {out / 'report.html'}")
-    if write_ifc is not None:
+    if write_ifc is not None and not nothing:
         for problem in write_study_ifc(result, write_ifc):
             click.echo(f"note: {problem.where}: {problem.what}")
         click.echo(f"building with results: {write_ifc}")
+    _raise_failures(result, len(chosen))
+
+
+def _raise_failures(result: StudyResult, explorers: int) -> None:
+    """End with an error that counts the cases, or the explorers begun, that failed."""
+    failed, total = result.failed, len(result.results)
+    if failed == total:
+        raise click.ClickException(f"{failed} of {total} cases failed: {result.first_error}")
     if failed:
         raise click.ClickException(
             f"{failed} of {total} cases failed, the first: {result.first_error}; "
             f"the others are kept, and the same command tries these again"
         )
+    if len(result.explored) < explorers:
+        lost = explorers - len(result.explored)
+        raise click.ClickException(f"{lost} of {explorers} explorers failed; the notes say why")
+
+
+def _check_explorable(plan: StudyPlan, explore: bool) -> None:
+    """Raise `click.UsageError` where no case could get the explorer that was asked for."""
+    from scenes.study.explored import PHASED
+
+    if explore and not any(case.options.method in PHASED for case in plan.cases):
+        raise click.UsageError("--explore needs cases by three-phase or five-phase")
 
 
 def _checked(
@@ -161,8 +193,9 @@ def _print_plan(plan: StudyPlan) -> None:
 
 
 def _print_outcome(result: StudyResult, out: Path) -> None:
-    """How many cases there are, and what they took."""
+    """How many cases there are, what they took, and the pages."""
     from scenes.report.numbers import counted
+    from scenes.result_folder import EXPLORER
 
     click.echo(
         f"{counted(len(result.results), 'case')}: {result.reused} were there, "
@@ -170,6 +203,17 @@ def _print_outcome(result: StudyResult, out: Path) -> None:
     )
     if result.clock:
         click.echo(f"auto: {result.clock}")
+    if result.failed < len(result.results):
+        click.echo(f"report: {out / 'report.html'}")
+    if result.explored:
+        number = counted(len(result.explored), "case")
+        click.echo(f"explorer: {out / EXPLORER / 'index.html'}, {number}")
+
+
+def _print_explorer(case: Case, explored: ExploredCase) -> None:
+    """One line for an explorer that could not be made."""
+    if explored.error:
+        click.echo(f"note: no explorer of {case.place}, {case.system}: {explored.error}")
 
 
 def _print_case(case, result, ready: int, total: int) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
+from bim.seasons import in_month
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy
@@ -128,7 +129,7 @@ class Check:
         self.hidden, self.glass = windows_without_view(windows, self.systems)
         self.calendar = calendar_of(files.weather)
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
-        self.outdoors: OutdoorMesh = outdoors_of(self.building)
+        self.outdoors: OutdoorMesh = outdoors_of(in_month(self.building, options.day[0]))
         self.seconds: dict[str, float] = {}
         self.asked: Mapping[str, frozenset[str]] = {}  # parts that a room's own criteria need
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.phase_light import PhaseSystems
+from mitsuba_cfs.methods.glare import hourly_glare, light_seen_from
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import part
 from scenes.comply.findings import SeatGlare
@@ -35,9 +34,8 @@ def seat_glare(
     rows = []
     for number, each in enumerate(views):
         steps = part(room.progress, number / len(views), (number + 1) / len(views), "annual glare")
-        seen = PhaseSystems(room.traced.seen_from(each.view), room.light.filled.systems)
         rated = hourly_glare(
-            seen.light(room.skies), "DGP", state, hours=lit,
+            light_seen_from(room.light, each.view), "DGP", state, hours=lit,
             options=rating_of(room.outputs), progress=steps,
         )  # fmt: skip
         whole = np.zeros(room.skies.hours)

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any
 
 WAIT = 120  # [s] for an answer: the processor may be shared with many
+LEFT = ("navigated or closed", "Cannot find context", "context was destroyed")  # the page asked
 KEYS = {
     "ArrowRight": 39, "ArrowLeft": 37, "ArrowDown": 40, "ArrowUp": 38, " ": 32, "Tab": 9,
     "Enter": 13, "Escape": 27, "PageUp": 33, "PageDown": 34,
@@ -137,17 +138,27 @@ class Page:
         return found["result"].get("value")
 
     def until(self, expression: str) -> None:
-        """Wait until JavaScript gives true."""
+        """Wait until JavaScript gives true; a page that is just being left gives nothing."""
         end = time.monotonic() + WAIT
-        while not self.value(expression):
+        while not self._value_of_a_page(expression):
             if time.monotonic() > end:
                 raise AssertionError(f"never came: {expression}; faults: {self.faults}")
             time.sleep(0.02)
 
+    def _value_of_a_page(self, expression: str) -> Any:
+        """What JavaScript gives; None where the page went while it was asked."""
+        try:
+            return self.value(expression)
+        except AssertionError as fault:
+            if not any(words in str(fault) for words in LEFT):
+                raise
+            return None
+
     def place(self, selector: str, across: float = 0.5, down: float = 0.5) -> tuple[float, float]:
         """A place of an element in the window, scrolled into view."""
         text = json.dumps(selector)
-        self.value(f"document.querySelector({text}).scrollIntoView({{block: 'center'}})")
+        how = "{block: 'center', behavior: 'instant'}"  # pages scroll smoothly: the mouse is faster
+        self.value(f"document.querySelector({text}).scrollIntoView({how})")
         box = self.value(
             f"(({{x, y, width, height}}) => [x, y, width, height])"
             f"(document.querySelector({text}).getBoundingClientRect())"

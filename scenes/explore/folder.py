@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import shutil
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,8 @@ from scenes.explore.packing import read_data, write_data
 from scenes.explore.room_files import write_room
 from scenes.figures.scale import ColourScale
 from scenes.report.page_files import page_files
+from scenes.result_folder import EXPLORER
 from scenes.results import RunResult
-from scenes.run.outputs import EXPLORER
 
 CASE = "case.js"
 FILES = page_files("scenes.explore") | {"style.css": page_files("scenes.report")["style.css"]}
@@ -29,8 +29,13 @@ def write_explorer(result: RunResult, folder: Path) -> None:
 
     A room that is equal to another has that one's light, and is named with it.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "data").mkdir(exist_ok=True)
+    write_rooms(result, folder)
+    write_page(folder)
+
+
+def write_rooms(result: RunResult, folder: Path) -> None:
+    """Write what the explorer of a run shows, without the page."""
+    (folder / "data").mkdir(parents=True, exist_ok=True)
     entries = []
     for number, room in enumerate(one for one in result.spaces if one.explored is not None):
         entry = write_room(folder, f"room{number}", result, room)
@@ -50,7 +55,6 @@ def write_explorer(result: RunResult, folder: Path) -> None:
             "rooms": entries,
         },
     )
-    write_page(folder)
 
 
 def write_page(folder: Path) -> None:
@@ -67,7 +71,7 @@ def explorer_of(results: Path) -> Path:
     for folder in (results / EXPLORER, results):
         if (folder / CASE).is_file():
             return folder
-    raise DataError("holds no explorer: compute it again with `cfs run --explore`", file=results)
+    raise DataError("holds no explorer: compute it again with --explore", file=results)
 
 
 def join_explorers(folders: Sequence[Path], target: Path) -> None:
@@ -81,11 +85,21 @@ def join_explorers(folders: Sequence[Path], target: Path) -> None:
         if case["hours"] != joined["hours"]:
             message = f"has {case['hours']} hours, {folders[0]} has {joined['hours']}"
             raise DataError(message, file=folder)
-        shutil.copytree(explorer_of(folder) / "data", target / str(number) / "data")
+        for place in {PurePosixPath(entry["file"]).parent for entry in case["rooms"]}:
+            shutil.copytree(explorer_of(folder) / place, target / str(number) / place)
         for entry in case["rooms"]:
-            named = {"name": f"{folder.name}: {entry['name']}", "file": f"{number}/{entry['file']}"}
-            for key in ("models", "lux"):
-                named[key] = [f"{number}/{name}" for name in entry[key]]
-            joined["rooms"].append(entry | named)
-    write_data(target / CASE, joined)
+            moved = moved_entry(entry, str(number), f"{folder.name}: {entry['name']}")
+            joined["rooms"].append({key: v for key, v in moved.items() if key != "id"})
+    write_joined(joined, target)
+
+
+def moved_entry(entry: dict[str, Any], place: str, name: str) -> dict[str, Any]:
+    """The entry of a room whose files went into a folder, under another name."""
+    files = {key: [f"{place}/{one}" for one in entry[key]] for key in ("models", "lux")}
+    return entry | files | {"name": name, "file": f"{place}/{entry['file']}"}
+
+
+def write_joined(case: dict[str, Any], target: Path) -> None:
+    """Write the page of rooms whose files are there."""
+    write_data(target / CASE, case)
     write_page(target)

@@ -160,7 +160,7 @@ class StudyFile(OperationTables):
                 fault = unknown_name(one.m3_h, self.schedules)
                 raise ValueError(f"transfer.{number}.m3_h: {fault}")
         if not self.system:
-            if self.box is not None:
+            if self.box is not None and self.box.window:
                 raise ValueError("system: is missing; a box holds no fenestration data")
             return self
         for one in self.variants:

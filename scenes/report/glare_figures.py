@@ -88,13 +88,8 @@ def colour_view(result: RunResult, glare: GlareResults, side: int) -> ColourView
         title=spoken(result.times[glare.colour.hour]),
         words=sun_words(result, glare.colour.hour),
         seen=photo_uri(tone_mapped(reduced(radiance.astype(float), factor))),
-        round=is_round(glare.view),
+        round=glare.view.is_disc,
     )
-
-
-def is_round(view: View) -> bool:
-    """Whether only the disc of a view's picture is one."""
-    return view.kind in ("angular", "hemispherical") and view.horizontal_deg == 180
 
 
 def luminance_scale(pictures: list[LuminancePicture]) -> ColourScale:
@@ -135,7 +130,7 @@ def glare_picture(
         numbers=", ".join(part for part in (numbers, sources, brightest) if part),
         falsecolour=png_uri(scale.rgba(luminance)[..., :3]),
         seen=photo_uri(seen),
-        round=is_round(view),
+        round=view.is_disc,
     )
 
 

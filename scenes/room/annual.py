@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.weather import Weather
 
@@ -23,7 +24,7 @@ COLUMNS = {
 
 
 def glare_by_state(
-    light: PhaseLight, rating: GlareOptions, progress: Progress
+    light: PhaseLight | SeasonalLight, rating: GlareOptions, progress: Progress
 ) -> NDArray[np.float64]:
     """DGP of every hour in every state [J, H], 0 in the dark."""
     J, count = light.filled.states, len(light.sky.lit)
@@ -38,7 +39,7 @@ def glare_by_state(
 
 
 def glare_of_year(
-    light: PhaseLight,
+    light: PhaseLight | SeasonalLight,
     state: NDArray[np.int64],
     weather: Weather,
     *,

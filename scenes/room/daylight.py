@@ -14,9 +14,9 @@ from bim.model import Building, Space
 from bim.sensors import held_grids, held_views, sensor_grid, view_point
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import View, fisheye, fitted
-from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.progress import Progress
 from mitsuba_cfs.sky.cie import cie_patches
@@ -39,7 +39,7 @@ class HeldSensors:
     @classmethod
     def of(cls, building: Building, space: Space) -> HeldSensors:
         """Those of a room."""
-        fisheyes = [one.view for one in held_views(building, space) if one.is_fisheye]
+        fisheyes = [one.view for one in held_views(building, space) if one.view.covers_hemisphere]
         return cls(tuple(held_grids(building, space)), fisheyes[0] if fisheyes else None)
 
 
@@ -87,7 +87,7 @@ def grid_points(space: Space, grid: SensorGrid) -> NDArray[np.float64]:
 
 
 def room_daylight(
-    light: PhaseLight,
+    light: PhaseLight | SeasonalLight,
     state: NDArray[np.int64],
     weather: Weather,
     method: str,
@@ -102,10 +102,9 @@ def room_daylight(
         held: whose grids' sensors come last in the scene.
     """
     sky, traced = light.sky, light.filled.traced
-    scene, sampling = traced.scene, traced.sampling
+    scene = traced.scene
     if method == "point-in-time":
-        filled = PathSystems(scene, light.filled.systems, sampling)
-        lit, error = filled.light(sky, progress=progress).estimate(state)
+        lit, error = paths_of(light, progress).estimate(state)
     else:
         lit, error = light.illuminance(state), light.relative_error(state)
     illuminance = sky.whole_year(lit.astype(np.float32)).T
@@ -131,8 +130,11 @@ def room_daylight(
     )
 
 
-def overcast_factor(light: PhaseLight) -> NDArray[np.float64]:
-    """Daylight factor of the sensors [S] (0 to 1) with every window in its first state."""
+def overcast_factor(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
+    """Daylight factor of the sensors [S] (0 to 1) with every window in its first state.
+
+    Where the outdoors changes over the year, with most leaves.
+    """
     subdivision = light.filled.traced.sampling.subdivision
     overcast = cie_patches("overcast", ReinhartSky(subdivision), 1.0)
     return daylight_factor(light.filled.coefficients() @ overcast, 1.0)

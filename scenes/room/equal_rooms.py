@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Building, Space
+from bim.seasons import seasons
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.phase_scene import PhaseScene
@@ -67,9 +68,17 @@ class OutdoorLight:
         return [self._daylight(band).sum(axis=axis) for band in BANDS for axis in (-1, -2)]
 
     def _daylight(self, band: str) -> NDArray[np.float64]:
-        exterior = exterior_surfaces(self.building, self.space, band)
-        scene = DaylightScene(Surfaces.none(), exterior, window_groups(self.space))
-        return PhaseScene(scene, self.sampling, cache=self.cache).daylight.values
+        """D of every season [.., K, P], one after the other."""
+        found, groups = [], window_groups(self.space)
+        for season in seasons(self.building):
+            exterior = exterior_surfaces(season.building, self.space, band)
+            scene = DaylightScene(Surfaces.none(), exterior, groups)
+            if found:
+                traced = found[0].before(scene)
+            else:
+                traced = PhaseScene(scene, self.sampling, cache=self.cache)
+            found.append(traced)
+        return np.concatenate([traced.daylight.values for traced in found])
 
 
 def alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

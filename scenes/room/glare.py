@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -11,12 +13,13 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.glare import rated_pictures
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.progress import Progress
 from scenes.results import GlareResults, LuminancePicture
 from scenes.room.options import Outputs
 from scenes.room.picture_hours import hour_index
 
-DEFAULT_DAYS = ("03-21", "06-21", "12-21")
+DEFAULT_DAYS = ((3, 21), (6, 21), (12, 21))  # month, day
 DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
 
 
@@ -37,16 +40,16 @@ def default_hours(
 
     Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
     """
-    labels = [f"{day} {clock:02d}" for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
+    moments = [datetime(2000, *day, clock) for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
     lit_set = set(lit.tolist())
-    found = [hour for label in labels if (hour := hour_index(label, times)) in lit_set]
+    found = [hour for moment in moments if (hour := hour_index(moment, times)) in lit_set]
     brightest = int(lit[np.argmax(eye_illuminance)])
     chosen = {brightest, *[hour for hour in found if hour != brightest][: count - 1]}
     return [hour for hour in dict.fromkeys([*found, brightest]) if hour in chosen]
 
 
 def room_glare(
-    light: PhaseLight | PathLight,
+    light: PhaseLight | PathLight | SeasonalLight,
     view: View,
     state: NDArray[np.int64],
     hours: list[int],

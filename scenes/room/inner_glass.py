@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
 from bim.doorways import THINNEST, panes_between, reveals_between, wall_depth
-from bim.model import Building, Element, Face, Space
+from bim.model import SHUT_ADVICE, Building, Element, Face, Space
 from bim.to_tracer import (
     element_surfaces,
     exterior_surfaces,
@@ -26,6 +26,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.systems import AngularScattering
 from scenes.fenestration.stated import StatedValues, glazing_system
@@ -33,6 +34,7 @@ from scenes.fenestration.systems import States
 from scenes.room.windows import room_windows
 
 CLEAR = 0.88  # visible transmittance of glass that states none: a float pane of 6 mm, EN 410
+PASSES = "daylight passes (--inner-glass)"
 PANE = "glass between rooms"  # name of a pane as the room beyond has it: opaque
 
 
@@ -67,7 +69,7 @@ def opened(building: Building) -> Building:
     """The building with its doorways open: each reflects what comes back from the room beyond.
 
     rho f / (1 - rho (1 - f)), rho the mean reflectance of that room, f the doorway's share of its
-    surface.
+    surface.  Problems that asked for this say that it is so.
 
     Source: Sumpner 1892 (the integrating sphere), as for light wells and cavities.
     """
@@ -81,7 +83,9 @@ def opened(building: Building) -> Building:
         return replace(face, reflectance_visible=visible, reflectance_solar=solar)
 
     spaces = tuple(replace(space, faces=tuple(map(seen, space.faces))) for space in building.spaces)
-    return replace(building, spaces=spaces)
+    told = [(one, one.consequence.replace(SHUT_ADVICE, PASSES)) for one in building.problems]
+    problems = tuple(replace(one, consequence=text) for one, text in told)
+    return replace(building, spaces=spaces, problems=problems)
 
 
 def _returned(room: Space, area: float, band: str) -> float:
@@ -138,14 +142,20 @@ def _inner_glass(
     return InnerGlass(furnished_surfaces(rest), *groups, *areas, names)
 
 
-def borrowed_share(space: Space, light: PhaseLight, inner: InnerGlass | None) -> str:
+def borrowed_share(
+    space: Space, light: PhaseLight | SeasonalLight, inner: InnerGlass | None
+) -> str:
     """How much of the light of a room's sensors over the year its inner glass gives, in words."""
     if inner is None:
         return ""
     first = len(light.filled.traced.scene.outdoor_groups)
-    states = [one[0] for one in light.sensors]
+    lights = [own for own, _ in light.parts()] if isinstance(light, SeasonalLight) else [light]
     sums = [
-        one.diffuse[:-1].sum() + (0 if one.sun is None else one.sun[:-1].sum()) for one in states
+        sum(
+            one.diffuse[:-1].sum() + (0 if one.sun is None else one.sun[:-1].sum())
+            for (one, *_) in of_group
+        )
+        for of_group in zip(*(own.sensors for own in lights), strict=True)
     ]
     share = float(sum(sums[first:]) / max(sum(sums), 1e-9))
     return (

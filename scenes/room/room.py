@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Problem, Space
 from bim.outer_faces import OuterFaces, outer_faces
+from bim.seasons import in_month, season_of, seasons
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.path_light import PathLight, PathSystems
+from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, in_shares, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
@@ -46,13 +48,13 @@ from scenes.room.explored import explored_room
 from scenes.room.glare import default_hours, rating_of, room_glare
 from scenes.room.heated import HeatInputs, heat_alone
 from scenes.room.holes import hole_problems
-from scenes.room.inner_glass import inner_glass
+from scenes.room.inner_glass import InnerGlass, inner_glass
 from scenes.room.kept_sun import kept_sun
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.sky_seen import under_the_sky
-from scenes.room.solar import RoomSun
+from scenes.room.solar import RoomSun, SeasonalOutdoors
 from scenes.room.thermal import fenestration_table
 from scenes.room.windows import room_windows
 from scenes.room.zone import (
@@ -125,7 +127,10 @@ class RoomSimulation:
             else skies
         )
         self.windows = room_windows(space, systems)
-        self.inner = inner_glass(building, space, systems) if inner else None
+        self.systems = systems
+        self.seasons = seasons(building)
+        first = self.seasons[0].building
+        self.inner = inner_glass(first, space, systems) if inner else None
         self.seconds: dict[str, float] = {}
 
     def timed(self, stage: str, work: Callable[[], T]) -> T:
@@ -138,15 +143,24 @@ class RoomSimulation:
     @cached_property
     def scene(self) -> DaylightScene:
         """Triangles, window groups, sensors and view in the visible band."""
+        return self._scene(self.seasons[0].building, self.inner)
+
+    def _scene(self, building: Building, inner: InnerGlass | None) -> DaylightScene:
         return room_scene(
-            self.building,
+            building,
             self.space,
             self.windows,
             self.grids,
             self.outputs.picture_size,
-            inner=self.inner,
+            inner=inner,
             held=self.held,
         )
+
+    @cached_property
+    def season(self) -> NDArray[np.int64]:
+        """The season of every lit hour [L], its number among `seasons`."""
+        months = self.weather.midpoints[self.skies.lit].month.to_numpy()
+        return season_of(self.seasons, months)
 
     @cached_property
     def traced(self) -> PhaseScene:
@@ -160,11 +174,23 @@ class RoomSimulation:
         )
 
     @cached_property
-    def light(self) -> PhaseLight:
+    def light(self) -> PhaseLight | SeasonalLight:
         """The light of the lit hours in every state."""
-        inner = () if self.inner is None else self.inner.optics
-        filled = PhaseSystems(self.traced, [*self.windows.optics(), *inner])
-        return filled.light(self.skies, progress=part(self.progress, 0.6, 0.9, "daylight"))
+        steps = part(self.progress, 0.6, 0.9, "daylight")
+        filled = [self._filled(self.traced, self.inner)]
+        for season in self.seasons[1:]:
+            inner = self.inner
+            if inner is not None:
+                inner = inner_glass(season.building, self.space, self.systems)
+            scene = self._scene(season.building, inner)
+            filled.append(self._filled(self.traced.before(scene), inner))
+        if len(filled) == 1:
+            return filled[0].light(self.skies, progress=steps)
+        return SeasonalLight.of(filled, self.skies, self.season, progress=steps)
+
+    def _filled(self, traced: PhaseScene, inner: InnerGlass | None) -> PhaseSystems:
+        optics = () if inner is None else inner.optics
+        return PhaseSystems(traced, [*self.windows.optics(), *optics])
 
     def eye(self) -> NDArray[np.float32]:
         """Illuminance at the eye in every state [J, L] [lx]."""
@@ -204,11 +230,9 @@ class RoomSimulation:
         return found
 
     @cached_property
-    def pictured(self) -> PhaseLight | PathLight:
+    def pictured(self) -> PhaseLight | PathLight | SeasonalLight:
         """The light that pictures are made of."""
-        if self.options.method != "point-in-time":
-            return self.light
-        return PathSystems(self.scene, self.light.filled.systems, self.sampling).light(self.skies)
+        return paths_of(self.light) if self.options.method == "point-in-time" else self.light
 
     def holes(self) -> tuple[Problem, ...]:
         """What of the light leaves through no window."""
@@ -231,7 +255,7 @@ class RoomSimulation:
         )  # fmt: skip
 
     def explored(self) -> ExploredRoom:
-        """Every hour in every state."""
+        """Every hour in every state, of outdoors that do not change over the year."""
         names = [state.name for state in max(self.windows.systems, key=len)]
         steps = part(self.progress, 0.0, 1.0, "explorer")
         sensors = len(self.daylight.points)
@@ -256,9 +280,10 @@ class RoomSimulation:
             return glare
         self.progress("colour", 0.0)
         hour, groups = brightest_picture(glare).hour, self.windows.groups
+        building = in_month(self.building, int(self.weather.midpoints[hour].month))
         sky = annual_sky(self.weather, self.sampling.subdivision, hours=[hour], **self.options.sky)
         found = with_colour(
-            glare, band_scenes(self.building, self.space, groups, glare.view),
+            glare, band_scenes(building, self.space, groups, glare.view),
             self.light.filled.systems[: len(groups)], sky, state=int(self.state[hour]),
             sampling=self.sampling, progress=part(self.progress, 0.0, 1.0, "colour"),
         )  # fmt: skip
@@ -266,9 +291,15 @@ class RoomSimulation:
         return found
 
     @cached_property
-    def outdoors(self) -> PhaseScene:
-        """D of the solar band: the visible one's where the outdoors reflects both bands alike."""
-        exterior = exterior_surfaces(self.building, self.space, "solar")
+    def outdoors(self) -> list[PhaseScene]:
+        """D of the solar band in each season: the visible one's where both bands reflect alike."""
+        first, *rest = (
+            exterior_surfaces(season.building, self.space, "solar") for season in self.seasons
+        )
+        scene = self._solar(first)
+        return [scene, *(scene.before(replace(scene.scene, exterior=one)) for one in rest)]
+
+    def _solar(self, exterior: Surfaces) -> PhaseScene:
         if (
             self.inner is None
             and "scene" in self.__dict__
@@ -293,7 +324,8 @@ class RoomSimulation:
         """The sun outside and what the room does with it."""
         steps = part(self.progress, 0.0, 0.8, "heat")
         interior = interior_surfaces(self.space, "solar")
-        return RoomSun(self.outdoors, interior, self.surfaces, self.outer, self.skies, steps)
+        seen = SeasonalOutdoors(self.outdoors, self.season)
+        return RoomSun(seen, interior, self.surfaces, self.outer, self.skies, steps)
 
     @cached_property
     def thermals(self) -> list[list[ThermalSystem]]:
@@ -340,8 +372,12 @@ class RoomSimulation:
             services = services_of(self.operation, area, self.weather)
         else:
             services = plain_services(self.space, self.occupied, self.options.occupancy)
-        exterior, seed = self.outdoors.scene.exterior, self.sampling.seed
-        room = under_the_sky(room, self.outer, exterior, seed=seed, cache=self.cache)
+        share = [len(season.months) / 12 for season in self.seasons]
+        exteriors = [outdoors.scene.exterior for outdoors in self.outdoors]
+        room = under_the_sky(
+            room, self.outer, list(zip(exteriors, share, strict=True)),
+            seed=self.sampling.seed, cache=self.cache,
+        )  # fmt: skip
         solar, gains = sun.switched(self.windows, self.thermals, state)
         return RoomZone(
             self.space, room, solar, gains, state, lamps, self.occupied, plane, services

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Building, Space
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
@@ -107,7 +108,8 @@ def lit_room(
         inner: True lets light of rooms with windows in through glass; phase methods only.
 
     Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
-        `ValueError` for a window without a system.
+        `ValueError` for a window without a system, `DataError` for an explorer where what stands
+        outdoors changes over the year.
     """
     if operation is None:
         systems = {guid: states[:1] for guid, states in systems.items()}
@@ -117,6 +119,9 @@ def lit_room(
         skies=skies, cache=cache, inner=inner, held=HeldSensors.of(building, space),
         progress=progress,
     )  # fmt: skip
+    if explore and len(room.seasons) > 1:
+        message = "the explorer knows one state of the trees: give them one transmittance"
+        raise DataError(message, file=building.file, field="--explore")
     outputs, skies = options.outputs, room.skies
     hours = wanted_hours(outputs.picture_hours, weather.midpoints, skies.lit)
     daylight = room.timed("daylight", lambda: room.daylight)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +41,18 @@ def _of_zone(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss | No
     return tuple(alike.get(number) for number in range(int(numbers.max()) + 1))
 
 
+@dataclass(frozen=True, slots=True)
+class SeasonalOutdoors:
+    """What stands before a room's windows in each season, in the solar band."""
+
+    scenes: list[PhaseScene]  # the same window groups, in the same parts
+    season: NDArray[np.int64]  # [L] of each lit hour
+
+    def parts(self) -> list[tuple[PhaseScene, NDArray[np.int64]]]:
+        """The scene of each season with its hours among the lit ones."""
+        return [(one, np.flatnonzero(self.season == i)) for i, one in enumerate(self.scenes)]
+
+
 class RoomSun:
     """The sun outside a room and what its surfaces do with it, whatever fills the windows.
 
@@ -48,7 +61,7 @@ class RoomSun:
 
     def __init__(
         self,
-        outdoors: PhaseScene,
+        outdoors: SeasonalOutdoors,
         interior: Surfaces,
         room: ThermalRoom,
         outer: OuterFaces,
@@ -56,7 +69,8 @@ class RoomSun:
         progress: Progress,
     ) -> None:
         """From the windows' groups and what stands before them, and the room, in the solar band."""
-        self.outdoors, self.outer, self.skies, self.progress = outdoors, outer, skies, progress
+        self.seasons, self.outdoors = outdoors, outdoors.scenes[0]
+        self.outer, self.skies, self.progress = outer, skies, progress
         self.surfaces = len(room.zone.surfaces)
         # the room's triangles, numbered by the surfaces of the zone
         numbers = room.surface_of_face[interior.surface]
@@ -65,10 +79,10 @@ class RoomSun:
         )
         self._absorbed: dict[bytes, FloatArray] = {}
         self._tracing = {
-            "samples": max(outdoors.sampling.patch_samples // BATCHES, 1),
+            "samples": max(self.outdoors.sampling.patch_samples // BATCHES, 1),
             "stopping": Stopping(batches=BATCHES),
-            "seed": outdoors.sampling.seed,
-            "cache": outdoors.cache,
+            "seed": self.outdoors.sampling.seed,
+            "cache": self.outdoors.cache,
         }
 
     @cached_property
@@ -77,8 +91,21 @@ class RoomSun:
         omega = KLEMS_FULL.projected_solid_angles()
         if not self.outdoors.scene.groups:
             return np.zeros((0, len(omega), len(self.skies.lit)))
-        daylight = self.outdoors.parts.of_groups(self.outdoors.daylight.values)
-        return phases.window_radiance(daylight, self.skies.solar) * omega[:, None]
+        return self._by_season(
+            lambda scene, sky: (
+                phases.window_radiance(scene.parts.of_groups(scene.daylight.values), sky)
+                * omega[:, None]
+            )
+        )
+
+    def _by_season(self, of_season: Callable[[PhaseScene, FloatArray], FloatArray]) -> FloatArray:
+        """Values [.., L] of all lit hours, from the scene and the sky [P, l] of each season."""
+        parts = self.seasons.parts()
+        if len(parts) == 1:
+            return of_season(parts[0][0], self.skies.solar)
+        found = [of_season(scene, self.skies.solar[:, hours]) for scene, hours in parts]
+        order = np.argsort(np.concatenate([hours for _, hours in parts]))
+        return np.concatenate(found, axis=-1)[..., order]
 
     @property
     def irradiance(self) -> FloatArray:
@@ -90,16 +117,20 @@ class RoomSun:
         """Irradiance on the outside of the zone's surfaces [H, F] [W/m2]."""
         outer, facade = self.outer, np.zeros((self.skies.hours, self.surfaces))
         if len(outer.surfaces):
-            matrix = sky_irradiance_matrix(
-                self.outdoors.scene.exterior,
-                outer.points,
-                outer.normals,
-                subdivision=self.outdoors.sampling.subdivision,
-                progress=part(self.progress, 0.4, 0.6),
-                **self._tracing,
-            )
-            facade[:, outer.surfaces] = self.skies.whole_year(matrix.values @ self.skies.solar).T
+            lit = self._by_season(lambda scene, sky: self._seen_by_faces(scene) @ sky)
+            facade[:, outer.surfaces] = self.skies.whole_year(lit).T
         return facade
+
+    def _seen_by_faces(self, outdoors: PhaseScene) -> FloatArray:
+        """Irradiance of the outer faces per unit radiance of each sky patch [n, P] [sr]."""
+        return sky_irradiance_matrix(
+            outdoors.scene.exterior,
+            self.outer.points,
+            self.outer.normals,
+            subdivision=outdoors.sampling.subdivision,
+            progress=part(self.progress, 0.4, 0.6),
+            **self._tracing,
+        ).values
 
     def absorbed(self, reflectance: FloatArray) -> FloatArray:
         """Where a unit of flux of each window patch is absorbed [G, K, F + G].

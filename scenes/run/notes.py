@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from bim.account import NOT_USABLE
-from bim.model import JOINED, NOT_USED, Building
+from bim.model import JOINED, NOT_USED, TREES, Building
 from mitsuba_cfs.sky.weather import Weather
 
-AT_THE_HEAD = (JOINED, NOT_USED)  # kinds of the model's problems that are notes of a run
+AT_THE_HEAD = (JOINED, NOT_USED, TREES)  # kinds of the model's problems that are notes of a run
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
 
@@ -18,7 +18,8 @@ def model_notes(building: Building) -> tuple[str, ...]:
 
 def unused_notes(building: Building) -> tuple[str, ...]:
     """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
-    found = [f"{p.what}: {p.consequence}." for p in building.problems if p.kind == NOT_USED]
+    found = [*tree_notes(building)]
+    found += [f"{p.what}: {p.consequence}." for p in building.problems if p.kind == NOT_USED]
     held = {
         "uses of rooms": building.uses, "sensor grids": building.grids, "views": building.views,
     }  # fmt: skip
@@ -26,6 +27,12 @@ def unused_notes(building: Building) -> tuple[str, ...]:
     if counts and building.file is not None:
         found.append(f"{building.file.name} holds {', '.join(counts)}: not used here.")
     return tuple(found)
+
+
+def tree_notes(building: Building) -> tuple[str, ...]:
+    """How much light the trees outdoors let pass."""
+    told = (p for p in building.problems if p.kind == TREES)
+    return tuple(f"{p.what}: {p.consequence}." for p in told)
 
 
 def _account_notes(building: Building) -> tuple[str, ...]:

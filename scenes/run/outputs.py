@@ -13,7 +13,7 @@ from bim.names import folder_names
 from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from scenes.pictures import write_falsecolour, write_tone_mapped
-from scenes.result_folder import ResultFolder
+from scenes.result_folder import EXPLORER, ResultFolder
 from scenes.results import GridDaylight, RoomYear, RunResult
 from scenes.room.daylight import illuminance_table
 from scenes.room.glare import glare_table
@@ -23,7 +23,6 @@ from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
 
 REPORT = "report.html"
-EXPLORER = "explore"  # folder of the explorer, inside that of the results
 
 
 def write_results(

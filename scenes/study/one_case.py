@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Unpack
 
 import numpy as np
 import pandas as pd
@@ -31,7 +33,7 @@ from scenes.room.drawn_shades import traced_building
 from scenes.room.operation import Operation, check_states, read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room import skies_for
-from scenes.room.room_year import compute_room
+from scenes.room.room_year import RoomChoices, compute_room
 from scenes.room.stated_use import used_operation
 from scenes.run.inputs import read_weather
 from scenes.study.case import Case, InputFile, program_version
@@ -41,6 +43,57 @@ from scenes.study.straight_view import straight_view
 WARM_C = 26.0  # operative temperature above which hours are counted
 KEPT_TEMPERATURES = ("outdoor_c", "air_c", "operative_c")
 ALONE = threading.Lock()  # Dr.Jit has all cores already, and a worker may have several threads
+
+
+@dataclass(frozen=True, slots=True)
+class CaseRoom:
+    """The room of a case, its systems, weather and operation, as its files hold them."""
+
+    building: Building
+    space: Space
+    systems: dict[str, States]  # by GUID of the window
+    weather: Weather  # turned about the model
+    operation: Operation | None
+
+    @classmethod
+    def of(cls, case: Case) -> CaseRoom:
+        """Read the files of a case.
+
+        Raises: `DataError` for a file that has changed or cannot be used.
+        """
+        if case.program != program_version():
+            raise DataError("this process runs another version of the program than the study's")
+        for source in case.files:
+            if isinstance(source, InputFile) and InputFile.of(source.path) != source:
+                raise DataError(
+                    "is not the file that it was when the study began", file=source.path
+                )
+        building, space = _room(case)
+        operation = None if case.operation is None else read_operation(case.operation.path)
+        systems = case_systems(case, space, operation)
+        building = traced_building(building, systems)
+        if operation is not None:
+            check_states(operation, max(map(len, systems.values())))
+        else:
+            systems = {guid: states[:1] for guid, states in systems.items()}
+        weather = _weather(case.weather, case.orientation_deg)
+        return cls(building, space, systems, weather, used_operation(operation, building))
+
+    def year(self, case: Case, **chosen: Unpack[RoomChoices]) -> RoomYear:
+        """The room's year by the case's options; chosen: as of `lit_room`."""
+        options = case.options
+        skies = _skies(
+            case.weather,
+            case.orientation_deg,
+            options.method,
+            options.sampling,
+            *options.sky.items(),
+        )
+        return compute_room(
+            self.building, self.space, self.systems, self.weather, options,
+            operation=self.operation, skies=skies, cache=MatrixCache.of_user(), pictures=False,
+            **chosen,
+        )  # fmt: skip
 
 
 def compute_case(case: Case) -> CaseResult:
@@ -55,34 +108,11 @@ def compute_case(case: Case) -> CaseResult:
 
 def _computed(case: Case) -> CaseResult:
     start = time.monotonic()
-    if case.program != program_version():
-        raise DataError("this process runs another version of the program than the study's")
-    for source in case.files:
-        if isinstance(source, InputFile) and InputFile.of(source.path) != source:
-            raise DataError("is not the file that it was when the study began", file=source.path)
     variants.activate()
-    building, space = _room(case)
-    operation = None if case.operation is None else read_operation(case.operation.path)
-    systems = case_systems(case, space, operation)
-    building = traced_building(building, systems)
-    weather = _weather(case.weather, case.orientation_deg)
-    chosen = case.options
-    skies = _skies(
-        case.weather, case.orientation_deg, chosen.method, chosen.sampling, *chosen.sky.items()
-    )
-    cache = MatrixCache.of_user()
-    if operation is not None:
-        check_states(operation, max(map(len, systems.values())))
-    else:
-        systems = {guid: states[:1] for guid, states in systems.items()}
+    held = CaseRoom.of(case)
+    space, systems, weather = held.space, held.systems, held.weather
     hours = _rated_hours(weather, case.options)
-    operation = used_operation(operation, building)
-    room = compute_room(
-        building, space, systems, weather, case.options,
-        operation=operation,
-        skies=skies, cache=cache, pictures=False,
-        rate=None if case.glare == "none" else (case.glare, hours),
-    )  # fmt: skip
+    room = held.year(case, rate=None if case.glare == "none" else (case.glare, hours))
     figures, arrays = room_figures(room)
     figures |= {f"da300 {grid.name}": grid.metrics["da300"] for grid in room.daylight.grids}
     figures["straight_view_percent"] = _straight_view(room, systems, hours)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.files import opened_arrays, write_bytes, write_table, write_text
 from mitsuba_cfs.matrices.cache import UNREADABLE
-from scenes.result_folder import ResultFolder
+from scenes.result_folder import EXPLORER, ResultFolder
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +70,17 @@ class Store:
         write_bytes(self._place(result.key), result.to_bytes())
 
     def write(
-        self, rows: Iterable[dict], manifest: dict, report: Callable[[Path], object] | None = None
+        self,
+        rows: Iterable[dict],
+        manifest: dict,
+        report: Callable[[Path], object] | None = None,
+        explorer: Callable[[Path], object] | None = None,
     ) -> None:
         """Write the table of all cases, what the study was made of, and its report.
 
-        Args: report: writes it to a path; without, an earlier report goes: it tells other numbers.
+        Args:
+            report: writes it to a path; without, an earlier report goes: it tells other numbers;
+            explorer: likewise, to a folder, beside the data of its cases.
         """
         import pandas as pd
 
@@ -86,6 +92,12 @@ class Store:
             write_text(place / "study.json", text + "\n")
             if report is not None:
                 report(place / "report.html")
+            if explorer is not None:
+                explorer(place / EXPLORER)
+
+    def explorers(self) -> Path:
+        """The folder of the cases' explorers, made; it is never cleared."""
+        return self._results.kept(EXPLORER)
 
     def _place(self, key: str) -> Path:
         return self.folder / "cases" / f"{key}.npz"

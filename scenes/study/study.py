@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from scenes.calibration.durations import spoken_time
 from scenes.report.glare_figures import compass
 from scenes.study.automatic import settled
 from scenes.study.case import Case
+from scenes.study.explored import ExploredCase, explorer_key, explorers
 from scenes.study.one_case import compute_case
 from scenes.study.plan import AS_HELD, StudyPlan, plan_of
 from scenes.study.schedule import Compute, computed
@@ -34,6 +35,7 @@ class StudyResult:
     reused: int  # cases that an earlier run had finished
     seconds: float
     quick: bool = False
+    explored: dict[int, ExploredCase] = field(default_factory=dict)  # by number from 1
 
     @property
     def failed(self) -> int:
@@ -134,11 +136,50 @@ def run_study(
     return StudyResult(study.title, plan, results, reused, seconds, study.quick)
 
 
+def with_explorers(
+    result: StudyResult,
+    chosen: Mapping[int, Case],
+    store: Store,
+    *,
+    processes: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = silent,
+    on_case: Callable[[Case, ExploredCase], None] | None = None,
+) -> StudyResult:
+    """The study with the explorers of some of its cases; the folder's own are not made again.
+
+    Args:
+        chosen: the cases by number from 1.
+        processes, scheduler, progress: as of `run_study`.
+        on_case: called with each case that is ready.
+    """
+    found: dict[str, ExploredCase] = {}
+
+    def under_way() -> None:
+        progress(Stage("", "explorer", min(len(found) + 1, len(chosen)), len(chosen)), 0.0)
+
+    under_way()
+    made = explorers(
+        tuple(chosen.values()), store.explorers(), processes=processes, scheduler=scheduler
+    )
+    for case, explored in made:
+        found[explored.key] = explored
+        under_way()
+        if on_case is not None:
+            on_case(case, explored)
+    every = {number: found[explorer_key(case)] for number, case in chosen.items()}
+    return replace(result, explored={n: one for n, one in every.items() if not one.error})
+
+
 def write_study(
-    study: Study, result: StudyResult, store: Store, report: Callable[[Path], object] | None
+    study: Study,
+    result: StudyResult,
+    store: Store,
+    report: Callable[[Path], object] | None,
+    explorer: Callable[[Path], object] | None = None,
 ) -> None:
-    """Write table, manifest and report of a study in the place of earlier ones."""
-    store.write(result.rows(), manifest(study, result.plan), report)
+    """Write table, manifest, report and explorer of a study in the place of earlier ones."""
+    store.write(result.rows(), manifest(study, result.plan), report, explorer)
 
 
 def described(case: Case, space: Space) -> dict:

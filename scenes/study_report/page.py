@@ -29,6 +29,7 @@ from scenes.study_report.comparison import (
     finished,
     scatter,
 )
+from scenes.study_report.explorer import explorer_link
 from scenes.study_report.model import study_model
 from scenes.study_report.parallel import parallel
 from scenes.study_report.verdict import study_verdict
@@ -70,6 +71,7 @@ def _filled(
         title=page.title or study.title or said("Study of fenestration systems"),
         facts=facts(study) + page.facts,
         verdict=study_verdict(study),
+        explored={number: explorer_link(study, number) for number in study.explored},
         beside=len(done) if len(done) <= MOST_BESIDE else 1,
         most_beside=min(len(pages), MOST_BESIDE),
         scatter=scatter(study),

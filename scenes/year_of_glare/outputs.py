@@ -133,4 +133,6 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
 
 
 def _plain(value: object) -> object:
+    if isinstance(value, tuple):
+        return [_plain(one) for one in value]
     return str(value) if isinstance(value, Path) else value

@@ -35,11 +35,11 @@ def rated_views(options: YearOptions) -> list[NamedView]:
 def _check_kind(each: NamedView) -> None:
     """Refuse views whose glare would mean nothing."""
     view = each.view
-    if view.kind not in ("angular", "hemispherical"):
+    if not view.is_fisheye:
         raise DataError(
             f"{each.name} is a {view.kind} view: expected a fisheye (-vta or -vth)", field="--view"
         )
-    if min(view.horizontal_deg, view.vertical_deg) < 180:
+    if not view.covers_hemisphere:
         raise DataError(
             f"{each.name} shows {view.horizontal_deg:g} x {view.vertical_deg:g} degrees: "
             "expected 180 x 180 (-vh 180 -vv 180)",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bim.building_file import files_beside
 from bim.model import Building, Space
+from bim.seasons import season_of
 from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, kept_glare
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult
@@ -27,6 +28,7 @@ from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, item, part, silent, summed
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
@@ -68,6 +70,8 @@ class GlareYear:
     notes: tuple[str, ...] = ()  # of systems and weather
     fenestration: Sequence[dict] = ()  # system, source and windows of each, see `resolver`
     space: Space | None = None  # the room, for its plan
+    scenes: Sequence[DaylightScene] = ()  # of each season; none where it is always the same
+    season: NDArray[np.int64] | None = None  # [L] of each hour of the sky
 
 
 def read_year(
@@ -115,7 +119,8 @@ def read_year(
     notes = (*viewed.notes(), *weather.notes)
     return GlareYear(
         options, viewed.space.label, views, viewed.scene, viewed.optics, weather, sky, used, digest,
-        notes, viewed.sources, viewed.space,
+        notes, viewed.sources, viewed.space, viewed.scenes,
+        season_of(viewed.seasons, weather.midpoints[sky.lit].month.to_numpy()),
     )  # fmt: skip
 
 
@@ -142,6 +147,7 @@ def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iter
         five_phase=options.method == "five-phase",
         cache=MatrixCache.of_user(),
     )
+    others = [traced.before(scene) for scene in year.scenes[1:]]
     times = year.weather.midpoints[year.sky.lit]
     for number, named in enumerate(year.views):
         steps = item(progress, "view", number + 1, len(year.views), named.name, whole=True)
@@ -151,8 +157,8 @@ def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iter
         found = kept_glare(keep, len(times)) if keep.is_file() else None
         tracing = summed(part(steps, 0.0, 0.3), named.name, TRACING)
         traced = traced.seen_from(named.view, tracing)
-        filled = PhaseSystems(traced, year.optics)
-        light = filled.light(year.sky)
+        others = [other.seen_from(named.view, tracing) for other in others]
+        light = _light(year, [traced, *others])
         found = found or hourly_glare(
             light, options.metric, options=rating_of(options), keep=keep,
             progress=part(steps, 0.3, 1.0),
@@ -165,8 +171,16 @@ def rate_views(year: GlareYear, kept: Path, progress: Progress = silent) -> Iter
         yield ViewYear(named, table, shown, time.monotonic() - start)
 
 
+def _light(year: GlareYear, traced: Sequence[PhaseScene]) -> PhaseLight | SeasonalLight:
+    """The light of the year's hours."""
+    filled = [PhaseSystems(one, year.optics) for one in traced]
+    if len(filled) == 1 or year.season is None:
+        return filled[0].light(year.sky)
+    return SeasonalLight.of(filled, year.sky, year.season)
+
+
 def _pictures(
-    light: PhaseLight, year: GlareYear, found: AnnualGlare
+    light: PhaseLight | SeasonalLight, year: GlareYear, found: AnnualGlare
 ) -> dict[pd.Timestamp, tuple[NDArray[np.float32], GlareResult]]:
     """Pictures of the worst lit hours, and their glare."""
     hours = found.worst(year.options.worst)

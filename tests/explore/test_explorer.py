@@ -124,7 +124,7 @@ def test_several_are_joined(results, tmp_path) -> None:
 
 
 def test_results_without_an_explorer_say_so(tmp_path) -> None:
-    with pytest.raises(DataError, match="holds no explorer: compute it again with `cfs run --expl"):
+    with pytest.raises(DataError, match="holds no explorer: compute it again with --expl"):
         explorer_of(tmp_path)
     done = CliRunner().invoke(cfs, ["explore", str(tmp_path)])
     assert done.exit_code and isinstance(done.exception, DataError)

@@ -110,3 +110,21 @@ def test_what_is_not_said_is_radiances_default():
 def test_impossible_views_are_refused(text, message):
     with pytest.raises(ValueError, match=message):
         parse_view(text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "across", "along", "covers", "disc"),
+    [
+        ("angular", 180, 180, True, True),
+        ("hemispherical", 180, 180, True, True),
+        ("angular", 220, 200, True, False),
+        ("angular", 180, 90, False, False),
+        ("perspective", 170, 170, False, False),
+        ("planispheric", 200, 200, False, False),
+    ],
+)
+def test_which_views_cover_the_hemisphere_before_the_eye(
+    kind: str, across: float, along: float, covers: bool, disc: bool
+) -> None:
+    view = View(kind, horizontal_deg=across, vertical_deg=along)
+    assert (view.covers_hemisphere, view.is_disc) == (covers, disc)

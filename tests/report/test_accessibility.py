@@ -1,4 +1,7 @@
-"""axe-core on every page: no serious fault, light and dark.  AXE_CORE names its axe.min.js."""
+"""axe-core on every page: no serious fault, light and dark; the explorer with two side by side.
+
+AXE_CORE names its axe.min.js.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,8 @@ from tests.comply.test_outputs import RULE, files_of
 from tests.explore.synthetic import explored_run
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
+from tests.report.test_glare_page import write_glare_page
+from tests.report.test_study_explorer import with_explored
 from tests.report.test_study_report import study
 
 AXE = Path(os.environ.get("AXE_CORE", "none"))
@@ -53,18 +58,24 @@ def pages(tmp_path_factory) -> dict[str, Path]:
         "german": report_html(run_result(picture_size=96), PageOptions(language="de")),
         "building": report_html(building(12, picture_size=48, pictures=1)),
         "study": study_report_html(study()),
+        "explored": study_report_html(with_explored(2, 3)),
         "dossier": dossier(folder),
     }
     for name, text in texts.items():
         (folder / f"{name}.html").write_text(text, encoding="utf-8")
     write_explorer(explored_run(), folder / "explorer")
-    files = {name: folder / f"{name}.html" for name in texts}
+    write_glare_page(folder / "glare.html")
+    files = {name: folder / f"{name}.html" for name in (*texts, "glare")}
     return files | {"explorer": folder / "explorer" / "index.html"}
 
 
 def faults(page: Page, file: Path) -> list:
     """What axe-core finds on a page."""
     page.open(file.as_uri(), ready="document.readyState === 'complete'")
+    if file.parent.name == "explorer":
+        page.until("document.body.dataset.ready === 'yes'")
+        page.click("#compare")
+        page.until("cfs.explorer.found.length === 2")
     page.value(DRAWN)
     page.value(AXE.read_text(encoding="utf-8") + "; 0")
     return page.value(FAULTS)

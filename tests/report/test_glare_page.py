@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,16 +40,21 @@ def table() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-@pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def write_glare_page(path: Path) -> None:
+    """The page of these views."""
     options = YearOptions("office.ifc", "city.epw", grid=2.0, directions=DIRECTIONS)
     year = SimpleNamespace(
         options=options, room="101 <Open> office", space=two_rooms().spaces[0],
         weather=SimpleNamespace(site="Lyon"), notes=("A note & more.",),
         fenestration=({"system": "Blind at 45", "source": "blind.xml", "windows": ["W"]},),
     )  # fmt: skip
-    path = tmp_path_factory.mktemp("glare") / "report.html"
     write_page(year, table(), path)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    path = tmp_path_factory.mktemp("glare") / "report.html"
+    write_glare_page(path)
     return path
 
 

@@ -164,6 +164,14 @@ def test_a_doorway_gives_back_what_a_room_does_not_absorb(doorway: Path) -> None
     assert closed.reflectance_visible == 0.5 and face.reflectance_visible < 0.05
 
 
+def test_problems_of_an_opened_building_ask_for_nothing_that_is_so(two_rooms: Path) -> None:
+    building = read_ifc(two_rooms)
+    asked = [one.consequence for one in building.problems if "--inner-glass" in one.consequence]
+    told = [p.consequence for p in opened(building).problems if "--inner-glass" in p.consequence]
+    assert asked and all("cfs run --inner-glass lets" in text for text in asked)
+    assert len(told) == len(asked) and all("daylight passes" in text for text in told)
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("variant")
 def test_light_through_a_doorway_is_that_of_paths_in_both_rooms(doorway: Path) -> None:

@@ -47,7 +47,7 @@ def test_a_colour_picture_has_three_bands_and_the_same_luminance(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--at", "13-40 12:00", "--out", "a.hdr"], "expected month-day hour:minute"),
+        (["--at", "13-40 12:00", "--out", "a.hdr"], "expected month, day and hour"),
         (["--at", "03-15 12:00", "--out", "a.jpg"], "expected one of .hdr"),
         (["--at", "03-15 12:00", "--out", "none/a.hdr"], "no such folder"),
         (["--at", "03-15 12:00", "--out", "a.hdr", "--view", "none.vf"], "cannot be read"),

@@ -116,7 +116,27 @@ def test_tutorial_runs_as_a_user_runs_it(name: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert main(["thermal", str(TUTORIALS / f"{name}.toml"), "--out", str(out)]) == 0
     record = json.loads((out / "run.json").read_text())
-    hours = pd.read_csv(next(out.rglob("hours*.csv")))
+    hours = pd.read_csv(sorted(out.rglob("hours*.csv"))[0], index_col=0, parse_dates=True)
     assert record["notes"] and len(hours) == 8760
     if name == "office_heated_slab":
         assert hours["heated_slab_w"].max() > 100 and (out / "design_days.csv").is_file()
+    if name.startswith("office"):
+        assert_night_air_passes_midnight(hours)
+    if name == "office_schedules":
+        assert_week_is_kept(hours)
+
+
+def assert_night_air_passes_midnight(hours: pd.DataFrame) -> None:
+    """Four air changes from 22 to 6 h in summer: by far the most of the air's heat then."""
+    july = hours[hours.index.month == 7]
+    lost = -july["air_exchange_w"].groupby(july.index.hour).mean()
+    assert lost[[23, 0, 5]].min() > 30 > lost[[7, 12, 20]].max()
+
+
+def assert_week_is_kept(hours: pd.DataFrame) -> None:
+    """January at noon: 21 degC on weekdays, 16 degC and no more than the sun's at weekends."""
+    january = hours[(hours.index.month == 1) & (hours.index.hour == 12)]["air_c"]
+    working = january.iloc[1:].to_numpy().reshape(-1, 5)[:1]  # Monday 2 to Friday 6
+    weekend = january.iloc[[6, 7, 13, 14]]  # the file's year begins with a Sunday
+    assert working == pytest.approx(21.0, abs=0.2)
+    assert weekend.max() < 17.0

@@ -58,6 +58,20 @@ def test_semi_infinite_wall_follows_the_closed_form():
     assert np.all(np.abs(result.surface_out_c[:, 0] - expected) < 0.6 * slope + 0.005)
 
 
+def test_a_single_iterate_goes_on_from_the_step_before():
+    """Temperatures that go on as they changed give the films that the iterates end at."""
+    outdoor = 10.0 + 8.0 * np.sin(np.arange(48) / 24 * 2 * np.pi)
+    zone = box(window=Fenestration("glass", 1.2, 0.04, 0.13))
+    air = []
+    for given in ({"iterations": 1}, {"iterations": 30, "tolerance": 1e-9}):
+        options = BalanceOptions(warm_tolerance=1e-6, warm_days=500, **given)
+        place = climate(48, outdoor=outdoor)
+        air.append(simulate(zone, place, sun(48, zone), options=options).air_c)
+    assert np.ptp(air[1]) > 1.0
+    apart = np.abs(air[0] - air[1]).max()
+    assert apart < 0.004  # [K]; 0.007 from the temperatures of the step before
+
+
 def test_window_in_the_room_returns_u_and_g():
     """At the measuring condition (its own films, no longwave) the balance gives U and g back."""
     r_o, r_i, u, tau, rho, g = 1 / 20.0, 1 / INSIDE_FILM, 1.2, 0.47, 0.21, 0.60

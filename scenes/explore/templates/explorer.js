@@ -16,16 +16,16 @@
     for (const entry of data.rooms) {
       let promise;
       const room = () => (promise ||= cfs.Room.load(entry));
-      const group = data.rooms.length > 1 ? entry.name : "Shading";
-      if (entry.states.length > 1) explorer.variants.push({ group, label: "as operated", state: -1, room, entry });
-      entry.states.forEach((label, state) => explorer.variants.push({ group, label, state, room, entry }));
+      const several = data.rooms.length > 1, which = several ? entry.name : "", group = which || "Shading";
+      if (entry.states.length > 1) explorer.variants.push({ group, which, label: "as operated", state: -1, room, entry });
+      entry.states.forEach((label, state) => explorer.variants.push({ group, which, label, state, room, entry }));
     }
-    const count = explorer.variants.length, second = Math.min(count - 1, explorer.variants.findIndex((v) => v.state === 1));
+    const count = explorer.variants.length, first = namedVariant(), second = secondVariant(first);
     ["one", "two"].forEach((id, i) => {
       const box = byId("panel").content.firstElementChild.cloneNode(true);
       box.id = id;
       byId("panels").append(box);
-      explorer.panels.push(new cfs.Panel(box, explorer.variants, i ? Math.max(second, 0) : 0, update));
+      explorer.panels.push(new cfs.Panel(box, explorer.variants, i ? second : first, update));
     });
     byId("compare").disabled = count < 2;
     hands(data);
@@ -55,11 +55,26 @@
       months.append(mark);
     }
     addEventListener("resize", update);
+    addEventListener("hashchange", () => location.reload());
   }
 
-  // The hour named behind the address's # (MM-DDThh), else noon of the spring equinox
+  // What the address names behind its #, as in #case-3&06-21T09
+  const named = () => location.hash.slice(1).split("&");
+
+  // The variant of the room that the address names, else the first
+  const namedVariant = () => Math.max(0, explorer.variants.findIndex((v) => v.entry.id && named().includes(v.entry.id)));
+
+  // What to put beside a variant: the closed state of its room, else that of another, else any
+  function secondVariant(first) {
+    const { entry } = explorer.variants[first] || {};
+    const at = [(v) => v.entry === entry && v.state === 1, (v) => v.state === 1, (v) => v.entry !== entry]
+      .map((is) => explorer.variants.findIndex(is)).find((i) => i >= 0);
+    return at ?? 0;
+  }
+
+  // The hour that the address names (MM-DDThh), else noon of the spring equinox
   function beginning() {
-    const found = /^#(\d\d)-(\d\d)T(\d\d)$/.exec(location.hash) || [0, "03", "21", "12"], { calendar } = explorer;
+    const found = named().map((one) => /^(\d\d)-(\d\d)T(\d\d)$/.exec(one)).find(Boolean) || [0, "03", "21", "12"], { calendar } = explorer;
     for (let d = 0; d < calendar.days; d++) {
       const date = calendar.date(d);
       if (date.getUTCMonth() + 1 === Number(found[1]) && date.getUTCDate() === Number(found[2])) return [d, Number(found[3])];
@@ -83,11 +98,11 @@
     const shown = explorer.panels.slice(0, both ? 2 : 1), found = [];
     for (const panel of shown) found.push(await panel.compute(hour)); // one scan may serve both
     if (mine !== turn) return;
-    const sun = Array.from(found[0].room.arrays.sun.subarray(3 * hour, 3 * hour + 3));
+    const suns = found.map((f) => Array.from(f.room.arrays.sun.subarray(3 * hour, 3 * hour + 3)));
     const lit = found.find((f) => f.l !== undefined), curve = lit ? cfs.toneCurve(lit.values) : () => 0;
-    shown.forEach((panel, i) => panel.paint(found[i], hour, day, look(), sun, curve));
+    shown.forEach((panel, i) => panel.paint(found[i], hour, day, look(), suns[i], curve));
     paintDifference(found);
-    sayHour(found[0], sun, lit);
+    sayHour(found[0], suns[0], lit);
     paintCarpet(found[0], day, clock);
     paintScale();
     explorer.found = found;
@@ -113,7 +128,7 @@
     const degrees = (v) => Math.round(v * 180 / Math.PI), altitude = degrees(Math.asin(Math.max(-1, Math.min(1, sun[2]))));
     let text = "Sun below the horizon.";
     if (altitude > 0) {
-      const azimuth = (degrees(Math.atan2(sun[0], sun[1])) + 360) % 360;
+      const azimuth = (degrees(Math.atan2(sun[0], sun[1])) + (found.room.entry.turned || 0) + 360) % 360;
       text = `Sun ${altitude}° high, ${azimuth}° from north by east`;
       text += found.l === undefined ? "." : `, ${cfs.number(found.room.arrays.sun_lux[found.l], 2)} lx normal to its beam.`;
     }

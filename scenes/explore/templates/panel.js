@@ -4,7 +4,7 @@
   const TEMPERATURES = [["operative", "operative", "--operative"], ["air", "air", "--air"], ["outdoor", "outdoors", "--outdoor"]];
 
   class Panel {
-    // root: its element; variants: [{label, room (a promise), state}]
+    // root: its element; variants: [{label, which room where there are several, room (a promise), state}]
     constructor(root, variants, first, changed) {
       Object.assign(this, { root, variants });
       this.at = (name) => root.querySelector("." + name);
@@ -57,8 +57,9 @@
     }
 
     say(found) {
-      const { glare, room, state } = found, set = (name, text) => { this.at(name).textContent = text; };
-      set("state", room.facts.states[state]);
+      const { glare, room, state, variant } = found, set = (name, text) => { this.at(name).textContent = text; };
+      set("state", [variant.which, room.facts.states[state]].filter(Boolean).join(" \u00b7 "));
+      set("up", room.entry.turned ? `as modelled, before it is turned by ${room.entry.turned}°` : "north up");
       const dgp = this.at("dgp");
       dgp.className = "dgp";
       if (!glare) {

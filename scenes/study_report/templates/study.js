@@ -29,11 +29,14 @@
   }
   for (const dot of dots) {
     dot.addEventListener("click", () => {
-      if ([...list.options].some((o) => o.value === dot.dataset.case)) open(dot.dataset.case);
+      if (dot.dataset.explorer) location.href = dot.dataset.explorer;
+      else if ([...list.options].some((o) => o.value === dot.dataset.case)) open(dot.dataset.case);
     });
   }
   for (const line of lines) {
-    line.addEventListener("click", (event) => { event.preventDefault(); open(line.dataset.case); });
+    if (line.getAttribute("href").startsWith("#")) {  // else a link to its explorer
+      line.addEventListener("click", (event) => { event.preventDefault(); open(line.dataset.case); });
+    }
   }
   const step = (by) => {
     const at = sections.findIndex((s) => s.dataset.case === list.value);

@@ -1,0 +1,160 @@
+"""Terrain as a grid of heights: ESRI ASCII grids and XYZ lists; coarser with the distance.
+
+Sources: Esri, "ASCII raster format" (ncols, nrows, xllcorner or xllcenter, yllcorner or yllcenter,
+cellsize, nodata_value, then rows from north to south); XYZ as GDAL's driver writes it, a line of
+x, y and height for each node of a regular grid, in any order.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.context.objects import TERRAIN, ContextFile, ContextObject, read_bytes
+from mitsuba_cfs.errors import DataError
+
+FloatArray = NDArray[np.float64]
+SUFFIXES = (".asc", ".xyz")
+HEADER = ("ncols", "nrows", "xllcorner", "xllcenter", "yllcorner", "yllcenter", "cellsize",
+          "nodata_value")  # fmt: skip
+MOST_NODES = 20_000_000
+OFF_GRID = 0.01  # of a step: nodes of an XYZ list may lie beside their place
+NODATA = -9999.0  # where no header says another
+
+
+def read_terrain(path: Path) -> ContextFile:
+    """The terrain of a file, its nodes in the map of the building, heights above the sea.
+
+    Raises: `DataError` that names file and field, or line.
+    """
+    try:
+        text = read_bytes(path).decode("ascii")
+    except UnicodeDecodeError:
+        raise DataError("is no text of numbers", file=path) from None
+    nodes = _ascii_grid(text, path) if path.suffix.lower() == ".asc" else _list(text, path)
+    if np.isfinite(nodes[..., 2]).sum() < 4:
+        raise DataError("has no heights", file=path)
+    terrain = ContextObject("terrain", np.empty((0, 3, 3)), TERRAIN, nodes=nodes)
+    return ContextFile(path, (terrain,), on_own_map=True)
+
+
+def graded(nodes: FloatArray, centre: FloatArray, steps_deg: float) -> tuple[FloatArray, float]:
+    """Triangles [T, 3, 3] of a grid, its rows and columns wider apart the further they are.
+
+    Args:
+        nodes: [R, C, 3] of the world [m]; triangles with a corner that is no number are holes.
+        centre: [3] from where it is seen; steps_deg: of nodes next to each other, about.
+
+    Returns: the triangles, and by how much a node that is left out lies off them at the most, as
+        an angle seen from the centre [degrees].
+    """
+    flat = np.linalg.norm(nodes[..., :2] - centre[:2], axis=-1)
+    rows = _kept(nodes[:, 0, :2], flat.min(axis=1), steps_deg)
+    columns = _kept(nodes[0, :, :2], flat.min(axis=0), steps_deg)
+    few = nodes[np.ix_(rows, columns)]
+    a, b, c, d = few[:-1, :-1], few[:-1, 1:], few[1:, 1:], few[1:, :-1]
+    both = np.stack([np.stack([a, b, c], 2), np.stack([a, c, d], 2)], axis=2).reshape(-1, 3, 3)
+    up = np.cross(both[:, 1] - both[:, 0], both[:, 2] - both[:, 0])[:, 2]
+    both = np.where((up < 0)[:, None, None], both[:, ::-1], both)
+    return both[np.isfinite(both).all(axis=(1, 2))], _worst(nodes, rows, columns, flat)
+
+
+def _kept(line: FloatArray, distance: FloatArray, steps_deg: float) -> NDArray[np.int64]:
+    """Which nodes of a line [n, 2] to keep, at distances [n] from the building [m]."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    kept = [0]
+    for node in range(1, len(line) - 1):
+        ahead = along[node + 1] - along[kept[-1]]
+        if ahead > np.tan(np.radians(steps_deg)) * min(distance[kept[-1]], distance[node]):
+            kept.append(node)
+    return np.array([*kept, len(line) - 1])
+
+
+def _worst(
+    nodes: FloatArray, rows: NDArray[np.int64], columns: NDArray[np.int64], flat: FloatArray
+) -> float:
+    """Greatest difference in height between nodes and the mean of the cells kept [degrees]."""
+    few = nodes[np.ix_(rows, columns)][..., 2]
+    across = np.stack([np.interp(np.arange(nodes.shape[1]), columns, row) for row in few])
+    whole = np.stack(
+        [np.interp(np.arange(nodes.shape[0]), rows, column) for column in across.T], axis=1
+    )
+    off = np.abs(nodes[..., 2] - whole)
+    seen = np.degrees(np.arctan2(off, np.maximum(flat, 1.0)))
+    return float(np.nanmax(seen)) if np.isfinite(seen).any() else 0.0
+
+
+def _ascii_grid(text: str, path: Path) -> FloatArray:
+    """Nodes [R, C, 3] of an ESRI ASCII grid: the middles of its cells."""
+    words = text.split(maxsplit=2 * len(HEADER))
+    fields: dict[str, float] = {}
+    while len(words) > 1 and words[0].lower() in HEADER:
+        name = words[0].lower()
+        try:
+            fields[name] = float(words[1])
+        except ValueError:
+            raise DataError(f"expected a number, got {words[1]!r:.40}", file=path, field=name)\
+                from None  # fmt: skip
+        words = words[2:]
+    missing = [name for name in ("ncols", "nrows", "cellsize") if name not in fields]
+    for axis in "xy":
+        if not {f"{axis}llcorner", f"{axis}llcenter"} & set(fields):
+            missing.append(f"{axis}llcorner")
+    if missing:
+        raise DataError("is missing at the head", file=path, field=missing[0])
+    columns, rows, step = (fields[name] for name in ("ncols", "nrows", "cellsize"))
+    whole = all(n % 1 == 0 and n > 1 for n in (columns, rows))
+    if not (whole and rows * columns <= MOST_NODES):
+        message = f"expected 2 and more, {MOST_NODES} in all at the most"
+        raise DataError(message, file=path, field="ncols, nrows")
+    place = [
+        fields.get(f"{axis}llcenter", fields.get(f"{axis}llcorner", 0.0) + step / 2)
+        for axis in "xy"
+    ]
+    if not (0 < step < 1e5 and np.isfinite(place).all()):
+        raise DataError("expected metres", file=path, field="cellsize")
+    heights = _numbers(" ".join(words), path)
+    if len(heights) != rows * columns:
+        message = f"has {len(heights)} heights, {rows * columns:.0f} expected"
+        raise DataError(message, file=path)
+    z = heights.reshape(int(rows), int(columns))[::-1]
+    z = np.where(z == fields.get("nodata_value", NODATA), np.nan, z)
+    x, y = (start + step * np.arange(n) for start, n in zip(place, z.shape[::-1], strict=True))
+    return np.stack([*np.meshgrid(x, y), z], axis=-1)
+
+
+def _list(text: str, path: Path) -> FloatArray:
+    """Nodes [R, C, 3] of a list of x, y and height."""
+    numbers = _numbers(text.replace(",", " ").replace(";", " "), path)
+    if len(numbers) % 3 or len(numbers) < 12:
+        raise DataError("expected lines of x, y and height, four at least", file=path)
+    points = numbers.reshape(-1, 3)
+    axes = []
+    for values, name in zip(points.T[:2], "xy", strict=True):
+        low, high = values.min(), values.max()
+        gaps = np.diff(np.unique(values))
+        gaps = gaps[gaps > OFF_GRID * gaps.max(initial=0.0)]
+        step = gaps.min() if len(gaps) else 0.0
+        count = round((high - low) / step) + 1 if step > 0 else 1
+        index = np.rint((values - low) / step).astype(int) if step > 0 else np.zeros(1, int)
+        if count < 2 or np.abs(values - low - index * step).max() > OFF_GRID * step * count:
+            raise DataError("the points are no regular grid", file=path, field=name)
+        axes.append((low + step * np.arange(count), index) if count <= MOST_NODES else ([], index))
+    (x, i), (y, j) = axes
+    if not 4 <= len(x) * len(y) <= MOST_NODES:
+        raise DataError(f"expected {MOST_NODES} nodes at the most", file=path)
+    z = np.full((len(y), len(x)), np.nan)
+    z[j, i] = np.where(points[:, 2] == NODATA, np.nan, points[:, 2])
+    return np.stack([*np.meshgrid(x, y), z], axis=-1)
+
+
+def _numbers(text: str, path: Path) -> FloatArray:
+    try:
+        found = np.array(text.split(), dtype=float)
+    except ValueError as error:
+        raise DataError(f"expected numbers: {str(error)[:60]}", file=path) from None
+    if not (np.abs(found) < 1e12).all():
+        raise DataError("expected finite numbers", file=path)
+    return found

@@ -1,0 +1,101 @@
+"""The explorer of one case of a study: computed after its figures, kept in the study's folder."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from operator import attrgetter
+from pathlib import Path
+from typing import Any
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_bytes
+from mitsuba_cfs.matrices.cache import digest
+from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.source_code import code_version
+from scenes.explore.folder import CASE, write_rooms
+from scenes.explore.packing import read_data
+from scenes.results import RunResult
+from scenes.study.case import Case
+from scenes.study.one_case import ALONE, CaseRoom
+from scenes.study.schedule import said
+from scenes.workers import Tasks
+
+PHASED = ("three-phase", "five-phase")  # a path tracer has no matrices to compute an hour from
+
+
+@dataclass(frozen=True, slots=True)
+class ExploredCase:
+    """What the explorer shows of a case."""
+
+    key: str  # of `explorer_key`
+    files: dict[str, bytes] = field(default_factory=dict)  # by name; none once they are written
+    shown: dict[str, Any] = field(default_factory=dict)  # as `case.js` holds it
+    error: str = ""  # one line; then there is nothing else
+
+
+def explorer_key(case: Case) -> str:
+    """A hash of what the explorer of a case depends on."""
+    return digest(case.key, code_version(__name__))[:32]
+
+
+def compute_explorer(case: Case) -> ExploredCase:
+    """Every hour's pictures, plan and temperatures of a case, as files of the explorer.
+
+    Raises: as `scenes.study.one_case.compute_case`.
+    """
+    with ALONE, tempfile.TemporaryDirectory() as name:
+        variants.activate()
+        held, folder = CaseRoom.of(case), Path(name)
+        room, weather = held.year(case, explore=True), held.weather
+        run = RunResult(
+            held.building, weather.midpoints, sun_directions(weather), (room,), (), {}
+        )  # fmt: skip
+        write_rooms(run, folder)
+        found = (one for one in folder.rglob("*") if one.is_file())
+        files = {one.relative_to(folder).as_posix(): one.read_bytes() for one in found}
+        return ExploredCase(explorer_key(case), files, read_data(folder / CASE))
+
+
+def explorers(
+    cases: Sequence[Case], folder: Path, *, processes: int = 1, scheduler: str | None = None
+) -> Iterator[tuple[Case, ExploredCase]]:
+    """The explorer of each case, once for each key: kept in the folder, or computed and kept.
+
+    Args: processes, scheduler: as of `scenes.study.schedule.computed`.
+    """
+    once = {explorer_key(case): case for case in cases}
+    left = []
+    for key, case in once.items():
+        kept = _kept(key, folder)
+        if kept is None:
+            left.append(case)
+        else:
+            yield case, kept
+    tasks = Tasks(left, compute_explorer, _failed, key=explorer_key, scene=attrgetter("scene"))
+    for found in tasks.results(processes=processes, scheduler=scheduler):
+        if not found.error:
+            _keep(found, folder)
+        yield once[found.key], ExploredCase(found.key, {}, found.shown, found.error)
+
+
+def _kept(key: str, folder: Path) -> ExploredCase | None:
+    """An explorer that an earlier run finished."""
+    try:
+        return ExploredCase(key, {}, read_data(folder / key / CASE))
+    except DataError:
+        return None
+
+
+def _keep(explored: ExploredCase, folder: Path) -> None:
+    """Write the files of a case; the last says that all are there."""
+    for name in sorted(explored.files, key=lambda name: name == CASE):
+        place = folder / explored.key / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(place, explored.files[name])
+
+
+def _failed(case: Case, error: BaseException) -> ExploredCase:
+    return ExploredCase(explorer_key(case), error=said(error))

@@ -1,0 +1,37 @@
+"""A wall's modes against its nodes' linear system, solved directly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.thermal.rooms import CONCRETE, INSULATION, PLASTER
+from thermal.conduction import wall_grid
+from thermal.zone import Layer
+
+AIR = Layer(0.02, 0.1, 0.0, 0.0)  # two cells without any heat, and beside another such layer one
+
+
+@pytest.mark.parametrize("step_s", [60.0, 600.0, 3600.0])
+@pytest.mark.parametrize(
+    "layers", [(PLASTER,), (PLASTER, INSULATION, CONCRETE), (AIR, AIR, PLASTER)]
+)
+def test_modes_go_as_the_nodes_do(layers: tuple[Layer, ...], step_s: float) -> None:
+    grid = wall_grid(layers)
+    modes, capacity = grid.modes(step_s), grid.capacity[1:-1] / step_s
+    conductance, matrix = grid.conductance, grid.inner_matrix(step_s)
+    node, amplitude = np.full(len(capacity), 20.0), 20.0 * modes.even
+    pipes = len(capacity) // 2
+    for outer, inner, power in ((-5.0, 21.0, 0.0), (3.0, 22.0, 40.0), (30.0, 24.0, 0.0)):
+        right = capacity * node
+        right[0] += conductance[0] * outer
+        right[-1] += conductance[-1] * inner
+        right[pipes] += power
+        fresh = np.linalg.solve(matrix, right)
+        moved = modes.decay * amplitude + modes.from_out * outer + modes.from_in * inner
+        moved += modes.from_nodes[pipes] * power
+        assert modes.at_out @ moved == pytest.approx(fresh[0], abs=1e-9)
+        assert modes.at_in @ moved == pytest.approx(fresh[-1], abs=1e-9)
+        stored = capacity @ (fresh - node)
+        assert modes.heat @ (moved - amplitude) == pytest.approx(stored, abs=1e-7)
+        node, amplitude = fresh, moved
