@@ -119,7 +119,7 @@ def test_tables_of_the_heat_page_have_no_unknown_keys(folder):
     models = [(StudyFile, study), (OperationTables, schedules)]
     box = '[[system]]\nbsdf = "a.xml"\n[box]\nwidth = 3\ndepth = 4\nheight = 3\nwindow = []\n'
     models += [(StudyFile, part + box if "weather =" in part else whole + part) for part in parts]
-    assert len(parts) == 4
+    assert len(parts) == 5
     for model, code in models:
         path = folder / "heat.toml"
         path.write_text(code)
