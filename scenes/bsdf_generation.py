@@ -1,4 +1,4 @@
-"""What `cfs bsdf generate` makes of its options: a traced layer as a BSDF file."""
+"""What `cfs bsdf generate` makes of its options: a traced layer, or a data sheet's fabric."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 from mitsuba_cfs.bsdf import klems
 from mitsuba_cfs.bsdf.blinds import venetian_blind, vertical_louvre
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.fabric import fabric_klems
+from mitsuba_cfs.bsdf.fabric_table import FabricShade, named_fabric, read_fabric_table
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, plastic
 from mitsuba_cfs.bsdf.radiance_geometry import read_radiance_layer
 from mitsuba_cfs.bsdf.screens import (
@@ -34,10 +36,18 @@ def generated_file(
     paths: int,
     seed: int,
     name: str,
+    fabrics: Path | None = None,
+    fabric: str | None = None,
     progress: Progress = silent,
     **options,
 ) -> tuple[BsdfFile, str]:
     """The layer's BSDF file (Visible and Solar), and how exact it is in words."""
+    if options["shape"] == "fabric":
+        if tensor_tree is not None:
+            raise click.UsageError("--shape fabric is written on a Klems basis, as no tensor tree")
+        return fabric_file(fabrics=fabrics, fabric=fabric, basis=basis, name=name)
+    if fabrics is not None or fabric is not None:
+        raise click.UsageError("--fabrics and --fabric belong to --shape fabric")
     from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
 
     try:
@@ -70,6 +80,61 @@ def generated_file(
         exact = f"{leaves} leaves, merged within {merged} standard errors of a cell's value"
     bands = dict(zip(("Visible", "Solar"), systems, strict=True))
     return BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness), exact
+
+
+def fabric_file(
+    *, fabrics: Path | None, fabric: str | None, basis: str, name: str
+) -> tuple[BsdfFile, str]:
+    """The BSDF file of a fabric in a table (`read_fabric_table`), and what is to be said of it."""
+    _needed("fabric", fabrics=fabrics)
+    shades, notes = read_fabric_table(fabrics)
+    shade = named_fabric(shades, fabric, fabrics)
+    bands = {"Visible": shade.visible, "Solar": shade.solar}
+    layer, more = layer_of_fabric(shade)
+    said = [f"{shade.name} (line {shade.line} of {fabrics})"]
+    for band, at in bands.items():
+        said.append(
+            f"{band}: transmittance {at.transmittance:.3f}, straight on {at.direct:.3f}; "
+            f"reflectance {at.reflectance_front:.3f}, back {at.reflectance_back:.3f}"
+        )
+    said += [f"as one of the layers of a .toml: {layer}"]
+    said += [f"note: {note}" for note in (*notes, *shade.notes, *more)]
+    file = BsdfFile(
+        {band: fabric_klems(at, BASES[basis]) for band, at in bands.items()},
+        name=name or shade.name,
+        manufacturer=shade.manufacturer,
+        thickness=shade.thickness,
+        emissivity_front=shade.emissivity[0],
+        emissivity_back=shade.emissivity[1],
+        infrared_transmittance=shade.infrared_transmittance,
+    )
+    return file, "\n".join(said)
+
+
+def layer_of_fabric(shade: FabricShade) -> tuple[str, tuple[str, ...]]:
+    """A fabric as an inline table of `[[layers]]`, and notes.
+
+    There an emissivity is the material's; data sheets state that of the sheet with its holes.
+    """
+    passed = shade.infrared_transmittance
+    keys, notes = [f"openness = {shade.openness:.4g}"], []
+    if passed is None:
+        notes.append("tau_IR is not stated: as openness")
+    else:
+        keys.append(f"infrared_transmittance = {passed:.4g}")
+    if shade.thickness is not None:
+        keys.append(f"thickness = {shade.thickness:.4g}")
+    if None in shade.emissivity:
+        notes.append("an emissivity is not stated: 0.9 of the material")
+    else:
+        solid = max(1 - (shade.openness if passed is None else passed), 1e-4)
+        sides = [e / solid for e in shade.emissivity]
+        if max(sides) > 1:
+            notes.append("the emissivity is more than holes leave: 1 of the material")
+        keys.append(f"emissivity = [{', '.join(f'{min(e, 1.0):.4g}' for e in sides)}]")
+    if shade.ultraviolet is not None:
+        notes.append(f"tau_UV {shade.ultraviolet:.3f} is stated and has no place in the file")
+    return "{ " + ", ".join(keys) + " }", tuple(notes)
 
 
 def described_layer(

@@ -20,7 +20,7 @@ from scenes.commands.room_options import seed_option
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
-SHAPES = ("venetian", "louvre", "perforated", "woven", "pleated", "prism", "radiance")
+SHAPES = ("venetian", "louvre", "perforated", "woven", "pleated", "prism", "radiance", "fabric")
 FILE = click.Path(path_type=Path)
 
 
@@ -216,6 +216,8 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option(
     "--index", type=Number(min=1), help="Refractive index of a prism panel; --tilt-deg its angle."
 )
+@click.option("--fabrics", type=FILE, help="CSV of fabrics by EN 14501, for --shape fabric.")
+@click.option("--fabric", help="Name and colour of one of them, where it has several.")
 @click.option("--visible", type=SHARE, help="Colour (Radiance plastic), visible.")
 @click.option("--solar", type=SHARE, help="Colour, solar; the visible's without.")
 @click.option("--specular", type=SHARE, default=0.0)
@@ -234,11 +236,14 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option("--name", default="", help="Name to write into the file.")
 @click.option("--out", type=FILE, required=True, help="XML file to write.")
 def generate(out: Path, **options) -> None:
-    """Trace the BSDF of a blind, screen or Radiance geometry and write it."""
+    """Trace the BSDF of a blind, screen or Radiance geometry and write it.
+
+    A fabric is not traced: its BSDF follows from what a data sheet states (ES-SO, EN 14501).
+    """
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
 
-    check_file(out, inputs=[options["geometry"]])
+    check_file(out, inputs=[options["geometry"], options["fabrics"]])
     with ProgressBar() as progress:
         file, exact = generated_file(progress=progress, **options)
     write_bsdf_xml(file, out)
