@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from bim.model import Building, Element, Space
 from bim.rays import ray_mesh
 from bim.to_thermal import ThermalRoom
+from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.surfaces import even_numbers, points_on_triangles
 
 DEEPEST_WALL = 1.2  # [m] from its face in the room
 TOUCHING = 0.05  # [m] wider gaps are outdoors: no cladding lies beyond them
+PARALLEL = 0.9  # least |cosine| to the wall's normal of both faces of what is a part of the wall
 OFF_THE_WALL = 0.02  # [m] sensors stand this far before the outer face
 PLACES = 64  # on each surface, a power of two
 MOST_STEPS = 24  # surfaces that a ray is followed through
@@ -36,7 +38,8 @@ def outer_faces(building: Building, space: Space, room: ThermalRoom) -> OuterFac
     """The outer faces of a room's surfaces and windows.
 
     A face in the room is followed outwards through the element that it belongs to, or by the
-    thickness of its layers where nothing of that element is drawn, and on through what touches it.
+    thickness of its layers where nothing of that element is drawn, and on through what touches it
+    and lies along it, as a cladding does; not through eaves, a balcony or a wall that stands out.
     """
     walls = _NearElements(building.elements, space)
     points, depths = [], []
@@ -87,7 +90,10 @@ class _NearElements:
         self.normals = np.cross(
             triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
         )
+        self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1), 1e-12)[:, None]
+        self.corners = [element.triangles.reshape(-1, 3) for element in near]
         counts = [len(element.triangles) for element in near]
+        self.of = np.repeat(np.arange(len(near)), counts)
         self.guids = np.repeat([element.guid for element in near], counts)
 
     def depth(
@@ -108,13 +114,40 @@ class _NearElements:
             here = (triangle >= 0) & (self.guids[triangle] == own)
             deep[here] = distance[here]
         deep = np.where(deep > 0, deep, thickness)
-        going = np.ones(len(points), dtype=bool)
-        for distance, triangle in met:
+        going, narrowest = np.ones(len(points), dtype=bool), self._narrowest(normal)
+        for number, (distance, triangle) in enumerate(met):
             further = (triangle >= 0) & (distance > deep + 1e-6)
             leaving = self.normals[triangle] @ normal > 0  # a solid that began before
-            going &= ~further | leaving | (distance <= deep + TOUCHING)
+            along = self._along(met[: number + 1], normal, narrowest)
+            going &= ~further | np.where(leaving, along, distance <= deep + TOUCHING)
             deep = np.where(further & going, distance, deep)
         return deep
+
+    def _along(
+        self,
+        met: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]],
+        normal: NDArray[np.float64],
+        narrowest: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """Whether the solids that rays leave at their last hit lie along the wall [n].
+
+        Both faces are parallel to it, and the way between them is no longer than the solid's
+        narrower side across: eaves, balconies and walls that stand out are not so.
+        """
+        distance, triangle = met[-1]
+        began, entered = np.zeros(len(distance)), np.ones(len(distance))
+        for before, other in met[:-1]:
+            cosine = self.normals[other] @ normal
+            into = (other >= 0) & (self.of[other] == self.of[triangle]) & (cosine < 0)
+            began = np.where(into, before, began)
+            entered = np.where(into, -cosine, entered)
+        parallel = np.minimum(entered, self.normals[triangle] @ normal) > PARALLEL
+        return parallel & (distance - began <= narrowest[self.of[triangle]] + 1e-6)
+
+    def _narrowest(self, normal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The smaller extent of each element across a normal [m]: level, and at right angles."""
+        across = window_frame(normal)[:2]
+        return np.array([np.ptp(corners @ across.T, axis=0).min() for corners in self.corners])
 
     def _met(
         self, points: NDArray[np.float64], normal: NDArray[np.float64]

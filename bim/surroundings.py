@@ -15,6 +15,8 @@ from bim.rooms import Piece, RoomSolid, cut
 
 DEEPEST_WALL = 1.5  # beyond this nothing belongs to the wall any more [m]
 WIDEST_GAP = 0.6  # air between the parts of one wall or ceiling [m]
+PARALLEL = 0.9  # least |cosine| to a wall's normal of what lies behind its first element: no eaves
+UPRIGHT = 0.5  # most |cosine| of a wall's normal to the vertical
 INSIDE = 0.02  # rays start this far inside the room: faces drawn into the wall [m]
 OPPOSITE = -0.98  # cosine between faces of two rooms that share a wall: 11 degrees
 OPEN_SKY = 0.1  # share of rays that escape where a wall faces the open air
@@ -121,6 +123,9 @@ def sample_points(facet: Facet) -> NDArray[np.float64]:
 def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
     """Elements behind a piece along the ray that most of its samples agree with, and what follows.
 
+    They agree on the element met first, then on all of them: one rafter of the eaves, met by one
+    sample, is no cladding.
+
     Args: own: index of the piece's own room in `around.guids`.
     """
     normal = piece.facet.plane.normal
@@ -130,9 +135,10 @@ def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
     walks = [_walk(point, normal, around, own) for point in points]
     firsts = [spans[0].element if spans else -1 for spans, _, _ in walks]
     common = max(set(firsts), key=firsts.count)
-    spans, room, stop = next(
-        walk for walk, first in zip(walks, firsts, strict=True) if first == common
-    )
+    chains = [tuple(span.element for span in spans) for spans, _, _ in walks]
+    agreeing = [chain for chain, first in zip(chains, firsts, strict=True) if first == common]
+    chosen = chains.index(max(agreeing, key=agreeing.count))
+    spans, room, stop = walks[chosen]
     if piece.role == "reveal":
         return Beyond(spans[:1], "adiabatic")
     if piece.neighbour is not None:
@@ -144,7 +150,7 @@ def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
     if not np.isfinite(stop) and normal[2] > -0.7:
         return Beyond(spans, "adiabatic")  # the end of a wall: boundary type 2b
     stop = min(stop, DEEPEST_WALL)
-    point = points[firsts.index(common)] + normal * (stop + 0.02)
+    point = points[chosen] + normal * (stop + 0.02)
     return Beyond(spans, _open_or_ground(point, normal, around))
 
 
@@ -186,7 +192,11 @@ def _walk(
 def _spans(
     crossings: list[tuple[float, int]], around: Surroundings, normal: NDArray[np.float64]
 ) -> tuple[Span, ...]:
-    """Entries and exits paired by element, until a gap too wide for one wall; t from the face."""
+    """Entries and exits paired by element, until a gap too wide for one wall; t from the face.
+
+    What a wall's ray meets aslant behind the first element is the roof over the wall or its
+    rafters, not a cladding; over a ceiling it is the roof that closes the attic.
+    """
     open_at: dict[int, tuple[float, int]] = {}
     spans: list[Span] = []
     met = [int(around.element[triangle]) for _, triangle in crossings]
@@ -217,9 +227,17 @@ def _spans(
     for span in spans:
         if span.start - reach > WIDEST_GAP:
             break
+        if kept and abs(normal[2]) < UPRIGHT and not _parallel(span, around, normal):
+            continue
         kept.append(span)
         reach = max(reach, span.stop)
     return tuple(kept)
+
+
+def _parallel(span: Span, around: Surroundings, normal: NDArray[np.float64]) -> bool:
+    """Whether the face that a ray meets first of an element is parallel to the wall."""
+    (vector,) = area_vectors(around.elements.triangles[[span.triangle]])
+    return bool(abs(vector @ normal) > PARALLEL * np.linalg.norm(vector))
 
 
 def _layered(met: list[int], leaves: NDArray[np.bool_]) -> dict[int, tuple[int, int]]:

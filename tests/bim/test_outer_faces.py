@@ -12,9 +12,12 @@ from bim.to_thermal import thermal_room
 from thermal.blackbox import Fenestration
 
 
-def slab(guid: str, near: float, far: float) -> Element:
+def slab(
+    guid: str, near: float, far: float, x: tuple[float, float] = (-10.0, 10.0),
+    z: tuple[float, float] = (-10.0, 10.0),
+) -> Element:  # fmt: skip
     """A plate of 20 x 20 m, from `near` to `far` south of the front wall's inner face [m]."""
-    low, high = np.array([-10.0, -far, -10.0]), np.array([10.0, -near, 10.0])
+    low, high = np.array([x[0], -far, z[0]]), np.array([x[1], -near, z[1]])
     corner = np.array(np.meshgrid(*np.stack([low, high]).T, indexing="ij")).reshape(3, 8).T
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     triangles = np.array([corner[[q[k] for k in part]] for q in quads
@@ -71,3 +74,36 @@ def test_a_plate_of_the_box_stands_out_of_its_line():
     assert plate.reflectance("solar") == 0.2
     with pytest.raises(ValueError, match="depth"):
         shoebox(4, 5, 3, plates=[Plate((0, 3), (4, 3), 0.0)])
+
+
+def under_eaves(rise: float, overhang: float) -> Element:
+    """A roof that falls southwards by `rise`, 0.2 m thick across, 0.1 m over the wall's top."""
+    roof = slab("roof", -4.0, 0.3 + overhang, z=(2.7, 2.9))
+    triangles = roof.triangles.copy()
+    triangles[..., 2] += rise * (triangles[..., 1] + 0.3)
+    return Element("roof", "roof", "IfcSlab", triangles, 0.3, 0.3)
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.1, 0.6], ids=["flat", "10 percent", "31 degrees"])
+def test_eaves_that_the_wall_reaches_into_are_not_its_outer_face(rise):
+    """Each place stands before the wall, those in the roof's body too: they see nothing."""
+    depth, points = front(slab("room-front", 0.0, 0.3), under_eaves(rise, 0.5))
+    assert depth == pytest.approx(0.3)
+    assert (points[:, 2] > 2.7).sum() >= 4  # behind the eaves
+    assert np.all(points[:, 1] <= -0.3 - OFF_THE_WALL + 1e-6)
+    assert np.all(points[:, 1] > -0.3 - 2 * OFF_THE_WALL - 0.05)
+
+
+@pytest.mark.parametrize("part", [{"z": (1.0, 1.2)}, {"x": (0.1, 0.4)}], ids=["balcony", "pier"])
+def test_what_stands_out_of_the_wall_is_not_its_outer_face(part):
+    _, points = front(slab("room-front", 0.0, 0.3), slab("out", 0.3, 0.9, **part))
+    assert np.all(points[:, 1] == pytest.approx(-0.3 - OFF_THE_WALL, abs=1e-4))
+
+
+def test_a_column_in_the_wall_is():
+    column = slab("column", 0.0, 0.4, x=(0.1, 0.5))
+    _, points = front(slab("room-front", 0.0, 0.3), column)
+    inside = (points[:, 0] > 0.1) & (points[:, 0] < 0.5)
+    assert inside.any()
+    assert points[inside, 1] == pytest.approx(-0.4 - OFF_THE_WALL)
+    assert points[~inside, 1] == pytest.approx(-0.3 - OFF_THE_WALL)
