@@ -12,7 +12,9 @@ names glass or a clear plastic; virtual elements have none.
 Phantom glass: what rooms here have beyond that, all that faces down, and what lies twice in one
 place.  Glass before a space: real glass of windows, doors and plates, drawn twice or once, with an
 IfcSpace of the file on one side and none on the other by 100 points of each, whatever became of
-that space here.
+that space here.  Left: real glass of such elements that no room here has, between rooms or before
+none; of it told: what a problem of the building is about, by the GUID of the element or of what it
+is part of.
 """
 
 from __future__ import annotations
@@ -69,6 +71,8 @@ class Counted:
     twice: float = 0.0  # of it: over other glass
     before: float = 0.0  # real glass before an IfcSpace
     before_used: float = 0.0  # of it: in rooms here
+    left: float = 0.0  # real glass that no room here has
+    told: float = 0.0  # of it: with a problem of its own
     misses: tuple[str, ...] = ()
     refused: str = ""
 
@@ -115,10 +119,26 @@ def counted(path: Path) -> Counted:
     lost = {g: a for g, a in lost.items() if a > ROUGH * real[g].area}
     misses += [f"{_said(model, guid)}: {area:.2f} not used" for guid, area in lost.items()]
     before = sum(pane.area * pane.inside for pane in real.values())
+    left = {guid: pane.area - ours.get(guid, 0.0) for guid, pane in real.items()}
+    left = {guid: area for guid, area in left.items() if area > ROUGH * real[guid].area}
+    named = {problem.where for problem in building.problems}
+    silent = {g: a for g, a in left.items() if named.isdisjoint(_with_wholes(model, g))}
+    misses += [f"{_said(model, g)}: {area:.2f} left in silence" for g, area in silent.items()]
+    left_area = sum(left.values())
     return Counted(
         path.name, sum(ours.values()) + down, parts["drawn"], parts["assumed"], parts["empty"],
-        parts["beyond"], down, twice(windows), before, before - sum(lost.values()), tuple(misses),
+        parts["beyond"], down, twice(windows), before, before - sum(lost.values()), left_area,
+        left_area - sum(silent.values()), tuple(misses),
     )  # fmt: skip
+
+
+def _with_wholes(model: ifcopenshell.file, guid: str) -> set[str]:
+    """GUIDs of an element and of all that it is a part of."""
+    found, element = {guid}, model.by_guid(guid)
+    while (whole := element_of.get_aggregate(element)) is not None:
+        found.add(whole.GlobalId)
+        element = whole
+    return found
 
 
 def real_glass(model: ifcopenshell.file, more: set[str]) -> dict[str, Pane]:
@@ -330,25 +350,31 @@ def table(rows: Sequence[Counted]) -> str:
     """Markdown table of the files and their sum."""
     head = (
         "| file | glass m2 | drawn | assumed | in empty openings | phantom "
-        "| before a space | of it used |"
+        "| before a space | of it used | left | of it told |"
     )
-    lines = [head, "|---" * 8 + "|"]
+    lines = [head, "|---" * 10 + "|"]
     for r in rows:
         if r.refused:
-            lines.append(f"| {r.file} | refused: {r.refused} | | | | | | |")
+            lines.append(f"| {r.file} | refused: {r.refused} | | | | | | | | |")
             continue
-        share = f"{100 * r.before_used / r.before:.1f} %" if r.before else "-"
+        share, told = _share(r.before_used, r.before), _share(r.told, r.left)
         lines.append(
             f"| {r.file} | {r.used:.1f} | {r.drawn:.1f} | {r.assumed:.1f} | {r.empty:.1f} "
-            f"| {r.phantom:.2f} | {r.before:.1f} | {share} |"
+            f"| {r.phantom:.2f} | {r.before:.1f} | {share} | {r.left:.1f} | {told} |"
         )
     sums = [sum(getattr(r, name) for r in rows) for name in (
-        "used", "drawn", "assumed", "empty", "phantom", "before", "before_used")]  # fmt: skip
+        "used", "drawn", "assumed", "empty", "phantom", "before", "before_used",
+        "left", "told")]  # fmt: skip
     lines.append(
         f"| all | {sums[0]:.1f} | {sums[1]:.1f} | {sums[2]:.1f} | {sums[3]:.1f} | {sums[4]:.2f} "
-        f"| {sums[5]:.1f} | {100 * sums[6] / max(sums[5], 1e-9):.1f} % |"
+        f"| {sums[5]:.1f} | {_share(sums[6], sums[5])} "
+        f"| {sums[7]:.1f} | {_share(sums[8], sums[7])} |"
     )
     return "\n".join(lines)
+
+
+def _share(part: float, whole: float) -> str:
+    return f"{100 * part / whole:.1f} %" if whole > EXACT else "-"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
