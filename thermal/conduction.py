@@ -62,10 +62,6 @@ class WallGrid:
         matrix = np.diag(c + g[:-1] + g[1:])
         return matrix - np.diag(g[1:-1], 1) - np.diag(g[1:-1], -1)
 
-    def inner_inverse(self, step_s: float) -> NDArray[np.float64]:
-        """Its inverse."""
-        return np.asarray(np.linalg.inv(self.inner_matrix(step_s)), dtype=np.float64)
-
     def modes(self, step_s: float) -> WallModes:
         """The modes of the inner nodes for a time step [s]."""
         g, c, matrix = self.conductance, self.capacity[1:-1] / step_s, self.inner_matrix(step_s)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.air_paths import AirPaths, Emitters, air_paths, emitters, slab_faces
-from thermal.conduction import WallGrid, wall_grid
+from thermal.conduction import WallGrid, WallModes, wall_grid
 from thermal.convection import DOE2_LEEWARD, DOE2_WINDWARD, local_wind_factor
 from thermal.elimination import Elimination, elimination
 from thermal.errors import require
@@ -244,7 +244,7 @@ def _walls(
         at_pipes = np.zeros_like(modes.decay)
         if i in pipes:
             at_pipes = modes.from_nodes[grid.node_at(pipes[i], f"heated slab {e.name}")]
-        ports.append((count, len(modes.decay), _two_port(grid, step_s)))
+        ports.append((count, len(modes.decay), _two_port(grid, modes, step_s)))
         rows.append(
             (modes.decay, modes.at_out, modes.at_in, modes.from_out, modes.from_in, modes.heat,
              modes.even, at_pipes)
@@ -255,11 +255,10 @@ def _walls(
     return ports, Modes(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def _two_port(grid: WallGrid, step_s: float) -> NDArray[np.float64]:
+def _two_port(grid: WallGrid, modes: WallModes, step_s: float) -> NDArray[np.float64]:
     g, capacity = grid.conductance, grid.capacity / step_s
-    inverse = grid.inner_inverse(step_s)
-    from_out, from_in = inverse[:, 0] * g[0], inverse[:, -1] * g[-1]
-    ends = [from_out[0], from_in[0], from_out[-1], from_in[-1]]
+    faces = (modes.from_out, modes.from_in)
+    ends = [end @ face for end in (modes.at_out, modes.at_in) for face in faces]
     return np.array([capacity[0], capacity[-1], g[0], g[-1], *ends])
 
 

@@ -50,13 +50,6 @@ MOST_CHANGES = 50  # of the plants in an iterate; each changes a few times at th
 
 
 @inlined
-def copy_into(source: NDArray[np.float64], target: NDArray[np.float64], first: int) -> None:
-    """Copy an array into another, from an index on."""
-    for i in range(source.size):
-        target[first + i] = source[i]
-
-
-@inlined
 def _go_on(now: NDArray[np.float64], before: NDArray[np.float64]) -> None:
     """Let temperatures change as in the step before, as the first iterate; `before`: the last."""
     for i in range(now.size):
