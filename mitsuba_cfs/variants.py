@@ -59,6 +59,14 @@ def activate(preferred: str | None = None, *, vectorised: bool = True) -> str:
     return variant
 
 
+def share_cores(processes: int) -> None:
+    """Trace with this process' share of the cores, one of so many that trace beside each other.
+
+    Threads that wait for work are busy, and two processes' on one core wait for each other.
+    """
+    _tracer("drjit").set_thread_count(max((os.cpu_count() or 1) // processes, 1))
+
+
 def choose(*, vectorised: bool = True) -> Choice:
     """The variant that suits this machine, with the reason; activates nothing."""
     gpu_fault = cuda_fault()

@@ -36,6 +36,9 @@ COMMANDS = {
 PLACES = ("scenes.commands", "scenes.evidence")  # the second comes with the repository only
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
 SIGNALLED = 128  # and the signal's number
+# OpenBLAS reads it when NumPy is loaded: its threads wait for work in 2^4 turns of a loop, not in
+# the 2^28 that they are busy for between two small products of a room, beside Dr.Jit's own
+BLAS_WAIT = {"OPENBLAS_THREAD_TIMEOUT": "4"}
 
 
 class Terminated(BaseException):
@@ -106,6 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     143 and 129: ended by SIGTERM or SIGHUP.  A problem gives one line on stderr; with CFS_DEBUG=1
     also its traceback.
     """
+    os.environ.update(BLAS_WAIT | os.environ)
     open_streams()
     for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
         number = getattr(signal, name, None)

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.processes import process_pool
+from mitsuba_cfs.variants import share_cores
 from scenes.user_errors import one_line
 
 T = TypeVar("T")
@@ -69,7 +70,8 @@ class Tasks(Generic[T, R]):
 
     def _beside_each_other(self, processes: int) -> Iterator[R]:
         leaders, followers = self._waves()
-        pool = process_pool(processes, partial(_Work.keep, self.compute, self.failed))
+        begin = partial(_Work.keep, self.compute, self.failed, processes)
+        pool = process_pool(processes, begin)
         try:
             waiting: dict[Future, T] = {}
 
@@ -150,8 +152,9 @@ class _Work:
     _kept: ClassVar[tuple[Callable, Callable]]
 
     @classmethod
-    def keep(cls, compute: Callable, failed: Callable) -> None:
-        """Begin the process with this."""
+    def keep(cls, compute: Callable, failed: Callable, processes: int) -> None:
+        """Begin one of so many processes with this."""
+        share_cores(processes)
         cls._kept = compute, failed
 
     @classmethod

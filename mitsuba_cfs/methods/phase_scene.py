@@ -19,7 +19,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.borrowed_pictures import BorrowedPictures
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.subdivision import CellLight, Parts, subdivided
+from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
 from mitsuba_cfs.methods.view_cache import kept_view
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
@@ -135,7 +135,8 @@ class PhaseScene:
             cache=self.cache,
         )
         lights = map(CellLight, groups, cells, found)
-        return Parts.of_cells(subdivided(light, chosen.window_parts or None) for light in lights)
+        most, limit = chosen.window_parts or None, allowed(chosen.patch_samples)
+        return Parts.of_cells(subdivided(light, most, limit=limit) for light in lights)
 
     @cached_property
     def daylight(self) -> Estimate:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.directions import incident_azimuth
+from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -132,8 +133,16 @@ class Parts:
         return np.tensordot(share / share.sum(axis=1, keepdims=True), values, 1)
 
 
-def subdivided(light: CellLight, parts: int | None = None) -> CellLight:
-    """A group cut until the error of D's means is below `LIMIT` of the light, or into `parts`.
+def allowed(samples: int) -> float:
+    """The error that D's means may have where its patches have so many paths each.
+
+    `LIMIT` of a full run; with fewer paths as much more as D's noise is: every part is more work.
+    """
+    return LIMIT * max(float(np.sqrt(Sampling().patch_samples / samples)), 1.0)
+
+
+def subdivided(light: CellLight, parts: int | None = None, *, limit: float = LIMIT) -> CellLight:
+    """A group cut until the error of D's means is below a limit of the light, or into `parts`.
 
     Each cut is the one, across height or width or between windows of different depth, that leaves
     least variance of what the cells see under five skies.
@@ -144,7 +153,7 @@ def subdivided(light: CellLight, parts: int | None = None) -> CellLight:
     seen = (outside * weight / level(outside)).reshape(len(outside), -1)
     regions = light.regions
     most = min(MOST_PARTS if parts is None else parts, len(seen))
-    while len(regions) < most and (parts is not None or judge.error(regions) > LIMIT):
+    while len(regions) < most and (parts is not None or judge.error(regions) > limit):
         cuts = [cut for region in regions if (cut := _best_cut(light.cells, region, seen))]
         if not cuts:
             break

@@ -137,7 +137,7 @@ def _summed(
     for block in blocks:
         for rows, values in zip(sums, (block.later, block.lit), strict=True):
             rows[block.row] += values.reshape(len(values), -1)
-        seen.append(sparse.csr_array(block.seen.reshape(len(block.seen), -1)))
+        seen.append(block.seen)
     ones = np.ones(len(number), dtype=np.float32)
     of_pixel = sparse.csr_array((ones, (number, np.arange(len(number)))))
     return sparse.csr_array(of_pixel @ sparse.vstack(seen))

@@ -11,6 +11,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
@@ -22,16 +23,17 @@ from mitsuba_cfs.trace.sampling import (
     batch_key,
     column,
     empty_sums,
-    opaque,
     path_generator,
     pixel_places,
     sums_of,
+    tables,
     vectors,
 )
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene, kept_scene
 from mitsuba_cfs.trace.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
+NO_PATCH = -1  # of a ray that meets none
 
 
 def luminance_pictures(
@@ -72,7 +74,8 @@ def picture_matrix_blocks(
     Args: options: of `picture_part_blocks`.
     """
     for block in picture_part_blocks(surfaces, groups, view, **options):
-        yield block.pixels, block.seen + block.lit + block.later
+        reflected = block.lit + block.later
+        yield block.pixels, block.seen.toarray().reshape(reflected.shape) + reflected
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +83,7 @@ class PictureBlock:
     """Rows of the view matrix of some pixels [n], by what the light has met before the eye."""
 
     pixels: NDArray[np.int64]  # [n] row * width + column
-    seen: NDArray[np.float32]  # [n, G, K] the windows that a pixel shows
+    seen: sparse.csr_array  # [n, G * K] the windows that a pixel shows, few of all
     row: NDArray[np.int64]  # [b] numbers of the rows that pixels share
     lit: NDArray[np.float32]  # [b, G, K] what surfaces that they show reflect of the windows' light
     later: NDArray[np.float32]  # [b, G, K] what comes after more reflections
@@ -117,7 +120,8 @@ def picture_part_blocks(
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
     row = np.arange(len(shown)) if row is None else row
     weight = np.ones(len(shown)) if weight is None else weight
-    held = 1 + 2 * len(np.unique(row)) / max(len(row), 1)  # rows for each pixel
+    held = 2 * len(np.unique(row)) / max(len(row), 1)  # rows for each pixel
+    held += tracer.gloss is not None
     size = max(256, int(BLOCK_BYTES / (8 * held * len(groups) * bins.size)))
     size = min(size, max(1, 2**31 // samples))
     time = numbered(shown)
@@ -146,23 +150,27 @@ def _block(
     pixels, time, row, weight = chosen
     rows, place = np.unique(row, return_inverse=True)
     n, b = len(pixels), len(rows)
-    shape = n + 2 * b, len(tracer.groups), bins.size
-    matrix = empty_sums(math.prod(shape))
+    own = n if tracer.gloss is not None else 0  # rows of what pixels show by gloss
+    shape = own + 2 * b, len(tracer.groups), bins.size
+    matrix, patches = empty_sums(math.prod(shape)), []
     eye, share = tracer.place(view.position), column(weight)
     number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
-    lit, again = column(n + place, mi.UInt32), dr.opaque(mi.UInt32, b)
+    lit, again = column(own + place, mi.UInt32), dr.opaque(mi.UInt32, b)
     path = column(pixels + time * view.width * view.height & 0xFFFFFFFF, mi.UInt32)
     places = pixel_places((int(time.max(initial=0)) + 1) * samples)
     for j in range(samples):
         dx, dy = places[time * samples + j].T
         directions, exists = pixel_rays(view, pixels, dx, dy)
+        way, exist = vectors(directions), column(exists, mi.Bool)
+        hit, patch, glazed = seen_patch(tracer, bins, eye, way, exist)
         add_picture_paths(
             tracer,
             bins,
             matrix,
             eye,
-            vectors(directions),
-            column(exists, mi.Bool),
+            way,
+            hit,
+            active=exist,
             row=dr.arange(mi.UInt32, dr.width(number)),
             lit=lit,
             later=lit + again,
@@ -172,9 +180,39 @@ def _block(
             generator=path_generator(path, batch_key(seed, j)),
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )
-        dr.eval(matrix)
+        patches.append(tables(dr.select(glazed, mi.Int32(patch), NO_PATCH), matrix)[0])
     sums = np.divide(sums_of(matrix, shape), samples, dtype=np.float32, casting="same_kind")
-    return PictureBlock(pixels, sums[:n], rows, sums[n : n + b], sums[n + b :])
+    seen = _shares(np.stack(patches), weight / samples, math.prod(shape[1:]))
+    if own:
+        seen = seen + sparse.csr_array(sums[:own].reshape(own, -1))
+    return PictureBlock(pixels, seen, rows, sums[own : own + b], sums[own + b :])
+
+
+def _shares(
+    patches: NDArray[np.int32], weight: NDArray[np.floating], columns: int
+) -> sparse.csr_array:
+    """What pixels [n] have of patches [n, columns] that their rays [samples, n] meet or do not."""
+    _, pixel = found = np.nonzero(patches != NO_PATCH)
+    entries = weight[pixel], (pixel, patches[found])
+    shares = sparse.coo_array(entries, shape=(len(weight), columns))
+    return sparse.csr_array(shares).astype(np.float32)
+
+
+def seen_patch(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    eye: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+) -> tuple[mi.PreliminaryIntersection3f, mi.UInt32, mi.Bool]:
+    """What rays meet first, and the patch of all windows that they show, where it is one."""
+    ray = mi.Ray3f(eye, direction)
+    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+    met = active & hit.is_valid()
+    group = dr.gather(mi.Int32, tracer.group, hit.prim_index, met)
+    glazed = met & (group != OPAQUE)
+    local = tracer.to_local(group, direction, glazed)
+    return hit, mi.UInt32(group) * mi.UInt32(bins.size) + bins.index(local), glazed & (local.z > 0)
 
 
 def add_picture_paths(
@@ -183,9 +221,10 @@ def add_picture_paths(
     matrix: mi.Float64,
     eye: mi.Point3f,
     direction: mi.Vector3f,
-    active: mi.Bool,
+    hit: mi.PreliminaryIntersection3f,  # of `seen_patch`
     *,
-    row: mi.UInt32,  # of what is seen
+    active: mi.Bool,  # as of that
+    row: mi.UInt32,  # of what gloss shows
     lit: mi.UInt32,  # row of what that reflects of the windows' light
     later: mi.UInt32,  # row of what comes after more reflections
     beta: mi.Float,  # weight of the path
@@ -194,23 +233,11 @@ def add_picture_paths(
     generator: mi.PCG32,
     max_depth: mi.UInt32,
 ) -> None:
-    """One path for each lane: L = 1 of the patch seen directly, else rho / pi E of the surface.
+    """One path for each lane: rho / pi E of the surface that is met, nothing of a patch.
 
     The three rows may be one.
     """
-    K = mi.UInt32(bins.size)
-    width = opaque(bins.size * len(tracer.groups), mi.UInt32)
-    ray = mi.Ray3f(eye, direction)
-    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active = active & hit.is_valid()
-    group = dr.gather(mi.Int32, tracer.group, hit.prim_index, active)
-
-    glazed = active & (group != OPAQUE)
-    local = tracer.to_local(group, direction, glazed)
-    glazed &= local.z > 0
-    slot = row * width + mi.UInt32(group) * K + bins.index(local)
-    dr.scatter_add(matrix, mi.Float64(beta), slot, glazed)
-
     position, face, reflectance = tracer.surface_at(hit, eye, direction, active)
     mirrors = mi.PCG32(generator)  # a copy: the loop changes what it is given
     add_view_paths(

@@ -150,6 +150,21 @@ def test_help_needs_no_heavy_imports() -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_threads_of_blas_do_not_wait_busily() -> None:
+    """OpenBLAS is told before NumPy is loaded, and what the user says of it stays."""
+    program = "import os, sys; from scenes import cli; print('numpy' in sys.modules); " + (
+        "import atexit; atexit.register(lambda: print(os.environ['OPENBLAS_THREAD_TIMEOUT'])); "
+        "cli.main(['--version'])"
+    )
+    for given, expected in (({}, "4"), ({"OPENBLAS_THREAD_TIMEOUT": "9"}, "9")):
+        environment = {k: v for k, v in os.environ.items() if k not in cli.BLAS_WAIT} | given
+        done = subprocess.run(
+            [sys.executable, "-c", program], env=environment, capture_output=True, text=True
+        )
+        said = done.stdout.split()
+        assert (said[0], said[-1]) == ("False", expected)
+
+
 def test_every_command_listed_can_be_loaded() -> None:
     context = click.Context(cli.cfs)
     for name in cli.cfs.list_commands(context):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +23,7 @@ from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import Workers
 from scenes.run.run import run_inputs, run_job
+from scenes.workers import Tasks
 from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, ROOM, SMALL
 from tests.scenes.test_equal_rooms import moved
@@ -157,3 +159,19 @@ def test_workers_of_a_cluster_give_what_one_process_gives(variant, tmp_path_fact
         np.testing.assert_array_equal(mine.daylight.illuminance, theirs.daylight.illuminance)
         np.testing.assert_array_equal(mine.heat.air_c, theirs.heat.air_c)
         assert not np.array_equal(seeded.daylight.illuminance, mine.daylight.illuminance)
+
+
+def threads(item: int) -> int:
+    import drjit as dr
+
+    return dr.thread_count()
+
+
+def fault(item: int, error: BaseException) -> BaseException:
+    return error
+
+
+def test_processes_beside_each_other_share_the_cores():
+    tasks = Tasks([0], threads, fault, key=str, scene=str)
+    expected = max((os.cpu_count() or 1) // 3, 1)
+    assert list(tasks.results(processes=3)) == [expected]

@@ -222,3 +222,17 @@ def test_states_of_a_cut_group_go_together():
     filled = PhaseSystems(traced, [[BsdfOptics(glass), BsdfOptics(half)]])
     lit = filled.light(twice).illuminance(np.array([[0, 1]]))
     np.testing.assert_allclose(lit[:, 1], 0.5 * lit[:, 0], rtol=1e-6)
+
+
+def test_few_paths_leave_few_parts():
+    """What parts put right is not to be less than the noise of D."""
+    from mitsuba_cfs.methods.subdivision import LIMIT, allowed
+
+    assert allowed(65_536) == allowed(16_384) == LIMIT and allowed(1_024) == pytest.approx(
+        4 * LIMIT
+    )
+    count = [
+        len(by_phases(overhang(1.0), patch_samples=n, sensor_samples=256)[2].parts.groups)
+        for n in (1_024, 16_384)
+    ]
+    assert 1 < count[0] < count[1]
