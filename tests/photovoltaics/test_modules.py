@@ -76,6 +76,39 @@ def test_free_flat_module_gets_the_global_horizontal_irradiance(variant, two_day
     assert found.diffuse_error < 0.01
 
 
+def test_free_upright_modules_have_the_sky_that_pvlib_gives_tilted_planes(variant, two_days):
+    """Perez 1990, as for the heat: of two modules back to back, 2 % of the diffuse light each."""
+    from pvlib import irradiance
+
+    from mitsuba_cfs.sky.matrix import sky_series
+    from mitsuba_cfs.sky.perez import SOLAR_CONSTANT, air_mass, eccentricity
+    from scenes.photovoltaics.irradiance import cell_irradiance
+
+    sheets = [
+        box("south", (0, 0, 5), (1, 0.04, 7)),
+        box("wall", (0, 0.05, 5), (1, 0.1, 7)),
+        box("north", (0, 0.11, 5), (1, 0.15, 7)),
+    ]
+    modules = pv_modules(sheets, frozenset({"south", "north"}))
+    found = cell_irradiance(sheets, modules, two_days)
+    series = sky_series(two_days, "solar")
+    sun, steps = series.sun[found.steps], found.steps
+    zenith = np.arccos(sun[:, 2])
+    direct, diffuse = series.direct_normal[steps], series.diffuse_horizontal[steps]
+    ground = 0.5 * 0.2 * series.global_horizontal[steps]
+    days = two_days.midpoints.day_of_year.to_numpy()[steps]
+    for number, module in enumerate(modules):
+        azimuth = module.azimuth_deg
+        sky = irradiance.perez(
+            90.0, azimuth, diffuse, direct, SOLAR_CONSTANT * eccentricity(days),
+            np.degrees(zenith), np.degrees(np.arctan2(sun[:, 0], sun[:, 1])), air_mass(zenith),
+            model="allsitescomposite1990",
+        )  # fmt: skip
+        beam = direct * np.maximum(sun @ module.normal, 0.0)
+        ours = found.plain[found.module == number].mean(axis=0)
+        assert abs((ours - beam - ground - sky).sum()) < 0.02 * diffuse.sum()
+
+
 def test_shade_of_a_black_fin_is_sharp_and_reflections_count(variant, two_days):
     from mitsuba_cfs.sky.matrix import sky_series
     from scenes.photovoltaics.irradiance import cell_irradiance
