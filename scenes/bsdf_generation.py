@@ -21,6 +21,7 @@ from mitsuba_cfs.bsdf.screens import (
     prism_panel,
     woven_screen,
 )
+from mitsuba_cfs.bsdf.shade_file import read_shade_file
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent
 
@@ -48,6 +49,9 @@ def generated_file(
         return fabric_file(fabrics=fabrics, fabric=fabric, basis=basis, name=name)
     if fabrics is not None or fabric is not None:
         raise click.UsageError("--fabrics and --fabric belong to --shape fabric")
+    product = options["product"]
+    if product is not None and options["shape"] != "product":
+        raise click.UsageError("--product belongs to --shape product")
     from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
 
     try:
@@ -79,7 +83,12 @@ def generated_file(
         merged = f"{100 * bound:.0f} % and three" if bound else "three"
         exact = f"{leaves} leaves, merged within {merged} standard errors of a cell's value"
     bands = dict(zip(("Visible", "Solar"), systems, strict=True))
-    return BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness), exact
+    file = BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness)
+    if product is not None:
+        shade = read_shade_file(product)
+        file = replace(file, name=name or shade.name, manufacturer=shade.manufacturer)
+        exact += f"\nas one of the layers of a .toml: {shade.thermal_layer()}"
+    return file, exact
 
 
 def fabric_file(
@@ -140,6 +149,7 @@ def layer_of_fabric(shade: FabricShade) -> tuple[str, tuple[str, ...]]:
 def described_layer(
     *,
     shape: str,
+    product: Path | None,
     geometry: Path | None,
     period_mm: tuple[float, float] | None,
     depth_mm: float | None,
@@ -155,6 +165,9 @@ def described_layer(
     roughness: float,
 ) -> PeriodicLayer:
     """The layer that the options of the command line describe, in two channels."""
+    if shape == "product":
+        _needed(shape, product=product)
+        return read_shade_file(product).layer()
     if shape == "radiance":
         _needed(shape, geometry=geometry, period_mm=period_mm)
         layer = read_radiance_layer(geometry, (period_mm[0] / 1000, period_mm[1] / 1000))

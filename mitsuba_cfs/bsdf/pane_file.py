@@ -74,7 +74,7 @@ def read_pane_file(path: str | PathLike[str]) -> PaneFile:
     text = _text(path)
     if text.lstrip().startswith("{") and '"' in text.lstrip()[:40]:
         document = _json(text, path)
-        return (_optical if is_optical_data(document) else _product)(document, path)
+        return (_optical if is_optical_data(document) else product_pane)(document, path)
     return _optics(text, path)
 
 
@@ -101,6 +101,11 @@ def read_glazing_layers(path: str | PathLike[str]) -> list[PaneFile]:
     if not panes:
         raise DataError("has no layers", file=path, field="layers")
     return panes
+
+
+def read_product_file(path: Path) -> dict[str, Any]:
+    """The table of an IGSDB product's JSON file."""
+    return _json(_text(path), path)
 
 
 def _text(path: Path) -> str:
@@ -137,13 +142,16 @@ def _optical(document: dict[str, Any], path: Path) -> PaneFile:
     )  # fmt: skip
 
 
-def _product(product: dict[str, Any], path: Path) -> PaneFile:
-    """A product of the IGSDB: its measured data, and what it states of daylight."""
+def product_pane(product: dict[str, Any], path: Path, *, material: bool = False) -> PaneFile:
+    """A product of the IGSDB: its measured data, and what it states of daylight.
+
+    Args: material: of a shade, whose sides are kept apart; else a pane is asked for.
+    """
     measured = product.get("measured_data")
     if not isinstance(measured, dict) or not measured:
         raise DataError("is no IGSDB product (measured_data)", file=path)
     kind = product.get("type") or "no type"
-    if kind in ("shading", "material") or measured.get("is_specular") is False:
+    if not material and (kind in ("shading", "material") or measured.get("is_specular") is False):
         raise DataError(f"expected a specular pane, got {kind}", file=path, field="type")
     if measured.get("thickness") is None and product.get("composition"):
         raise DataError("is a shade or a product of parts, not a pane", file=path)
@@ -161,7 +169,7 @@ def _product(product: dict[str, Any], path: Path) -> PaneFile:
     thickness = _stated(measured, "thickness", path)
     return PaneFile(
         path, str(product.get("name") or path.stem), _spectrum(rows, path),
-        _is_coated(product.get("coated_side")),
+        material or _is_coated(product.get("coated_side")),
         thickness=None if thickness is None else thickness / 1000.0,
         conductivity=_stated(measured, "conductivity", path),
         emissivity=(

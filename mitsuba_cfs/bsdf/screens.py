@@ -55,6 +55,32 @@ def woven_screen(
     return _with_hole(hole, rim, thickness, material, spacing)
 
 
+def thread_screen(
+    material: SlatMaterial, *, diameter: float, spacing: float, segments: int = 16
+) -> PeriodicLayer:
+    """Round upright threads before round level ones, on a square grid.
+
+    Args:
+        diameter: of a thread [m].
+        spacing: distance of the threads' axes [m].
+        segments: corners of the polygon that stands for a thread, as wide as it.
+    """
+    if not 0 < diameter < spacing:
+        raise ValueError(f"diameter: expected above 0 and below {spacing}, got {diameter}")
+    angle = 2 * np.pi * np.arange(segments) / segments
+    outline = diameter / 2 * np.stack([np.cos(angle), np.sin(angle)], -1)
+    edges = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+    level = extrude(edges + np.array([spacing / 2, -diameter / 2]), spacing)
+    upright = extrude(edges + np.array([spacing / 2, diameter / 2]), spacing)[..., [1, 0, 2]]
+    triangles = np.concatenate([level, upright])
+    # every triangle's front outdoors: of a thread's two halves these are the outside and the inside
+    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    inwards = np.cross(u, v)[:, 2] < 0
+    triangles[inwards] = triangles[inwards][:, ::-1]
+    kind = np.zeros(len(triangles), dtype=np.int64)
+    return PeriodicLayer(triangles, kind, (material,), (spacing, spacing))
+
+
 def _with_hole(
     hole: NDArray[np.float64],
     rim: NDArray[np.float64],

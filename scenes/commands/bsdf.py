@@ -22,7 +22,17 @@ from scenes.commands.room_options import seed_option
 
 INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
-SHAPES = ("venetian", "louvre", "perforated", "woven", "pleated", "prism", "radiance", "fabric")
+SHAPES = (
+    "venetian",
+    "louvre",
+    "perforated",
+    "woven",
+    "pleated",
+    "prism",
+    "radiance",
+    "fabric",
+    "product",
+)
 FILE = click.Path(path_type=Path)
 
 ANGLES = (Number(), Number())
@@ -207,6 +217,7 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option(
     "--index", type=Number(min=1), help="Refractive index of a prism panel; --tilt-deg its angle."
 )
+@click.option("--product", type=FILE, help="IGSDB's JSON of a shade, for --shape product.")
 @click.option("--fabrics", type=FILE, help="CSV of fabrics by EN 14501, for --shape fabric.")
 @click.option("--fabric", help="Name and colour of one of them, where it has several.")
 @click.option("--visible", type=SHARE, help="Colour (Radiance plastic), visible.")
@@ -231,7 +242,7 @@ def generate(out: Path, **options) -> None:
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
 
-    check_file(out, inputs=[options["geometry"], options["fabrics"]])
+    check_file(out, inputs=[options[name] for name in ("geometry", "product", "fabrics")])
     with ProgressBar() as progress:
         file, exact = generated_file(progress=progress, **options)
     write_bsdf_xml(file, out)

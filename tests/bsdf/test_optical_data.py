@@ -168,6 +168,8 @@ def test_what_is_no_pane_is_named(tmp_path, path, value, words):
     [
         ([point({"transmittance": 0.5}, {"wavelength": 500})], "500 nm.*reflectance"),
         ([point({"transmittance": 0.6}, {"integral": "solar"})], "near normal"),
+        ([point({"transmittance": 0.6, "reflectance": 0.1}, {"wavelength": 500}, 60.0)],
+         "near normal"),
         ([point({"transmittance": 0.6, "reflectance": 0.1}, {"wavelength": 500}),
           point({"transmittance": 0.2}, {"wavelength": 500}, emergence={"polar": 8})],
          "scatters 0.40"),
