@@ -43,7 +43,7 @@ SOLVERS = tuple(
         "window_reflection",
     )
 )  # fmt: skip
-IFC = ("bim/ifc/", "scenes/demo/", "scenes/evidence/validation/")
+IFC = ("bim/ifc/", "scenes/demo/", "scenes/evidence/")
 PLOTTING = ("scenes/",)
 LIMITED = {
     "mitsuba": TRACING,

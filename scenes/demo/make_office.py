@@ -42,7 +42,7 @@ NAMESPACE = uuid.UUID("6f0b5f0e-9d1c-4c57-8f5b-5a3c2c0d7a11")  # of the repeatab
 def office() -> ifcopenshell.file:
     """The whole model; the same entities with the same GlobalIds at every call."""
     model = ifcopenshell.api.project.create_file(version="IFC4")
-    storey, body, axis = _project(model)
+    storey, body, axis = project(model)
     parts = Office(model, storey, body, axis)
     _structure(parts)
     _openings(parts)
@@ -51,7 +51,8 @@ def office() -> ifcopenshell.file:
     return model
 
 
-def _project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ...]:
+def project(model: ifcopenshell.file) -> tuple[ifcopenshell.entity_instance, ...]:
+    """The ground floor and the contexts of bodies and axes of a project on the demo's site."""
     create = ifcopenshell.api.root.create_entity
     project = create(model, ifc_class="IfcProject", name="mitsuba-cfs demo office")
     units = [

@@ -35,10 +35,16 @@ REVEAL = 0.20  # from the wall's inner face to the frame: in the insulation's pl
 class Office:
     """One storey being furnished with building elements; all lengths in metres."""
 
-    def __init__(self, model: ifcopenshell.file, storey: Entity, body: Entity, axis: Entity):
-        """Add to this storey, with bodies and axes in these contexts."""
+    def __init__(
+        self, model: ifcopenshell.file, storey: Entity, body: Entity, axis: Entity,
+        *, palette: Palette | None = None,
+    ) -> None:  # fmt: skip
+        """Add to this storey, with bodies and axes in these contexts; heights from its elevation.
+
+        Args: palette: of a storey made before, where there is one.
+        """
         self._model, self._storey, self._body, self._axis = model, storey, body, axis
-        self._palette = Palette(model)
+        self.palette = Palette(model) if palette is None else palette
         self._walls: dict[str, tuple[Entity, NDArray[np.float64], float]] = {}
 
     def slab(self, name: str, layers: str, outline: tuple[Point, ...], z: float, style: str):
@@ -191,13 +197,14 @@ class Office:
         return made
 
     def _place(self, product: Entity, frame: NDArray[np.float64]) -> None:
-        ifcopenshell.api.geometry.edit_object_placement(self._model, product=product, matrix=frame)
+        placed = _shift(0.0, 0.0, self._storey.Elevation or 0.0) @ frame
+        ifcopenshell.api.geometry.edit_object_placement(self._model, product=product, matrix=placed)
 
     def _layered(self, product: Entity, layers: str, direction: str) -> None:
         """The layer set, from the reference line in the positive direction."""
         ifcopenshell.api.material.assign_material(
             self._model, products=[product], type="IfcMaterialLayerSetUsage",
-            material=self._palette.layer_set(layers),
+            material=self.palette.layer_set(layers),
         )  # fmt: skip
         usage = product.HasAssociations[0].RelatingMaterial
         usage.LayerSetDirection, usage.DirectionSense = direction, "POSITIVE"
@@ -210,7 +217,7 @@ class Office:
         for name, substance in parts.items():
             ifcopenshell.api.material.add_constituent(
                 self._model, constituent_set=constituents, name=name,
-                material=self._palette.material(substance),
+                material=self.palette.material(substance),
             )  # fmt: skip
         ifcopenshell.api.material.assign_material(
             self._model, products=[product], type="IfcMaterialConstituentSet",
@@ -235,7 +242,7 @@ class Office:
         for solid, style in solids:
             if style is not None:
                 ifcopenshell.api.style.assign_item_style(
-                    model, item=solid, style=self._palette.style(style)
+                    model, item=solid, style=self.palette.style(style)
                 )
 
     def _extruded(self, outline: tuple[Point, ...], height: float, z: float = 0.0) -> Entity:

@@ -1,0 +1,47 @@
+"""The generated tower: every room closed, with its windows, its doors and the storey above."""
+
+from __future__ import annotations
+
+import pytest
+
+from bim.ifc.building import read_ifc
+from bim.shell import open_edges
+from scenes.demo.make_office import HEIGHT
+from scenes.evidence.benchmarks.tower import NORTH, ROOMS, SOUTH, tower
+
+
+@pytest.fixture(scope="module")
+def model():
+    return tower(20)
+
+
+def test_each_storey_has_ten_rooms_eleven_windows_and_nine_doors(model):
+    counts = [len(model.by_type(f"Ifc{name}")) for name in ("Space", "Window", "Door", "Slab")]
+    assert counts == [20, 22, 18, 3]
+    low, high = (storey.Elevation for storey in model.by_type("IfcBuildingStorey"))
+    assert (low, high) == (0.0, pytest.approx(HEIGHT + 0.38))
+
+
+@pytest.mark.parametrize("rooms", [0, 7, -10])
+def test_half_a_storey_is_refused(rooms):
+    with pytest.raises(ValueError, match="a multiple of 10 rooms"):
+        tower(rooms)
+
+
+@pytest.mark.slow
+def test_rooms_are_closed_and_border_on_each_other(model, tmp_path):
+    model.write(str(tmp_path / "tower.ifc"))
+    building = read_ifc(tmp_path / "tower.ifc")
+    assert len(building.spaces) == 2 * ROOMS
+    assert [open_edges(space.shell) for space in building.spaces] == [0] * 20
+    assert building.account.share_used == pytest.approx(1.0)
+    storeys = [[s for s in building.spaces if s.storey == name] for name in ("Ground floor",
+               "Storey 1")]  # fmt: skip
+    for below, above in zip(*storeys, strict=True):
+        ceilings = [face for face in below.faces if face.normal[2] > 0.9 and face.area > 1.0]
+        assert {face.neighbour for face in ceilings} == {above.guid}
+        (windows,) = {len(below.windows), len(above.windows)}
+        assert windows == (2 if below.long_name == "Corridor" else 1)
+    hall = storeys[0][-1]
+    doors = {face.neighbour for face in hall.faces if face.kind == "door"}
+    assert len(doors) == SOUTH + NORTH
