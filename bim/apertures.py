@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bim.colours import GREY, Colour
 from bim.defaults import FRAME_FRACTION
 from bim.model import Problem
-from bim.planes import Plane, area_vectors, plane_through, polygons_of
+from bim.planes import Plane, area_vectors, plane_through, polygons_of, without_slits
 
 FLAT = 0.95  # cosine: panes within 18 degrees of the main direction are in its plane
 SMALLEST_PANE = 0.01  # less glass than this is a spy hole, not a window [m2]
@@ -181,8 +181,7 @@ def shadow(triangles: NDArray[np.float64], plane: Plane) -> shapely.Geometry:
     covering = np.abs(vectors[0][:, 0] * vectors[1][:, 1] - vectors[0][:, 1] * vectors[1][:, 0])
     polygons = shapely.polygons(flat[covering > 1e-9])
     merged = shapely.union_all(shapely.set_precision(polygons, 1e-6))
-    closed = merged.buffer(PANE_JOINT / 2, join_style="mitre")
-    return _polygonal(closed.buffer(-PANE_JOINT / 2, join_style="mitre").simplify(OUTLINE))
+    return _polygonal(without_slits(merged, PANE_JOINT).simplify(OUTLINE))
 
 
 def _polygonal(geometry: shapely.Geometry) -> shapely.Geometry:

@@ -24,6 +24,7 @@ NO_EMISSION = 1e-4  # EnergyPlus takes no 0: of the faces to the gap, whose resi
 GAPS = 3  # in every state: EnergyPlus switches between equals only
 TYPICAL = 10.0, 15.0  # mean of the layers [degC] and difference [K] where R is read: EN 673
 AIR = 2.873e-3 + 7.76e-5 * (TYPICAL[0] + 273.15)  # conductivity [W/(m K)], ISO 15099 annex B
+WARMER_AIR = 7.76e-5 / AIR  # by which it rises [1/K]
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,8 @@ def outer_faces(building: Building, space: Space, room: ThermalRoom) -> OuterFac
 
     A face in the room is followed outwards through the element that it belongs to, or by the
     thickness of its layers where nothing of that element is drawn, and on through what touches it
-    and lies along it, as a cladding does; not through eaves, a balcony or a wall that stands out.
+    or begins within its layers and lies along it, as a cladding or the outer leaf beyond a cavity
+    does; not through eaves, a balcony or a wall that stands out.
     """
     walls = _NearElements(building.elements, space)
     points, depths = [], []
@@ -119,7 +120,8 @@ class _NearElements:
             further = (triangle >= 0) & (distance > deep + 1e-6)
             leaving = self.normals[triangle] @ normal > 0  # a solid that began before
             along = self._along(met[: number + 1], normal, narrowest)
-            going &= ~further | np.where(leaving, along, distance <= deep + TOUCHING)
+            belongs = distance <= np.maximum(deep + TOUCHING, thickness)
+            going &= ~further | np.where(leaving, along, belongs)
             deep = np.where(further & going, distance, deep)
         return deep
 

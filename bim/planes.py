@@ -115,6 +115,12 @@ def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     return [part for part in parts if part.geom_type == "Polygon" and part.area > SMALLEST_AREA]
 
 
+def without_slits(geometry: shapely.Geometry, width: float) -> shapely.Geometry:
+    """A polygon or several with the gaps and notches up to this width filled [m]."""
+    wider = geometry.buffer(width / 2, join_style="mitre")
+    return wider.buffer(-width / 2, join_style="mitre")
+
+
 def rings_of(polygon: shapely.Polygon) -> list[NDArray[np.float64]]:
     """Open rings [N, 2]: the outer one counter-clockwise, then the holes clockwise."""
     oriented = shapely.orient_polygons(polygon)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bim.apertures import Aperture
 from bim.model import Problem
-from bim.planes import GRID, Facet, Plane, planar_facets, polygons_of
+from bim.planes import GRID, Facet, Plane, planar_facets, polygons_of, without_slits
 from bim.solids import prism, triangles_of, union
 
 REACH = 1.0  # a room's face this far inside the glazing plane still belongs to the window [m]
@@ -21,6 +21,7 @@ FACING = 0.3  # cosine between window and face: up to 72 degrees for roof window
 SMALLEST_SHARE = 0.05  # of the opening: a smaller part before a room is drawing noise
 FLUSH = 0.005  # recesses shallower than this are none [m]
 OVERLAP = 0.001  # the recess enters the room this far, so that the union leaves no slit [m]
+SLIT = 1e-5  # halves of a region nearer than this are one: ten times what solids weld [m]
 THIN = 0.002  # pieces thinner than this are not cut off [m]
 
 
@@ -165,7 +166,12 @@ def _seen_from(aperture: Aperture, facet: Facet) -> tuple[float, float, shapely.
 def room_pieces(
     room: RoomSolid, attachments: Sequence[Attachment]
 ) -> tuple[list[Piece], float, list[Problem]]:
-    """Pieces that close the room's air, its volume [m3], and what had to be changed."""
+    """Pieces that close the room's air, its volume [m3], and what had to be changed.
+
+    A slit as thin as rounding in a region, as faces leave it that meet behind one window, is
+    closed: the union of solids has lost the half of the glass beside one.
+    """
+    attachments = [replace(a, region=without_slits(a.region, SLIT)) for a in attachments]
     problems: list[Problem] = []
     recesses: dict[int, Attachment] = {}
     painted: list[Attachment] = []

@@ -17,6 +17,7 @@ DEEPEST_WALL = 1.5  # beyond this nothing belongs to the wall any more [m]
 WIDEST_GAP = 0.6  # air between the parts of one wall or ceiling [m]
 PARALLEL = 0.9  # least |cosine| to a wall's normal of what lies behind its first element: no eaves
 UPRIGHT = 0.5  # most |cosine| of a wall's normal to the vertical
+PLUMB = 0.05  # and of one that stands upright: 3 degrees
 INSIDE = 0.02  # rays start this far inside the room: faces drawn into the wall [m]
 OPPOSITE = -0.98  # cosine between faces of two rooms that share a wall: 11 degrees
 OPEN_SKY = 0.1  # share of rays that escape where a wall faces the open air
@@ -195,7 +196,8 @@ def _spans(
     """Entries and exits paired by element, until a gap too wide for one wall; t from the face.
 
     What a wall's ray meets aslant behind the first element is the roof over the wall or its
-    rafters, not a cladding; over a ceiling it is the roof that closes the attic.
+    rafters, not a cladding, but for an upright wall that runs aslant behind another one; over a
+    ceiling it is the roof that closes the attic.
     """
     open_at: dict[int, tuple[float, int]] = {}
     spans: list[Span] = []
@@ -227,17 +229,18 @@ def _spans(
     for span in spans:
         if span.start - reach > WIDEST_GAP:
             break
-        if kept and abs(normal[2]) < UPRIGHT and not _parallel(span, around, normal):
+        if kept and abs(normal[2]) < UPRIGHT and not _may_clad(span, around, normal):
             continue
         kept.append(span)
         reach = max(reach, span.stop)
     return tuple(kept)
 
 
-def _parallel(span: Span, around: Surroundings, normal: NDArray[np.float64]) -> bool:
-    """Whether the face that a ray meets first of an element is parallel to the wall."""
+def _may_clad(span: Span, around: Surroundings, normal: NDArray[np.float64]) -> bool:
+    """Whether the face that a ray meets first of an element is parallel to the wall, or upright."""
     (vector,) = area_vectors(around.elements.triangles[[span.triangle]])
-    return bool(abs(vector @ normal) > PARALLEL * np.linalg.norm(vector))
+    unit = vector / np.linalg.norm(vector)
+    return bool(abs(unit @ normal) > PARALLEL or abs(unit[2]) < PLUMB)
 
 
 def _layered(met: list[int], leaves: NDArray[np.bool_]) -> dict[int, tuple[int, int]]:

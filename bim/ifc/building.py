@@ -22,7 +22,7 @@ from bim.ifc.defects import model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.found_rooms import found_rooms
 from bim.ifc.furniture import furnished
-from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms
+from bim.ifc.glass_of_rooms import apertures_in, glass_of_rooms, lost_glass
 from bim.ifc.joining import joined_rooms
 from bim.ifc.map_conversion import map_georeference
 from bim.ifc.passages import Passage, open_apertures
@@ -93,6 +93,7 @@ def read_ifc(
         found, more = _space(index, boundary, records, around, elements=elements, finishes=finishes)
         spaces += found
         problems += more
+    problems += lost_glass(attached, spaces)
     problems += boundary_problems(source, spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
     problems += more

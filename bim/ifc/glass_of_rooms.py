@@ -23,7 +23,7 @@ from bim.ifc.project import storey_of
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.ifc.transparent import PHANTOM, is_phantom
-from bim.model import SHUT_ADVICE, Problem
+from bim.model import SHUT_ADVICE, Problem, Space
 from bim.names import plain_text
 from bim.planes import plane_through, polygons_of, triangulated
 from bim.rays import RayMesh
@@ -34,6 +34,7 @@ SMALLEST_OPENING = 0.1  # smaller ones are for ducts [m2]
 DOOR_SILL, DOOR_WIDTH = 0.3, 1.3  # an opening to the floor up to this width is a door [m]
 ASIDE = 0.5  # points asked on both sides of glass lie this far from it [m]
 CLEAR_WAY = 1.0  # an opening goes through where nothing stands in it this far to both sides [m]
+LEAST_LOST = 0.01  # share of a pane from which on what is missing is said
 TALLEST_GAP = 30.0  # between the top of a room and glass above it [m]
 DOOR_NAME = re.compile(r"\b(tur|tuer|door|porte?|deur|puerta|porta|ajto|drzwi|dvere|ovi)", re.I)
 NOT_FILLED = "IfcOpeningElement"
@@ -101,6 +102,28 @@ def glass_of_rooms(
     )  # fmt: skip
 
 
+def lost_glass(attachments: Sequence[Attachment], spaces: Sequence[Space]) -> list[Problem]:
+    """Glass before a room that is no window of the finished room; rooms left out say so themselves.
+
+    None is known: the last net under the cutting of solids.
+    """
+    problems = []
+    for space in spaces:
+        windows: dict[str, float] = {}
+        for window in space.windows:
+            windows[window.guid] = windows.get(window.guid, 0.0) + window.area
+        for one in attachments:
+            if one.room != space.guid or one.neighbour is not None or one.glass.is_empty:
+                continue
+            filling, area = one.aperture.filling, one.glass.area
+            lost = area - windows.get(filling.guid, 0.0)
+            if lost > LEAST_LOST * area:
+                what = f"{filling.ifc_class} {filling.name}: {lost:.2f} m2 before {space.label}"
+                done = "are no window of it: that part gives no daylight"
+                problems.append(Problem(filling.guid, what, done, glass=lost, kind="lost glass"))
+    return problems
+
+
 def _real(found: list[Attachment], problems: list[Problem]) -> list[Attachment]:
     """Attachments without the glass of floors: walls and slabs that face down."""
     real = []
@@ -145,7 +168,11 @@ def _account(
 def _inner_point(
     aperture: Aperture, found: Sequence[Attachment], building: RayMesh
 ) -> NDArray[np.float64] | None:
-    """A point [3] indoors behind the glass without a room; None where it does not look out."""
+    """A point [3] indoors behind the glass without a room; None where it does not look out.
+
+    Where both sides are shut in, as below a canopy, the rest of a pane looks out as the part of it
+    that a room has.
+    """
     left = aperture.glass
     for one in found:
         turned = one.aperture.plane.normal @ aperture.plane.normal < 0
@@ -157,9 +184,13 @@ def _inner_point(
     middle = shapely.get_coordinates(shapely.point_on_surface(left))
     point, normal = aperture.plane.to_world(middle)[0], aperture.plane.normal
     open_sides = [is_open(point + s * ASIDE * normal, s * normal, building) for s in (1.0, -1.0)]
-    if open_sides[0] == open_sides[1]:  # within the building, or free-standing outdoors
+    out = open_sides[0] - open_sides[1]
+    if not any(open_sides):
+        sides = [a.aperture.plane.normal @ normal for a in found if a.neighbour is None]
+        out = min(sides, default=0) if min(sides, default=0) == max(sides, default=0) else 0
+    if out == 0:  # within the building, or free-standing outdoors
         return None
-    return point + (-ASIDE if open_sides[0] else ASIDE) * normal
+    return point - np.sign(out) * ASIDE * normal
 
 
 def _room_below(

@@ -1,4 +1,4 @@
-"""Files of panes: Optics (IGDB) text, products of the IGSDB, layers of a glazing system (JSON)."""
+"""Files of panes: Optics (IGDB) text, IGSDB products, optical data, glazing systems (JSON)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.en410 import visible_value
 from mitsuba_cfs.bsdf.glazing import Pane
+from mitsuba_cfs.bsdf.optical_data import is_optical_data, optical_data_of
 from mitsuba_cfs.errors import DataError
 
 FloatArray = NDArray[np.float64]
@@ -65,14 +66,15 @@ class PaneFile:
 
 
 def read_pane_file(path: str | PathLike[str]) -> PaneFile:
-    """The pane of an Optics (IGDB) text file or of an IGSDB product's JSON file.
+    """The pane of an Optics (IGDB) text file, an IGSDB product's or an optical data JSON file.
 
     Raises: `DataError` that names the file and what is missing.
     """
     path = Path(path)
     text = _text(path)
     if text.lstrip().startswith("{") and '"' in text.lstrip()[:40]:
-        return _product(_json(text, path), path)
+        document = _json(text, path)
+        return (_optical if is_optical_data(document) else _product)(document, path)
     return _optics(text, path)
 
 
@@ -116,6 +118,23 @@ def _json(text: str, path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise DataError("expected a table of a product", file=path)
     return data
+
+
+def _optical(document: dict[str, Any], path: Path) -> PaneFile:
+    """The pane of building-envelope-data's optical data."""
+    data = optical_data_of(document, path)
+    spectrum = _spectrum(data.rows, path)
+    if not len(spectrum) and data.visible is None:
+        message = "has no transmittance and reflectance near normal incidence"
+        raise DataError(message, file=path, field="dataPoints")
+    return PaneFile(
+        path, data.name or path.stem, spectrum, data.coated,
+        thickness=None if data.thickness_mm is None else data.thickness_mm / 1000.0,
+        conductivity=data.conductivity,
+        emissivity=data.emissivity,
+        infrared_transmittance=data.infrared_transmittance,
+        visible=data.visible,
+    )  # fmt: skip
 
 
 def _product(product: dict[str, Any], path: Path) -> PaneFile:

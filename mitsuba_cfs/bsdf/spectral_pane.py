@@ -50,19 +50,24 @@ class SpectralPane:
         )  # fmt: skip
 
 
-def read_spectral_pane(path: str | PathLike[str]) -> SpectralPane:
+def read_spectral_pane(
+    path: str | PathLike[str], *, thickness: float | None = None
+) -> SpectralPane:
     """The pane of a file, see `pane_file.read_pane_file`.
+
+    Args: thickness: [m] where the file states none.
 
     Raises: `DataError` that names the file and what is missing.
     """
     file = read_pane_file(path)
     if not len(file.spectrum):
         raise DataError("holds no spectrum", file=file.path, field="spectral_data")
-    if not file.thickness:
+    thickness = file.thickness or thickness
+    if not thickness:
         raise DataError("states no thickness", file=file.path)
     front, back = (EMISSIVITY if e is None else e for e in file.emissivity)
     return SpectralPane(
-        file.name, *file.spectrum.T, file.thickness, file.conductivity or 1.0, (front, back),
+        file.name, *file.spectrum.T, thickness, file.conductivity or 1.0, (front, back),
         file.infrared_transmittance or 0.0, file.coated,
     )  # fmt: skip
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,26 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 
 FloatArray = NDArray[np.float64]
+T = TypeVar("T")
+
+
+def hours_by_season(
+    each: Sequence[T], season: NDArray[np.int64]
+) -> list[tuple[T, NDArray[np.int64]]]:
+    """What each season has, with its hours; seasons without hours are left out.
+
+    Where there are no hours at all, the first season with none. Args: season: [L] of each hour.
+    """
+    parts = [(one, np.flatnonzero(season == i)) for i, one in enumerate(each)]
+    return [(one, hours) for one, hours in parts if len(hours)] or parts[:1]
+
+
+def in_order_of_hours(parts: Sequence[tuple[FloatArray, NDArray[np.int64]]]) -> FloatArray:
+    """Values [.., L] of all hours from those of each season [.., l] and its hours [l]."""
+    found = np.zeros((*parts[0][0].shape[:-1], sum(len(hours) for _, hours in parts)))
+    for values, hours in parts:
+        found[..., hours] = values
+    return found
 
 
 class SeasonalLight:
@@ -110,19 +130,17 @@ class SeasonalLight:
 
     def parts(self) -> list[tuple[Any, NDArray[np.int64]]]:
         """The light of the seasons that have hours among the sky's, and these."""
-        hours = [np.flatnonzero(self.season == i) for i in range(len(self.lights))]
-        return [(own, some) for own, some in zip(self.lights, hours, strict=True) if len(some)]
+        return hours_by_season(self.lights, self.season)
 
     def _merged(
         self, of_season: Callable[[Any, State], FloatArray], state: State | None
     ) -> FloatArray:
         """Values [.., L] of all hours, each by the light of its season."""
         rows = self._rows(state)
-        parts = [(of_season(light, rows[:, hours]), hours) for light, hours in self.parts()]
-        found = np.zeros((*parts[0][0].shape[:-1], len(self.sky.lit)))
-        for values, hours in parts:
-            found[..., hours] = values
-        return found
+        parts = self.parts()
+        return in_order_of_hours(
+            [(of_season(light, rows[:, hours]), hours) for light, hours in parts]
+        )
 
 
 def paths_of(

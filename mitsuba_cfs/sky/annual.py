@@ -19,6 +19,7 @@ from mitsuba_cfs.sky.matrix import (
     sky_series,
 )
 from mitsuba_cfs.sky.sun import is_up, sun_directions
+from mitsuba_cfs.sky.three_part import three_part
 from mitsuba_cfs.sky.weather import Weather
 
 NO_SUN = "the sky was made without the sun alone: annual_sky(sun=True)"
@@ -98,7 +99,7 @@ def annual_sky(
         towards = sun_directions(weather, model=sun_model)
     place: dict[str, Any] = {"towards": towards, "rotation_deg": rotation_deg}
     visible = sky_series(weather, **place)
-    radiance = sky_series(weather, "solar", **place) if solar else None
+    radiance = three_part(sky_series(weather, "solar", **place)) if solar else None
     return _of_series(
         visible, radiance, subdivision, hours, sun=sun, reflectance=weather.albedo, ground=ground
     )
@@ -129,7 +130,7 @@ def given_sky(
     given = direction, direct_normal, diffuse_horizontal
     moment: dict[str, Any] = {"day_of_year": day_of_year, "dew_point_c": dew_point_c}
     visible = given_series(*given, **moment)
-    radiance = given_series(*given, "solar", **moment) if solar else None
+    radiance = three_part(given_series(*given, "solar", **moment)) if solar else None
     return _of_series(
         visible,
         radiance,

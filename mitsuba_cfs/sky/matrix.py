@@ -239,16 +239,20 @@ def series_matrix(
             block[0] = series.ground(h, ground_reflectance, ground)
             block[1:] = series.patches(sky, h)
         if parts != "sky":
-            _add_sun(block, sky, series.sun[h], series.direct_normal[h], sun_patches)
+            add_sun(block, sky, series.sun[h], series.direct_normal[h], sun_patches)
         result[:, columns] = block
         progress("sky matrix", (start + len(columns)) / len(lit))
     return result
 
 
-def _add_sun(
-    block: FloatArray, sky: ReinhartSky, sun: FloatArray, direct: FloatArray, count: int
+def add_sun(
+    block: FloatArray,
+    sky: ReinhartSky,
+    sun: FloatArray,
+    direct: FloatArray,
+    count: int = SUN_PATCHES,
 ) -> None:
-    """Add the direct sun [h] to its `count` nearest patches of `block` [P, h]."""
+    """Add light [h] normal to the sun to its `count` nearest patches of `block` [P, h]."""
     if not 1 <= count < sky.size:
         raise ValueError(f"sun_patches: expected 1 or more, got {count}")
     cosine = sky.directions[1:] @ sun.T

@@ -15,6 +15,8 @@ from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, replacing, write_table
+from scenes.commands.bsdf_interpolation import interpolate
+from scenes.commands.bsdf_options import Number, basis_option, cull_option, tensor_tree_option
 from scenes.commands.bsdf_thermal import thermal
 from scenes.commands.room_options import seed_option
 
@@ -22,18 +24,6 @@ INFO_ANGLES_DEG = (0, 10, 20, 30, 40, 50, 60, 70, 80)
 INFO_SIDES = {"sky": 90.0, "right": 0.0, "ground": -90.0, "left": 180.0}  # where the light is
 SHAPES = ("venetian", "louvre", "perforated", "woven", "pleated", "prism", "radiance", "fabric")
 FILE = click.Path(path_type=Path)
-
-
-class Number(click.FloatRange):
-    """A finite number within bounds."""
-
-    def convert(self, value, param, ctx) -> float:
-        """The number; a usage error where it is none."""
-        number = super().convert(value, param, ctx)
-        if not np.isfinite(number):
-            self.fail(f"{value!r} is not a finite number.", param, ctx)
-        return number
-
 
 ANGLES = (Number(), Number())
 LENGTH, SHARE = Number(min=0, min_open=True), Number(0, 1)
@@ -49,6 +39,7 @@ def command() -> None:
 
 
 command.add_command(thermal)
+command.add_command(interpolate)
 
 
 @command.command()
@@ -222,13 +213,10 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option("--solar", type=SHARE, help="Colour, solar; the visible's without.")
 @click.option("--specular", type=SHARE, default=0.0)
 @click.option("--roughness", type=Number(min=0), default=0.0)
-@click.option("--basis", type=click.Choice(["full", "half", "quarter"]), default="full")
-@click.option("--tensor-tree", type=click.IntRange(1, 6), help="4^N cells a hemisphere instead.")
+@basis_option
+@tensor_tree_option
 @click.option("--isotropic", is_flag=True, help="Tensor tree of rank 3: the mean over azimuths.")
-@click.option(
-    "--cull", type=Number(0, 1, max_open=True), default=0.9,
-    help="Share of a tree's cells to merge away.",
-)  # fmt: skip
+@cull_option
 @click.option(
     "--paths", type=click.IntRange(min=1), default=32_768, help="For each direction and side."
 )

@@ -118,7 +118,7 @@ class GlazingLayerTable(TomlTable):
 
     def spectral(self) -> SpectralPane:
         """The pane of the file, as it is turned."""
-        pane = read_spectral_pane(self.pane)
+        pane = read_spectral_pane(self.pane, thickness=self.thickness)
         return pane.turned() if self.turned else pane
 
     def _of_file(self) -> GlazingLayer:

@@ -164,6 +164,8 @@ def _heat(result: RunResult) -> str:
         "The daylight matrix in the solar band gives the solar radiation passing into the room and "
         "absorbed in the window, whose two layers take and give heat by its U and g (Kuhn's "
         "Blackbox).",
+        "The sky of heat has three parts with the irradiances that Perez found on tilted planes: "
+        "an even dome, light around the sun and a band at the horizon.",
         "A balance of the room's surfaces and air every ten minutes, with the gains, outdoor air "
         "and set points of the operation file, gives temperatures."
         if any(room.operation is not None for room in result.spaces)

@@ -137,7 +137,10 @@ def _warmth(result: RunResult) -> str:
     if not rooms:
         return said("Temperatures were not computed.")
     hours = [_warm_hours(room) for room in rooms]
-    room, warm = max(zip(rooms, hours, strict=True), key=lambda one: one[1].sum())
+    room, warm = max(  # of rooms too warm in as many hours, the hottest
+        zip(rooms, hours, strict=True),
+        key=lambda one: (one[1].sum(), one[0].heat.operative_c.max()),
+    )
     if not warm.any():
         none = said("No occupied hour is above {limit} °C.", limit=f"{WARM_C:.0f}")
         return f"{none} {heated(room)}"

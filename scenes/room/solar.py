@@ -15,6 +15,7 @@ from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.gloss import Gloss
 from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
+from mitsuba_cfs.methods.seasonal_light import hours_by_season, in_order_of_hours
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import Surfaces
@@ -49,8 +50,8 @@ class SeasonalOutdoors:
     season: NDArray[np.int64]  # [L] of each lit hour
 
     def parts(self) -> list[tuple[PhaseScene, NDArray[np.int64]]]:
-        """The scene of each season with its hours among the lit ones."""
-        return [(one, np.flatnonzero(self.season == i)) for i, one in enumerate(self.scenes)]
+        """The scene of each season that has some of the lit hours, with these."""
+        return hours_by_season(self.scenes, self.season)
 
 
 class RoomSun:
@@ -100,12 +101,12 @@ class RoomSun:
 
     def _by_season(self, of_season: Callable[[PhaseScene, FloatArray], FloatArray]) -> FloatArray:
         """Values [.., L] of all lit hours, from the scene and the sky [P, l] of each season."""
-        parts = self.seasons.parts()
+        parts, sky = self.seasons.parts(), self.skies.solar
         if len(parts) == 1:
-            return of_season(parts[0][0], self.skies.solar)
-        found = [of_season(scene, self.skies.solar[:, hours]) for scene, hours in parts]
-        order = np.argsort(np.concatenate([hours for _, hours in parts]))
-        return np.concatenate(found, axis=-1)[..., order]
+            return of_season(parts[0][0], sky)
+        return in_order_of_hours(
+            [(of_season(scene, sky[:, hours]), hours) for scene, hours in parts]
+        )
 
     @property
     def irradiance(self) -> FloatArray:

@@ -60,3 +60,13 @@ def test_over_a_ceiling_the_slanting_roof_closes_the_attic():
     steep = body((-1.0, -1.0, 2.0), (5.0, 6.0, 2.2), 0.6)
     assert met_behind(UP, ceiling, roof) == ([0, 1], "outside")
     assert met_behind(UP, ceiling, steep)[0] == [0, 1]
+
+
+def test_an_upright_wall_that_runs_aslant_behind_another_is_its_layer():
+    """At 45 degrees the corner of a facade closes the wedge of air behind a panel."""
+    panel = body((-1.0, -0.1, -0.2), (5.0, 0.0, 4.0))
+    facade = body((-6.0, -0.15, -0.2), (10.0, 0.15, 4.0))
+    turn = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, np.sqrt(2)]]) / np.sqrt(2)
+    facade = facade @ turn.T + np.array([2.0, -0.45, 0.0])
+    elements, beyond = met_behind(SOUTH, panel, facade)
+    assert (elements, beyond) == ([0, 1], "outside")

@@ -63,6 +63,16 @@ def test_a_wall_inside_another_solid_comes_out_of_it():
     assert front(slab("room-front", 0.0, 0.2), slab("other", 0.1, 0.5))[0] == pytest.approx(0.5)
 
 
+def test_the_outer_leaf_beyond_the_cavity_of_its_layers_is():
+    """The box's layers are 0.39 m thick: what begins within them is one of them."""
+    thickness = front()[0]
+    inner = slab("room-front", 0.0, 0.1)
+    leaf = slab("leaf", thickness - 0.1, thickness)
+    assert front(inner, leaf)[0] == pytest.approx(thickness)
+    beyond = slab("leaf", thickness + 0.1, thickness + 0.2)
+    assert front(inner, beyond)[0] == pytest.approx(0.1)
+
+
 def test_a_plate_of_the_box_stands_out_of_its_line():
     (plate,) = shoebox(4, 5, 3, plates=[Plate((0, 3), (4, 3), 1.5)], recess=0.2).elements
     assert np.ptp(plate.triangles[..., 1]) == pytest.approx(1.5)

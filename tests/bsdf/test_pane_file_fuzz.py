@@ -31,7 +31,19 @@ LAYERS = {
          "spectral_data": {str(1000 * row[0]): row[1:] for row in ROWS}}
     ]
 }  # fmt: skip
+OPTICAL = {
+    "data": [
+        {"componentCharacteristics": {"surface": side},
+         "dataPoints": [
+            {"incidence": {"direction": {"polar": 8}, "wavelengths": {"wavelength": 1000 * nm}},
+             "emergence": {"direction": "hemispherical"},
+             "results": {"transmittance": t, "reflectance": f}} for nm, t, f, _ in ROWS]}
+        for side in ("prime", "nonPrime")
+    ],
+    "serverSpecific": {"igsdb": {"physicalProperties": {"thickness": 4}}},
+}  # fmt: skip
 FILES = {
+    "optical data": (read_pane_file, OPTICAL),
     "optics": (read_pane_file, OPTICS),
     "product": (read_pane_file, PRODUCT),
     "layers": (read_glazing_layers, LAYERS),

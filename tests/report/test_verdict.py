@@ -62,6 +62,15 @@ def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
     assert said(replace(result, spaces=(one,)), "Warmth").startswith("No occupied hour is above 26")
 
 
+def test_of_rooms_warm_in_every_hour_the_hottest_is_named(result) -> None:
+    rooms = []
+    for room, peak in zip(result.spaces[:2], (33.0, 34.2), strict=True):
+        hot = room.heat.temperatures.assign(operative_c=peak)
+        rooms.append(replace(room, heat=replace(room.heat, temperatures=hot)))
+    text = said(replace(result, spaces=tuple(rooms)), "Warmth")
+    assert text.startswith(rooms[1].space.label) and "34.2 °C" in text
+
+
 def test_shading_says_how_often_and_at_what_cost(result) -> None:
     from tests.explore.synthetic import explored_run
 

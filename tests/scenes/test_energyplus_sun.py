@@ -11,9 +11,16 @@ import pytest
 from scenes.evidence.benchmarks.coupled_zones import row_of_zones
 from scenes.evidence.validation.energyplus_twin import (
     ABSORBED,
+    CONVECTED,
     INCIDENT,
+    INSIDE_FACE,
+    LAYER,
+    OUTSIDE_FACE,
+    RADIATED,
     SUN,
+    as_told,
     sky_seen,
+    told_resistance,
     with_their_sun,
 )
 from scenes.heat.study_file import read_study
@@ -30,43 +37,56 @@ def test_the_studies_read(path, real_data):
     assert study.loads.heating_c == 20 and len(study.system[0].layers) == 2
 
 
-def test_a_room_has_their_sums_spread_as_ours():
-    """Two hours and one in the dark: twice the sun on the glass, half of it indoors, own walls."""
+def test_a_room_has_their_sun_in_layers_and_surfaces():
+    """Two hours and one in the dark; what the inner layer takes is by the balance of its face."""
     (zone,) = row_of_zones(1)
-    walls, rng = len(zone.surfaces), np.random.default_rng(5)
-    inside = np.vstack([rng.random((2, walls)), np.zeros((1, walls))])
-    layers = np.array([[3.0], [5.0], [0.0]])
-    solar = Solar(layers, 0.5 * layers, inside, np.ones((3, walls)), window_inside=0.1 * layers)
-    own = np.array([30.0, 50.0, 0.0])
-    gains = {"incident_w": own, "transmitted_w": own, "absorbed_room_w": inside.sum(axis=1) * 9}
+    walls = len(zone.surfaces)
+    ours = np.ones((3, 1))
+    solar = Solar(ours, ours, np.ones((3, walls)), np.ones((3, walls)), window_inside=ours)
     room = RoomZone(
-        None, SimpleNamespace(zone=zone), solar, gains, None, None, None, None, None
+        None, SimpleNamespace(zone=zone), solar, {"incident_w": ours[:, 0]},
+        None, None, None, None, None,
     )  # fmt: skip
     outdoor = [k for k, s in enumerate(zone.surfaces) if s.outside == "outdoor"]
-    area = zone.windows[0].area
+    window, area = zone.windows[0], zone.windows[0].area
+    resistance = told_resistance(window.states[0], np.array([25.0, 27.5, 10.0]))
     theirs = pd.DataFrame({
-        f"Z0 W0:{INCIDENT}": np.array([60.0, 100.0, 8.0]) / area,
-        f"Z0 W0:{SUN}": [30.0, 50.0, 8.0],
-        f"Z0 S0:{ABSORBED}": gains["absorbed_room_w"] / 2 + [0.0, 0.0, 4.0],
+        f"Z0 W0:{INCIDENT}": np.array([60.0, 100.0, 0.0]) / area,
+        f"Z0 W0:{SUN}": [30.0, 50.0, 0.0],
+        f"Z0 W0:{LAYER.format(1)}": [6.0, 10.0, 0.0],
+        f"Z0 W0:{LAYER.format(4)}": [2.0, 4.0, 0.0],
+        f"Z0 W0:{INSIDE_FACE}": [30.0, 30.0, 15.0],
+        f"Z0 W0:{OUTSIDE_FACE}": [20.0, 25.0, 5.0],
+        f"Z0 W0:{CONVECTED}": [-5.0, -5.0, 9.0],
+        f"Z0 W0:{RADIATED}": [-3.0, -1.0, 9.0],
+        f"Z0 S0:{ABSORBED}": [7.0, 8.0, 4.0],
         f"Z0 S{outdoor[0]}.0:{INCIDENT}": [10.0, 20.0, 0.0],
         f"Z0 S{outdoor[0]}.1:{INCIDENT}": [30.0, 40.0, 0.0],
         f"Z01 S0:{ABSORBED}": [1e6, 1e6, 1e6],  # another room's
     })  # fmt: skip
     found = with_their_sun("Z0", room, theirs)
     got = found.solar
-    np.testing.assert_allclose(got.absorbed_outer[:2], 2 * layers[:2])
-    np.testing.assert_allclose(got.absorbed_inner[:2], layers[:2])
-    np.testing.assert_allclose(got.window_inside[:2], 0.1 * layers[:2])
-    np.testing.assert_allclose(got.inside[:2], inside[:2] / 2)
-    # in our dark 8 of the year's 80 W, and 4 W as the year spreads what is absorbed
-    np.testing.assert_allclose(got.absorbed_outer[2], 8.0 / 80.0 * layers.sum(axis=0))
-    np.testing.assert_allclose(
-        got.inside[2], 4.0 * inside.sum(axis=0) / gains["absorbed_room_w"].sum()
-    )
+    np.testing.assert_allclose(got.absorbed_outer[:, 0], np.array([6.0, 10.0, 0.0]) / area)
+    # 8 and 6 W to the room, and what 10 and 5 K drive outwards
+    taken = np.array([8.0, 6.0]) / area + np.array([10.0, 5.0]) / resistance[:2]
+    np.testing.assert_allclose(got.absorbed_inner[:, 0], [*taken, 0.0])
+    np.testing.assert_array_equal(got.window_inside, 0.0)
+    np.testing.assert_allclose(got.inside[:, 0], [7.0, 8.0, 4.0])
+    np.testing.assert_allclose(got.inside[:, 1:], 1.0)
     np.testing.assert_allclose(got.facade[:, outdoor[0]], [20.0, 30.0, 0.0])
     others = [k for k in range(walls) if k != outdoor[0]]
     np.testing.assert_allclose(got.facade[:, others], 1.0)
-    assert found.gains["incident_w"] == pytest.approx([60.0, 100.0, 8.0])
+    assert found.gains["incident_w"] == pytest.approx([60.0, 100.0, 0.0])
+
+
+def test_windows_have_the_resistance_that_energyplus_is_told():
+    """That at 10 degC and 15 K, 0.3 % less for each kelvin, whatever the difference is."""
+    (zone,) = row_of_zones(1)
+    own = zone.windows[0].states[0]
+    got = as_told(own).layer_resistance
+    assert got.at(10.0, 2.0) == pytest.approx(float(own.layer_resistance.at(10.0, 15.0)))
+    assert got.at(30.0, 2.0) == pytest.approx(float(told_resistance(own, np.array(30.0))))
+    assert got.at(30.0, 2.0) / got.at(10.0, 9.0) == pytest.approx(1 / 1.0624, rel=1e-3)
 
 
 def test_their_share_of_the_sky_is_the_mean_of_a_surface_s_parts():

@@ -49,9 +49,10 @@ def test_panes_send_light_straight_on_and_shades_to_all_sides() -> None:
         BACK,
     )  # fmt: skip
     panes, shade = (traced_system(n, optics).solar for n in ("dgu", "ext_shade"))
-    assert panes.transmission_front[0, 0] == pytest.approx(0.5 / OMEGA[0])
+    # means over patches: five degrees of the first
+    assert panes.transmission_front[0, 0] == pytest.approx(0.5 / OMEGA[0], rel=5e-3)
     assert np.count_nonzero(panes.transmission_front) <= KLEMS_FULL.size
-    assert shade.transmission_front[:, 0] == pytest.approx(0.5 / np.pi)
+    assert shade.transmission_front[:, 0] == pytest.approx(0.5 / np.pi, rel=5e-3)
 
 
 @pytest.mark.slow
@@ -63,3 +64,19 @@ def test_shades_outside_meet_their_bars_with_traced_sun(reference_data, real_dat
     found = compare(reference, real_data / "epw", ["Frankfurt"], ["S"]).set_index("system")
     air = np.sqrt(found["air square"])
     assert air["ext_shade"] < 0.15 and air["ext_blind"] < 0.5
+
+
+@pytest.mark.slow
+def test_glass_meets_its_bar_where_it_passes_the_sky_as_energyplus(
+    reference_data, real_data
+) -> None:
+    """Air within 0.2 K (chapter 4's bar), south, Frankfurt; by its own angles it is further off."""
+    reference = reference_data / "energyplus"
+    if not (reference / "ep_Frankfurt.parquet").is_file():
+        pytest.skip("EnergyPlus' hours (../shared/reference/energyplus) are not here")
+    case = reference, real_data / "epw", ["Frankfurt"], ["S"], ["dgu"]
+    own, theirs = (
+        np.sqrt(compare(*case, one_diffuse=one)["air square"].item()) for one in (False, True)
+    )
+    assert theirs < 0.15
+    assert theirs < 0.7 * own

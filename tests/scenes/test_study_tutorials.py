@@ -105,9 +105,7 @@ def test_cases_of_the_standard_lie_in_the_range_of_its_programs(reference_data, 
         pytest.skip("ASHRAE 140's figures (../shared/reference/ashrae140) are not here")
     found = ashrae140_studies.compare(reference, tmp_path)
     assert len(found) == 60
-    outside = found[~found["inside"]]  # docs/validation.md says so
-    assert set(outside["case"]) <= {"610", "950"} and set(outside["output"]) <= {"cooling"}
-    assert (outside["ours"] < 1.03 * outside["high"]).all(), outside
+    assert found["inside"].all(), found[~found["inside"]]
 
 
 @pytest.mark.slow

@@ -52,6 +52,14 @@ def _explorer(inputs: Path) -> Path:
     return results
 
 
+def _goniophotometer(inputs: Path, out: Path) -> list[object]:
+    rows = [f"{180 - theta} {phi} 0.2" for theta in (10, 40, 70) for phi in (0, 90, 180, 270)]
+    head = ["#format: theta phi BSDF", "#incident_angle 30 0"]
+    (inputs / "sample.txt").write_text("\n".join([*head, *rows]) + "\n")
+    words = ["--basis", "quarter", "--out", out]
+    return ["bsdf", "interpolate", inputs / "sample.txt", *words]
+
+
 def _measured(inputs: Path, out: Path) -> list[object]:
     rows = "time,global_horizontal,diffuse_horizontal\n2020-06-21 12:00,500,200\n"
     (inputs / "m.csv").write_text(rows + "2020-06-21 13:00,500,200\n")
@@ -117,6 +125,7 @@ JOBS = {
         lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--toml", out], "out.toml"
     ),
     "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
+    "bsdf interpolate": Job(_goniophotometer, "out.xml"),
     "bsdf combine": Job(
         lambda _, out: ["bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", out], "out.xml"
     ),

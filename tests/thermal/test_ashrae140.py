@@ -36,10 +36,11 @@ def test_traced_sun_by_its_parts_is_energyplus_own(variant, reference_data):
     table = by_parts(reference_data / "ashrae140", samples=2048).set_index(["case", "part"])
     on = table["on: traced"] / table["on: EnergyPlus"] - 1
     # sun on patches of 3 degrees, ground of one tone: 1.1 % and 0.5 %
-    alike = [("600", "sun"), ("600", "sky"), ("600", "ground"), ("610", "sun"), ("610", "ground")]
+    alike = [("600", "sun"), ("600", "ground"), ("610", "sun"), ("610", "ground")]
     assert on[alike].abs().max() < 0.02
-    # the all-weather sky is brighter below the overhang; light from there meets the glass steeply
-    assert 0.02 < on[("610", "sky")] < 0.08
+    # EnergyPlus thins the air mass of Perez 1990 by the site's 1650 m: 372.5 for 364.6 kWh/m2
+    assert on[[("600", "sky"), ("610", "sky")]].add(0.022).abs().max() < 0.01
+    # light from under the overhang meets the glass nearer to its normal
     shaded = table.loc[("610", "all")]
     assert 631.3 < shaded["through: flat"] < 665.3  # the standard's range
     assert 8 < shaded["through: traced"] - shaded["through: flat"] < 14

@@ -25,7 +25,9 @@ from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.sky.epw import read_epw
-from mitsuba_cfs.sky.matrix import sky_matrix
+from mitsuba_cfs.sky.matrix import series_matrix, sky_series
+from mitsuba_cfs.sky.sun import is_up
+from mitsuba_cfs.sky.three_part import three_part
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Stopping
@@ -60,10 +62,12 @@ def traced_light(
     )  # fmt: skip
     area = np.array([g.area for g in groups])
     seen = np.einsum("g,gkp->kp", area / area.sum(), daylight.values)
+    series = three_part(sky_series(weather, "solar"))
+    lit = np.flatnonzero(is_up(series.sun))
     sun, sky = (
-        sky_matrix(weather, SUBDIVISION, "solar", parts, sun_up_only=True).sum(axis=1)
+        series_matrix(series, lit, SUBDIVISION, part, ground_reflectance=weather.albedo).sum(axis=1)
         * (weather.step_h / 1e3)
-        for parts in ("sun", "sky")
+        for part in ("sun", "sky")
     )
     return {
         "sun": seen[:, 1:] @ sun[1:],

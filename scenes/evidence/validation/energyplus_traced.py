@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +21,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
+from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.matrix import series_matrix, sky_series
 from mitsuba_cfs.sky.weather import Weather
 from scenes.evidence.validation.energyplus_cases import (
     EPW_FILES,
@@ -37,11 +39,12 @@ from scenes.evidence.validation.energyplus_study import STUDY
 from scenes.evidence.validation.reference_room import ORIENTATIONS
 from scenes.evidence.validation.reference_systems import SYSTEMS, Optics, layers, read_optics
 from scenes.fenestration.systems import FenestrationSystem
+from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.study_file import StudyFile, read_study
 from scenes.room.room import RoomSimulation, skies_for
 from scenes.room.windows import in_all_windows
-from scenes.room.zone import balances
+from scenes.room.zone import RoomZone, balances
 from thermal.closure import Closure
 
 FloatArray = NDArray[np.float64]
@@ -56,6 +59,7 @@ class Place:
     name: str
     weather: Weather
     skies: AnnualSky
+    sun: NDArray[np.floating]  # [P, L] the sun alone [W/m2/sr]
 
 
 def traced_system(name: str, optics: Optics) -> FenestrationSystem:
@@ -64,7 +68,9 @@ def traced_system(name: str, optics: Optics) -> FenestrationSystem:
     omega = KLEMS_FULL.projected_solid_angles()
     even = np.ones((KLEMS_FULL.size, KLEMS_FULL.size)) / np.pi
     if optics.phi is None:
-        tau, rho = (np.interp(theta, optics.theta, v) for v in (optics.tau, optics.rho))
+        table = AngularTable(optics.theta, optics.tau, optics.rho)
+        tau = table.patch_means(KLEMS_FULL)
+        rho = table.patch_means(KLEMS_FULL, optics.rho, 1.0)
         front = np.diag(tau / omega) if name == "dgu" else even * tau
     else:
         order = _patches(optics, theta, phi)
@@ -93,15 +99,25 @@ def traced_case(
     orientation: str,
     system: FenestrationSystem,
     cache: MatrixCache | None,
+    *,
+    one_diffuse: bool = False,
 ) -> EnergyPlusCase:
-    """Our hours of a case, traced."""
+    """Our hours of a case, traced; one_diffuse: see `with_one_diffuse`."""
     turned = study.box.model_copy(update={"facing_deg": float(ORIENTATIONS[orientation])})
     building = box_building(turned)
     (space,) = building.spaces
-    room = RoomSimulation(
-        building, space, in_all_windows(space, system), place.weather, study.options,
-        operation=study, skies=place.skies, cache=cache,
-    ).zone  # fmt: skip
+
+    def under(solar: NDArray[np.floating]) -> RoomZone:
+        return RoomSimulation(
+            building, space, in_all_windows(space, system), place.weather, study.options,
+            operation=study, skies=replace(place.skies, solar=solar), cache=cache,
+        ).zone  # fmt: skip
+
+    whole = place.skies.solar
+    room = under(whole)
+    if one_diffuse:
+        rest = under(np.maximum(whole - place.sun, 0.0))
+        room = with_one_diffuse(room, under(place.sun), rest, thermal_system(system))
     step_s = study.options.heat_step_s
     (result,) = balances([room], place.weather, step_s, terrain=study.terrain)
     walls, window = result.surface_in_c, result.window_inner_c
@@ -114,18 +130,56 @@ def traced_case(
     )  # fmt: skip
 
 
+def with_one_diffuse(
+    room: RoomZone, beam: RoomZone, rest: RoomZone, system: ThermalSystem
+) -> RoomZone:
+    """A room whose windows pass and absorb light of sky and ground as EnergyPlus' do.
+
+    One hemispherical value holds wherever it comes from; the beam keeps its angle.
+
+    Args: beam, rest: the room under the sun alone, and without it.
+    """
+    omega = KLEMS_FULL.projected_solid_angles()
+    falls, sun, sky = rest.gains["incident_w"], beam.solar, rest.solar
+
+    def scaled(values: FloatArray, name: str, by_patch: FloatArray) -> FloatArray:
+        own = rest.gains[name]
+        share = np.divide(falls * (omega @ by_patch / omega.sum()), own, np.zeros_like(own),
+                          where=own > 0)  # fmt: skip
+        return values * share[:, None]
+
+    outer, inner = system.absorptances.outer, system.absorptances.inner
+    passed = ("transmitted_w", system.transmittance)
+    solar = replace(
+        room.solar,
+        absorbed_outer=sun.absorbed_outer + scaled(sky.absorbed_outer, "absorbed_outer_w", outer),
+        absorbed_inner=sun.absorbed_inner + scaled(sky.absorbed_inner, "absorbed_inner_w", inner),
+        inside=sun.inside + scaled(sky.inside, *passed),
+        window_inside=sun.window_inside + scaled(sky.window_inside, *passed),
+    )
+    return replace(room, solar=solar)
+
+
 def compare(
-    reference: Path, epw: Path, climates: Sequence[str], orientations: Sequence[str]
+    reference: Path,
+    epw: Path,
+    climates: Sequence[str],
+    orientations: Sequence[str],
+    names: Sequence[str] = SYSTEMS,
+    *,
+    one_diffuse: bool = False,
 ) -> pd.DataFrame:
-    """A row of errors for every case."""
+    """A row of errors for every case; one_diffuse: see `with_one_diffuse`."""
     variants.activate()
     study, cache, rows = read_study(STUDY), MatrixCache.of_user(), []
-    systems = [traced_system(name, read_optics(reference, name)) for name in SYSTEMS]
+    systems = [traced_system(name, read_optics(reference, name)) for name in names]
     for name in climates:
         weather = read_epw(epw / EPW_FILES[name])
         options = study.options
         skies = skies_for(weather, options.method, options.sampling, cache, **options.sky)
-        place = Place(name, weather, skies)
+        series = sky_series(weather, "solar")
+        sun = series_matrix(series, skies.lit, options.sampling.subdivision, "sun")
+        place = Place(name, weather, skies, sun.astype(np.float32))
         hours = pd.read_parquet(reference / f"ep_{name}.parquet")
         tables = dict(list(hours.groupby(["cfs", "ori"], observed=True)))
         for orientation in orientations:
@@ -133,7 +187,9 @@ def compare(
                 theirs = reference_case(
                     name, system.name, orientation, tables[(system.name, orientation)]
                 )
-                ours = traced_case(study, place, orientation, system, cache)
+                ours = traced_case(
+                    study, place, orientation, system, cache, one_diffuse=one_diffuse
+                )
                 rows.append(case_row(ours, theirs))
     return pd.DataFrame(rows)
 
@@ -145,8 +201,16 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--epw", type=Path, required=True)
     parser.add_argument("--climates", nargs="+", default=list(EPW_FILES), choices=list(EPW_FILES))
     parser.add_argument("--orientations", nargs="+", default=list(ORIENTATIONS))
+    parser.add_argument("--systems", nargs="+", default=list(SYSTEMS), choices=list(SYSTEMS))
+    parser.add_argument(
+        "--one-diffuse", action="store_true",
+        help="windows pass light of sky and ground by one hemispherical value, as EnergyPlus",
+    )  # fmt: skip
     chosen = parser.parse_args(words)
-    cases = compare(chosen.reference, chosen.epw, chosen.climates, chosen.orientations)
+    cases = compare(
+        chosen.reference, chosen.epw, chosen.climates, chosen.orientations, chosen.systems,
+        one_diffuse=chosen.one_diffuse,
+    )  # fmt: skip
     for by in (["system"], ["system", "orientation"], ["system", "climate"]):
         sys.stdout.write(pooled(cases, by).round(3).to_string() + "\n")
 

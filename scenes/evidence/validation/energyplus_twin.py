@@ -4,17 +4,18 @@
 
 Each study runs by `cfs thermal STUDY.toml --energyplus`; EnergyPlus then runs the model that this
 has written, with the study's own weather file.  With `--their-sun` our balance is solved again with
-EnergyPlus' sun in every hour: on the outer walls, in the window layers by what falls on the glass,
-and indoors what the room's surfaces absorb.  What still differs then is not the sun's.  With
-`--open-sky` it is solved again as if nothing hid the sky from the outer faces' longwave, and the
-share of the sky that each face sees stands beside EnergyPlus' own.
+EnergyPlus' sun in every hour: on the outer walls, in the window layers and in the room's surfaces;
+and once more with the resistance of the window layers that EnergyPlus is told, which ours follows
+by temperature.  What still differs then is neither's.  With `--open-sky` it is solved again as if
+nothing hid the sky from the outer faces' longwave, and the share of the sky that each face sees
+stands beside EnergyPlus' own.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,15 +23,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.energyplus_windows import GAPS, TYPICAL, WARMER_AIR
 from mitsuba_cfs.progress import silent
 from scenes.evidence.validation.energyplus_run import run_written
 from scenes.heat.energyplus import energyplus_twin
 from scenes.heat.study import BalancedRooms, run_study
 from scenes.heat.study_file import read_study
 from scenes.room.zone import RoomZone, balances
+from thermal.blackbox import Fenestration, LayerResistance
 
 Hours = NDArray[np.float64]  # [H] or [H, N]
-LEAST_SUN = 1.0  # [W] of a room, below which ours has no pattern
 SETTLED = 7 * 24  # hours left out of the temperatures at the start
 AIR = "Zone Mean Air Temperature"
 HEATING = "Zone Ideal Loads Zone Sensible Heating Rate"
@@ -38,6 +40,11 @@ COOLING = "Zone Ideal Loads Zone Sensible Cooling Rate"
 INCIDENT = "Surface Outside Face Incident Solar Radiation Rate per Area"
 SUN = "Surface Window Transmitted Solar Radiation Rate"
 ABSORBED = "Surface Inside Face Solar Radiation Heat Gain Rate"
+LAYER = "Surface Window Total Absorbed Shortwave Radiation Rate Layer {}"
+INSIDE_FACE, OUTSIDE_FACE = (f"Surface {side} Face Temperature" for side in ("Inside", "Outside"))
+CONVECTED = "Surface Inside Face Convection Heat Gain Rate"
+RADIATED = "Surface Inside Face Net Surface Thermal Radiation Heat Gain Rate"
+WINDOWS = (LAYER.format(1), LAYER.format(GAPS + 1), INSIDE_FACE, OUTSIDE_FACE, CONVECTED, RADIATED)
 # our sums of the sun, and what the table calls them
 SUMS = {"incident_w": "sun on", "transmitted_w": "sun in", "absorbed_room_w": "sun kept"}
 
@@ -56,6 +63,8 @@ def compared(
     twin = energyplus_twin(study, found)
     folder.mkdir(parents=True, exist_ok=True)
     twin.model["Output:Surfaces:List"] = {"seen": {"report_type": "Details"}}
+    if their_sun:
+        twin.model["Output:Variable"] |= window_outputs(twin.zones, found.rooms)
     model, *_ = twin.write(folder)
     theirs = run_written(model, study.weather)
 
@@ -74,10 +83,27 @@ def compared(
         tables["ours under an open sky"] = again([under_open_sky(room) for room in found.rooms])
     if their_sun:
         pairs = zip(twin.zones, found.rooms, strict=True)
-        tables["ours with EnergyPlus' sun"] = again(
-            [with_their_sun(zone, room, theirs) for zone, room in pairs]
-        )
+        sunned = [with_their_sun(zone, room, theirs) for zone, room in pairs]
+        tables["ours with EnergyPlus' sun"] = again(sunned)
+        told = [with_their_windows(room) for room in sunned]
+        tables["and with its windows' resistance"] = again(told)
     return tables
+
+
+def window_outputs(zones: Sequence[str], rooms: Sequence[RoomZone]) -> dict[str, dict[str, str]]:
+    """The request for what `with_their_sun` reads of every window."""
+    windows = [
+        f"{zone} W{k}"
+        for zone, room in zip(zones, rooms, strict=True)
+        for k in range(len(room.zone.windows))
+    ]
+    return {
+        f"{window} {k}": {
+            "key_value": window, "variable_name": name, "reporting_frequency": "Hourly",
+        }
+        for window in windows
+        for k, name in enumerate(WINDOWS)
+    }  # fmt: skip
 
 
 def under_open_sky(room: RoomZone) -> RoomZone:
@@ -126,36 +152,66 @@ def their_sums(zone: str, room: RoomZone, theirs: pd.DataFrame) -> dict[str, Hou
 
 
 def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
-    """A room with EnergyPlus' sun: its sums of every hour, spread as ours are.
+    """A room with EnergyPlus' sun of every hour: outside, in both window layers, in its surfaces.
 
-    An hour in which we have no sun is spread as our year's.
+    What a window's inner layer takes from the room is in none of EnergyPlus' outputs; it is what
+    its face gives to air and room more than it has from the other layer and from outside.
     """
-    sun = room.solar
-    sums = their_sums(zone, room, theirs)
-
-    def scaled(values: Hours | None, name: str) -> Hours | None:
-        if values is None or name not in room.gains:
-            return values
-        own, dark = room.gains[name], room.gains[name] < LEAST_SUN
-        share = values / np.where(dark, 1.0, own)[:, None]
-        share[dark] = values.sum(axis=0) / max(own.sum(), LEAST_SUN)
-        return share * sums[name][:, None]
-
-    facade = sun.facade.copy()
-    for index in np.flatnonzero([one.outside == "outdoor" for one in room.zone.surfaces]):
+    sun, number = room.solar, GAPS + 1  # of the inner layer
+    outer, inner = sun.absorbed_outer.copy(), sun.absorbed_inner.copy()
+    for k, window in enumerate(room.zone.windows):
+        of = _outputs(theirs, f"{zone} W{k}")
+        outer[:, k] = of(LAYER.format(1)) / window.area
+        warm, cold = of(INSIDE_FACE), of(OUTSIDE_FACE)
+        resistance = told_resistance(window.states[0], 0.5 * (warm + cold))
+        given = -of(CONVECTED) - of(RADIATED)
+        taken = given / window.area - (cold - warm) / resistance
+        inner[:, k] = np.where(of(LAYER.format(number)) > 0.0, np.maximum(taken, 0.0), 0.0)
+    facade, inside = sun.facade.copy(), sun.inside.copy()
+    for index, surface in enumerate(room.zone.surfaces):
         name = shouted(f"{zone} S{index}")
-        parts = [c for c in theirs if c.split(".")[0].split(":")[0] == name and INCIDENT in c]
-        if parts:  # a frame's is that of the wall it is in, which stays ours
-            facade[:, index] = theirs[parts].to_numpy().mean(axis=1)
+        parts = [c for c in theirs if c.split(":")[0].split(".")[0] == name]
+        absorbed = [c for c in parts if c.endswith(f":{ABSORBED}")]
+        if absorbed:  # a frame's is that of the wall it is in, which stays ours
+            inside[:, index] = theirs[absorbed].to_numpy().sum(axis=1)
+        if surface.outside == "outdoor" and parts:
+            falls = [c for c in parts if c.endswith(f":{INCIDENT}")]
+            facade[:, index] = theirs[falls].to_numpy().mean(axis=1)
     solar = replace(
-        sun,
-        absorbed_outer=scaled(sun.absorbed_outer, "incident_w"),
-        absorbed_inner=scaled(sun.absorbed_inner, "incident_w"),
-        inside=scaled(sun.inside, "absorbed_room_w"),
-        window_inside=scaled(sun.window_inside, "transmitted_w"),
-        facade=facade,
+        sun, absorbed_outer=outer, absorbed_inner=inner, inside=inside, facade=facade,
+        window_inside=None if sun.window_inside is None else np.zeros_like(sun.window_inside),
+    )  # fmt: skip
+    return replace(room, solar=solar, gains=room.gains | their_sums(zone, room, theirs))
+
+
+def told_resistance(one: Fenestration, mean_c: Hours) -> Hours:
+    """Resistance between a window's layers in EnergyPlus' model [m2 K/W], by their mean [degC].
+
+    Still air of `bim.energyplus_windows`: that at 10 C, less as the air conducts better.
+    """
+    at_ten = float(one.layer_resistance.at(*TYPICAL))
+    return at_ten / (1.0 + WARMER_AIR * (mean_c - TYPICAL[0]))
+
+
+def as_told(one: Fenestration) -> Fenestration:
+    """A window's system with the resistance between its layers that EnergyPlus is told."""
+    conductance = 1.0 / float(one.layer_resistance.at(*TYPICAL))
+    shape = (conductance, conductance * WARMER_AIR, 0.0, 0.0, 0.0, 0.0)
+    return replace(one, resistance=LayerResistance("surface", shape))
+
+
+def with_their_windows(room: RoomZone) -> RoomZone:
+    """A room whose window layers have the resistance that EnergyPlus is told."""
+    windows = tuple(
+        replace(window, states=tuple(as_told(one) for one in window.states))
+        for window in room.zone.windows
     )
-    return replace(room, solar=solar, gains=room.gains | sums)
+    zone = replace(room.zone, windows=windows)
+    return replace(room, room=replace(room.room, zone=zone))
+
+
+def _outputs(theirs: pd.DataFrame, name: str) -> Callable[[str], Hours]:
+    return lambda output: theirs[f"{shouted(name)}:{output}"].to_numpy()
 
 
 def _rows(zones: Sequence[str], found: BalancedRooms, theirs: pd.DataFrame) -> pd.DataFrame:

@@ -1,0 +1,92 @@
+"""Glass that is before a room becomes that room's windows, or a problem says that it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from bim.apertures import Aperture, Filling
+from bim.ifc import building as reading
+from bim.ifc.building import read_ifc
+from bim.planes import plane_through
+from bim.rooms import Attachment, room_pieces, room_solid
+from bim.solids import prism
+from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WIDTH, box_model
+
+RECESS = 0.15  # from the room's faces to the glass [m]
+LEFT, SILL, RIGHT, TOP = 1.0, 0.75, 3.0, 2.25
+
+
+def attached(guid: str, y: float, north: float, apart: float) -> Attachment:
+    """Glass before a wall, its region in two halves [m] apart, as the faces of a bent wall give."""
+    plane = plane_through(np.array([0.0, y, 0.0]), np.array([0.0, north, 0.0]))
+    corners = [(LEFT, SILL), (RIGHT, SILL), (RIGHT, TOP), (LEFT, TOP)]
+    low, near, high, far = plane.to_plane(np.array([(x, y, z) for x, z in corners]))[:, :2]
+    up = np.array([0.0, apart])
+    halves = shapely.polygons([[low, near, high]]), shapely.polygons([[low + up, high + up, far]])
+    outline = shapely.Polygon([low, near, high, far])
+    region = shapely.union_all(np.concatenate(halves)) if apart else outline
+    filling = Filling(guid, guid, "IfcWindow", np.empty((0, 3, 3)), np.empty(0, dtype=bool))
+    return Attachment(Aperture(filling, plane, outline, outline), "room", region, -RECESS, -RECESS)
+
+
+def box(width: float, depth: float, height: float):
+    """A room with its low corner in the origin."""
+    floor = plane_through(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    outline = shapely.transform(
+        shapely.box(0, 0, width, depth),
+        lambda p: floor.to_plane(np.column_stack([p, np.zeros(len(p))]))[:, :2],
+    )
+    return room_solid("room", "room", prism(outline, floor, 0.0, height))
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-16, 3e-16, 1e-12, 1e-8, 6e-7, 2e-6])
+def test_glass_before_a_wall_that_is_bent_along_a_diagonal_is_all_there(apart):
+    own = [attached("bent", -RECESS, -1.0, apart), attached("whole", DEPTH + RECESS, 1.0, 0.0)]
+    pieces, _, _ = room_pieces(box(WIDTH, DEPTH, HEIGHT), own)
+    for one in own:
+        guid = one.aperture.filling.guid
+        glass = [
+            p.facet.polygon.area for p in pieces
+            if p.role == "glass" and p.attachment.aperture.filling.guid == guid
+        ]  # fmt: skip
+        assert sum(glass) == pytest.approx((RIGHT - LEFT) * (TOP - SILL), rel=1e-4)
+
+
+def test_glass_that_is_lost_in_the_cutting_is_said(tmp_path, monkeypatch):
+    path = tmp_path / "model.ifc"
+    box_model()[0].model.write(str(path))
+    assert lost(path) == []
+    finished = reading.faces_and_windows
+
+    def without_windows(*given):
+        faces, _, assumed = finished(*given)
+        return faces, [], assumed
+
+    monkeypatch.setattr(reading, "faces_and_windows", without_windows)
+    (problem,) = lost(path)
+    assert problem.glass == pytest.approx(GLASS_AREA, rel=1e-6)
+    assert problem.what.startswith("IfcWindow W1: 3.64 m2 before R1")
+
+
+def test_glass_above_a_room_and_behind_a_screen_is_said(tmp_path):
+    """Neither side of the part above the room lies in the open air."""
+    low = 1.5  # the space ends here, under a ceiling
+    small, _ = box_model(space_height=low)
+    small.box("IfcCovering", "ceiling", (0.0, 0.0, low), (WIDTH, DEPTH, 0.05))
+    small.box("IfcWall", "screen", (-3.0, -0.95, 0.5), (WIDTH + 6.0, 0.2, HEIGHT))
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    left = GLASS_AREA - sum(w.area for space in building.spaces for w in space.windows)
+    assert left > 0.4 * GLASS_AREA
+    assert building.account.glass_out == pytest.approx(GLASS_AREA, rel=1e-3)
+    (problem,) = [p for p in building.problems if p.glass > 0]
+    assert problem.glass == pytest.approx(left, rel=1e-3)
+    assert "lie above the top of room R1" in problem.what or "no room behind" in problem.what
+
+
+def lost(path) -> list:
+    """What is said of glass that became no window."""
+    return [problem for problem in read_ifc(path).problems if problem.kind == "lost glass"]
