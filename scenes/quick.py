@@ -12,7 +12,7 @@ NOTE = (
 ROOM = {  # by the names of `scenes.room.options.NAMES`: `cfs run` and `cfs study`
     "picture_count": 1,
     "picture_size": 200,
-    "picture_samples": 4,
+    "picture_samples": 2,
     "sky_subdivision": 2,
     "sensor_spacing": 1.0,
     "sensor_samples": 2_048,

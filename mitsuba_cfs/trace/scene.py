@@ -66,7 +66,7 @@ class TracedScene:
 
         self.groups = tuple(groups)
         self._panes = windows_block and bool(windows)
-        self.centre = glazed.mean(axis=(0, 1)) if centre is None else np.asarray(centre, float)
+        self.centre = _middle(groups) if centre is None else np.asarray(centre, float)
         self.surface_count = int(surfaces.surface.max()) + 1 if len(surfaces.surface) else 0
         if window_reflectance is None:
             window_reflectance = np.zeros(len(groups))
@@ -316,7 +316,8 @@ def kept_scene(
     A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
     of thousands of triangles.
     """
-    values = (window_reflectance, centre)
+    # said or not, one centre is one scene
+    values = (window_reflectance, _middle(groups) if centre is None and groups else centre)
     arrays = [None if value is None else np.asarray(value, float) for value in values]
     inputs = (surfaces, *groups)
     key = (
@@ -338,6 +339,12 @@ def kept_scene(
 # with the objects whose ids are in the key, which so stay theirs; empty before Dr.Jit ends
 _last_scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
 atexit.register(_last_scenes.clear)
+
+
+def _middle(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:
+    """The middle of the corners of all windows' triangles [3]."""
+    windows = [window.triangles for group in groups for window in group.windows]
+    return np.concatenate(windows).mean(axis=(0, 1))
 
 
 def _mesh(triangles: NDArray[np.float64]) -> mi.Mesh:

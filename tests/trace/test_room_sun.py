@@ -137,3 +137,14 @@ def test_elements_are_asked_again_where_one_beside_or_around_is_lit_unlike() -> 
         element, hour = edges.crossed(light)
         assert sorted(order[element].tolist()) == expected
         assert not hour.any()
+
+
+def test_places_that_stand_for_an_element_are_its_own_and_evenly_drawn() -> None:
+    from mitsuba_cfs.trace.room_sun import _chosen
+
+    element = np.repeat([0, 1, 2], [1, 7, 40])
+    drawn = np.stack([_chosen(element, 3, 4, seed).reshape(3, 4) for seed in range(400)])
+    assert (element[drawn] == np.arange(3)[:, None]).all()
+    assert all(len(set(places)) == 4 for places in drawn[:, 2])
+    often = np.bincount(drawn[:, 2].ravel(), minlength=48)[8:]
+    assert np.abs(often - often.mean()).max() < 5 * np.sqrt(often.mean())

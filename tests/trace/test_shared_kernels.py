@@ -112,3 +112,12 @@ def test_scene_of_the_same_objects_is_found_again_and_no_other():
     for _ in range(KEPT):
         kept_scene(rooms.test_room()[0], groups)
     assert kept_scene(interior, groups) is not first
+
+
+def test_a_scene_is_found_again_whether_its_centre_is_said_or_not() -> None:
+    from mitsuba_cfs.trace.scene import kept_scene
+
+    interior, groups = rooms.test_room()
+    found = kept_scene(interior, groups)
+    assert kept_scene(interior, groups, centre=found.centre) is found
+    assert kept_scene(interior, groups, centre=found.centre + 1e-3) is not found
