@@ -113,7 +113,7 @@ class EnergyPlusTwin:
         self.schedules = Schedules(self.model)
         self.climate, self.rooms = climate, rooms
         self.notes: dict[str, None] = {}
-        self._states: dict[int, str] = {}
+        self._states: dict[tuple[int, bool], str] = {}
         self.zones = [f"Z{k} {object_name(r.zone.name)}" for k, r in enumerate(rooms)]
         outer = [outer_faces(building, room.space, room.room) for room in rooms]
         for zone, room, faces in zip(self.zones, rooms, outer, strict=True):
@@ -232,7 +232,8 @@ class EnergyPlusTwin:
         """A window in its frame, with its constructions."""
         window, name = room.space.windows[index], f"{zone} W{index}"
         frame, _, _ = self._construction(f"{name} frame", _frame_surface(room, window.normal))
-        states = [self._state(optics) for optics in room.optics[window.guid]]
+        known = room.optics[window.guid]
+        states = [self._state(optics, panes=len(known) == 1) for optics in known]
         write_window(self.model, name, zone, window, frame=frame, glazing=states[0])
         held = np.minimum(room.state, len(states) - 1)
         if np.any(held):
@@ -240,14 +241,15 @@ class EnergyPlusTwin:
             number = len(self.model.get("EnergyManagementSystem:Sensor", {}))
             shading_control(self.model, name, schedule, states, number)
 
-    def _state(self, optics: WindowOptics) -> str:
-        """Name of the construction of a system in a state, written once."""
-        if id(optics) not in self._states:
+    def _state(self, optics: WindowOptics, *, panes: bool) -> str:
+        """Name of the construction of a system in a state, written once; see `complex_state`."""
+        key = id(optics), panes
+        if key not in self._states:
             name = f"System {len(self._states)}"
-            complex_state(self.model, name, optics)
-            self._states[id(optics)] = name
-            self.notes |= dict.fromkeys(optics.simplified)
-        return self._states[id(optics)]
+            complex_state(self.model, name, optics, panes=panes)
+            self._states[key] = name
+            self.notes |= dict.fromkeys(optics.simplified(panes=panes))
+        return self._states[key]
 
     def _air_between(self, air: TwinAir) -> None:
         """The air that passes between the zones."""

@@ -1,9 +1,10 @@
 """Windows of an EnergyPlus model by their BSDF: `Construction:ComplexFenestrationState`.
 
 A system is Kuhn's Blackbox there as here: two layers that absorb what ours absorb of every
-direction, with the resistance between them of air that is too thin to flow.  EnergyPlus 25.2 takes
-no other gas than its own four there and no other pressure than the sea's, so that resistance is
-made of several gaps, divided by layers that neither absorb nor radiate.
+direction.  Where it is two known panes they and their gas stand between them, and EnergyPlus' own
+ISO 15099 says the resistance of the hour.  Else it is that of air that is too thin to flow:
+EnergyPlus 25.2 takes no other gas than its own four there and no other pressure than the sea's, so
+that resistance is made of several gaps, divided by layers that neither absorb nor radiate.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from numpy.typing import NDArray
 from bim.energyplus_parts import Model
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from thermal.blackbox import Fenestration, LayerAbsorptances
+from thermal.glazing_unit import GasGap, GlazingUnit
 
 PANE = 0.001  # [m] thickness of a virtual layer
 PANE_CONDUCTIVITY = 100.0  # [W/(m K)]: a hundred-thousandth of a window's resistance
 NO_EMISSION = 1e-4  # EnergyPlus takes no 0: of the faces to the gap, whose resistance is given
-GAPS = 3  # in every state: EnergyPlus switches between equals only
+GAPS = 3  # of a resistance, in every state: EnergyPlus switches between equals only
 TYPICAL = 10.0, 15.0  # mean of the layers [degC] and difference [K] where R is read: EN 673
 AIR = 2.873e-3 + 7.76e-5 * (TYPICAL[0] + 273.15)  # conductivity [W/(m K)], ISO 15099 annex B
-WARMER_AIR = 7.76e-5 / AIR  # by which it rises [1/K]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,22 +37,34 @@ class WindowOptics:
     fenestration: Fenestration
     absorptances: LayerAbsorptances  # [K]
     back_absorptance: float  # diffuse, from the room
+    unit: GlazingUnit | None = None  # the panes whose resistance `fenestration` has
 
     @property
-    def simplified(self) -> tuple[str, ...]:
-        """What of it EnergyPlus is not told."""
+    def panes(self) -> GlazingUnit | None:
+        """Two panes and their gap, where the system is just that."""
+        one = self.unit
+        shaded = one is None or any(layer.openings is not None for layer in one.layers)
+        return None if shaded or one is None or len(one.layers) != 2 else one
+
+    def simplified(self, *, panes: bool) -> tuple[str, ...]:
+        """What of it EnergyPlus is not told; panes: see `complex_state`."""
         found = []
         one = self.fenestration
-        if one.layer_resistance.kind != "constant":
+        known = panes and self.panes is not None
+        if not known and one.layer_resistance.kind != "constant":
             found.append(f"its layers' resistance, which varies, is that at {TYPICAL[0]:g} C")
         if one.extra_inner or one.extra_outer:
             found.append("what a shade gives to the air behind it is left out")
         return tuple(f"{one.name}: {what}" for what in found)
 
 
-def complex_state(model: Model, name: str, optics: WindowOptics) -> None:
-    """Write the construction `name` of a system in one state."""
-    one, size = optics.fenestration, KLEMS_FULL.size
+def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool) -> None:
+    """Write the construction `name` of a system in one state.
+
+    Args: panes: by its two panes where they are known; not for a window of several states, as
+        EnergyPlus switches between equal numbers of layers only.
+    """
+    size = KLEMS_FULL.size
     spectral = {}
     for band, data in (("solar", optics.solar), ("visible", optics.visible)):
         filled = data.filled()
@@ -63,19 +76,17 @@ def complex_state(model: Model, name: str, optics: WindowOptics) -> None:
         ):
             key = f"{band}_optical_complex_{side}_matrix_name"
             spectral[key] = _matrix(model, f"{name} {band} {side}", values)
-    gaps = _gaps(model, float(one.layer_resistance.at(*TYPICAL)))
+    gaps, stack = _layers(model, optics, panes=panes)
     still = [(np.zeros(size), np.zeros(size))] * (len(gaps) - 1)
     absorbed = [
         (optics.absorptances.outer, np.zeros(size)),
         *still,
         (optics.absorptances.inner, np.full(size, optics.back_absorptance)),
     ]
-    faces = [(one.emissivity_out, NO_EMISSION), *[(NO_EMISSION,) * 2] * len(still),
-             (NO_EMISSION, one.emissivity_in)]  # fmt: skip
     layers: dict[str, str] = {f"gap_{k}_name": gap for k, gap in enumerate(gaps, 1)}
-    for k, (pair, emissivities) in enumerate(zip(absorbed, faces, strict=True), 1):
+    for k, (pair, pane) in enumerate(zip(absorbed, stack, strict=True), 1):
         key = "outside_layer" if k == 1 else f"layer_{k}"
-        layers[f"{key}_name"] = _pane(model, *emissivities)
+        layers[f"{key}_name"] = pane
         for side, values in zip(("front", "back"), pair, strict=True):
             layers[f"{key}_directional_{side}_absorptance_matrix_name"] = _matrix(
                 model, f"{name} layer {k} {side}", values[None, :]
@@ -152,17 +163,50 @@ def _thermal_model(model: Model) -> str:
     return name
 
 
-def _pane(model: Model, front: float, back: float) -> str:
-    """A virtual layer that conducts well, with the emissivities of its faces."""
-    name = f"Layer {front:g} {back:g}"
+def _layers(model: Model, optics: WindowOptics, *, panes: bool) -> tuple[list[str], list[str]]:
+    """Names of the gaps and of the layers of a system, outermost first."""
+    if panes and optics.panes is not None:
+        real = [
+            _pane(model, *one.emissivity, one.thickness, one.conductivity)
+            for one in optics.panes.layers
+        ]
+        (gap,) = optics.panes.gaps
+        return [_gas_gap(model, gap)], real
+    one = optics.fenestration
+    gaps = _gaps(model, float(one.layer_resistance.at(*TYPICAL)))
+    faces = [(one.emissivity_out, NO_EMISSION), *[(NO_EMISSION,) * 2] * (len(gaps) - 1),
+             (NO_EMISSION, one.emissivity_in)]  # fmt: skip
+    return gaps, [_pane(model, *pair, PANE, PANE_CONDUCTIVITY) for pair in faces]
+
+
+def _pane(model: Model, front: float, back: float, thickness: float, conductivity: float) -> str:
+    """A layer with the emissivities of its faces; its sun is in the matrices."""
+    name = f"Layer {front:g} {back:g} {1e3 * thickness:g} mm {conductivity:g}"
     model.setdefault("WindowMaterial:Glazing", {})[name] = {
         "optical_data_type": "BSDF",
-        "thickness": PANE,
-        "conductivity": PANE_CONDUCTIVITY,
+        "thickness": thickness,
+        "conductivity": conductivity,
         "infrared_transmittance_at_normal_incidence": 0.0,
         "front_side_infrared_hemispherical_emissivity": front,
         "back_side_infrared_hemispherical_emissivity": back,
     }
+    return name
+
+
+def _gas_gap(model: Model, gap: GasGap) -> str:
+    """The gap between two panes."""
+    known = [(gas, share) for gas, share in gap.gas if share > 0.0]
+    gas = " ".join(f"{gas} {share:g}" for gas, share in known)
+    name = f"{gas} {1e3 * gap.width:g} mm"
+    mixture: dict[str, object] = {
+        "thickness": gap.width, "number_of_gases_in_mixture": len(known),
+    }  # fmt: skip
+    for k, (one, share) in enumerate(known, 1):
+        mixture |= {f"gas_{k}_type": one.title(), f"gas_{k}_fraction": share}
+    model.setdefault("WindowMaterial:GasMixture", {})[gas] = mixture
+    model.setdefault("WindowMaterial:Gap", {})[name] = {
+        "thickness": gap.width, "gas_or_gas_mixture_": gas, "pressure": 101325.0,
+    }  # fmt: skip
     return name
 
 

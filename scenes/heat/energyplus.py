@@ -48,6 +48,8 @@ def energyplus_twin(study: StudyFile, found: BalancedRooms) -> EnergyPlusTwin:
 
 def _optics(system: FenestrationSystem) -> WindowOptics:
     heat = thermal_system(system)
+    closure, stated = system.closure, system.u_value is not None  # a stated U is not its panes'
     return WindowOptics(
-        system.solar, system.visible, heat.fenestration, heat.absorptances, heat.back_absorptance
-    )
+        system.solar, system.visible, heat.fenestration, heat.absorptances, heat.back_absorptance,
+        None if closure is None or stated else closure.unit,
+    )  # fmt: skip

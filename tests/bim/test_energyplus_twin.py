@@ -11,7 +11,7 @@ import pytest
 
 from bim.energyplus_operation import FILE
 from bim.energyplus_twin import EnergyPlusTwin, TwinAir, TwinRoom
-from bim.energyplus_windows import AIR, TYPICAL, WindowOptics
+from bim.energyplus_windows import AIR, TYPICAL, WindowOptics, complex_state
 from bim.model import Building
 from bim.shoebox import WindowRectangle, shoebox
 from bim.to_thermal import thermal_room
@@ -20,6 +20,7 @@ from mitsuba_cfs.errors import DataError
 from thermal.blackbox import Fenestration, LayerAbsorptances
 from thermal.climate import Climate
 from thermal.emitters import IdealLoads
+from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, Openings
 from thermal.zone import Gains
 
 HOURS = 8760
@@ -134,6 +135,47 @@ def test_gains_set_points_and_limits_are_those_of_the_hours():
     (plant,) = model["ZoneHVAC:IdealLoadsAirSystem"].values()
     assert plant["maximum_sensible_heating_capacity"] == 900.0
     assert "cooling_limit" not in plant
+
+
+def panes() -> GlazingUnit:
+    """Two panes of which no two numbers are alike."""
+    outer = GlazingLayer(0.004, 0.9, (0.81, 0.82))
+    inner = GlazingLayer(0.006, 1.0, (0.05, 0.83))
+    return GlazingUnit((outer, inner), (GasGap(0.014, (("argon", 0.85), ("air", 0.15))),))
+
+
+def test_two_known_panes_are_written_with_their_gas():
+    model: dict = {}
+    complex_state(model, "glass", replace(optics(), unit=panes()), panes=True)
+    state = model["Construction:ComplexFenestrationState"]["glass"]
+    outer, inner = (
+        model["WindowMaterial:Glazing"][state[key]]
+        for key in ("outside_layer_name", "layer_2_name")
+    )
+    assert "layer_3_name" not in state
+    assert (outer["thickness"], inner["thickness"]) == (0.004, 0.006)
+    assert outer["back_side_infrared_hemispherical_emissivity"] == 0.82
+    assert inner["front_side_infrared_hemispherical_emissivity"] == 0.05
+    gap = model["WindowMaterial:Gap"][state["gap_1_name"]]
+    mixture = model["WindowMaterial:GasMixture"][gap["gas_or_gas_mixture_"]]
+    assert gap["thickness"] == 0.014
+    assert (mixture["gas_1_type"], mixture["gas_1_fraction"]) == ("Argon", 0.85)
+    assert (mixture["gas_2_type"], mixture["gas_2_fraction"]) == ("Air", 0.15)
+    assert model["Matrix:TwoDimension"]["glass layer 2 back"]["values"][0]["value"] == 0.25
+
+
+def test_panes_among_states_or_behind_a_shade_are_a_resistance():
+    shade = GlazingLayer(0.0005, 0.15, (0.9, 0.9), openings=Openings(top=0.1))
+    shaded = GlazingUnit((shade, *panes().layers), (GasGap(0.1), *panes().gaps))
+    one = replace(optics(), unit=panes())
+    for name, system, alone in (
+        ("switched", one, False),
+        ("shade", replace(one, unit=shaded), True),
+    ):
+        model: dict = {}
+        complex_state(model, name, system, panes=alone)
+        assert "layer_4_name" in model["Construction:ComplexFenestrationState"][name]
+        assert "WindowMaterial:GasMixture" not in model
 
 
 def test_a_window_has_its_matrices_and_the_resistance_of_the_blackbox():

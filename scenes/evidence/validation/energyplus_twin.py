@@ -4,11 +4,10 @@
 
 Each study runs by `cfs thermal STUDY.toml --energyplus`; EnergyPlus then runs the model that this
 has written, with the study's own weather file.  With `--their-sun` our balance is solved again with
-EnergyPlus' sun in every hour: on the outer walls, in the window layers and in the room's surfaces;
-and once more with the resistance of the window layers that EnergyPlus is told, which ours follows
-by temperature.  What still differs then is neither's.  With `--open-sky` it is solved again as if
-nothing hid the sky from the outer faces' longwave, and the share of the sky that each face sees
-stands beside EnergyPlus' own.
+EnergyPlus' sun in every hour: on the outer walls, in the window layers and in the room's surfaces
+(of windows by two panes).  What still differs then is not the sun's.  With `--open-sky` it is
+solved again as if nothing hid the sky from the outer faces' longwave, and the share of the sky
+that each face sees stands beside EnergyPlus' own.
 """
 
 from __future__ import annotations
@@ -23,14 +22,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.energyplus_windows import GAPS, TYPICAL, WARMER_AIR
 from mitsuba_cfs.progress import silent
 from scenes.evidence.validation.energyplus_run import run_written
 from scenes.heat.energyplus import energyplus_twin
 from scenes.heat.study import BalancedRooms, run_study
 from scenes.heat.study_file import read_study
 from scenes.room.zone import RoomZone, balances
-from thermal.blackbox import Fenestration, LayerResistance
 
 Hours = NDArray[np.float64]  # [H] or [H, N]
 SETTLED = 7 * 24  # hours left out of the temperatures at the start
@@ -44,7 +41,7 @@ LAYER = "Surface Window Total Absorbed Shortwave Radiation Rate Layer {}"
 INSIDE_FACE, OUTSIDE_FACE = (f"Surface {side} Face Temperature" for side in ("Inside", "Outside"))
 CONVECTED = "Surface Inside Face Convection Heat Gain Rate"
 RADIATED = "Surface Inside Face Net Surface Thermal Radiation Heat Gain Rate"
-WINDOWS = (LAYER.format(1), LAYER.format(GAPS + 1), INSIDE_FACE, OUTSIDE_FACE, CONVECTED, RADIATED)
+WINDOWS = (LAYER.format(1), LAYER.format(2), INSIDE_FACE, OUTSIDE_FACE, CONVECTED, RADIATED)
 # our sums of the sun, and what the table calls them
 SUMS = {"incident_w": "sun on", "transmitted_w": "sun in", "absorbed_room_w": "sun kept"}
 
@@ -83,10 +80,9 @@ def compared(
         tables["ours under an open sky"] = again([under_open_sky(room) for room in found.rooms])
     if their_sun:
         pairs = zip(twin.zones, found.rooms, strict=True)
-        sunned = [with_their_sun(zone, room, theirs) for zone, room in pairs]
-        tables["ours with EnergyPlus' sun"] = again(sunned)
-        told = [with_their_windows(room) for room in sunned]
-        tables["and with its windows' resistance"] = again(told)
+        tables["ours with EnergyPlus' sun"] = again(
+            [with_their_sun(zone, room, theirs) for zone, room in pairs]
+        )
     return tables
 
 
@@ -157,16 +153,16 @@ def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
     What a window's inner layer takes from the room is in none of EnergyPlus' outputs; it is what
     its face gives to air and room more than it has from the other layer and from outside.
     """
-    sun, number = room.solar, GAPS + 1  # of the inner layer
+    sun = room.solar
     outer, inner = sun.absorbed_outer.copy(), sun.absorbed_inner.copy()
     for k, window in enumerate(room.zone.windows):
         of = _outputs(theirs, f"{zone} W{k}")
         outer[:, k] = of(LAYER.format(1)) / window.area
         warm, cold = of(INSIDE_FACE), of(OUTSIDE_FACE)
-        resistance = told_resistance(window.states[0], 0.5 * (warm + cold))
+        between = window.states[0].layer_resistance.at(0.5 * (warm + cold), warm - cold)
         given = -of(CONVECTED) - of(RADIATED)
-        taken = given / window.area - (cold - warm) / resistance
-        inner[:, k] = np.where(of(LAYER.format(number)) > 0.0, np.maximum(taken, 0.0), 0.0)
+        taken = given / window.area - (cold - warm) / between
+        inner[:, k] = np.where(of(LAYER.format(2)) > 0.0, np.maximum(taken, 0.0), 0.0)
     facade, inside = sun.facade.copy(), sun.inside.copy()
     for index, surface in enumerate(room.zone.surfaces):
         name = shouted(f"{zone} S{index}")
@@ -182,32 +178,6 @@ def with_their_sun(zone: str, room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
         window_inside=None if sun.window_inside is None else np.zeros_like(sun.window_inside),
     )  # fmt: skip
     return replace(room, solar=solar, gains=room.gains | their_sums(zone, room, theirs))
-
-
-def told_resistance(one: Fenestration, mean_c: Hours) -> Hours:
-    """Resistance between a window's layers in EnergyPlus' model [m2 K/W], by their mean [degC].
-
-    Still air of `bim.energyplus_windows`: that at 10 C, less as the air conducts better.
-    """
-    at_ten = float(one.layer_resistance.at(*TYPICAL))
-    return at_ten / (1.0 + WARMER_AIR * (mean_c - TYPICAL[0]))
-
-
-def as_told(one: Fenestration) -> Fenestration:
-    """A window's system with the resistance between its layers that EnergyPlus is told."""
-    conductance = 1.0 / float(one.layer_resistance.at(*TYPICAL))
-    shape = (conductance, conductance * WARMER_AIR, 0.0, 0.0, 0.0, 0.0)
-    return replace(one, resistance=LayerResistance("surface", shape))
-
-
-def with_their_windows(room: RoomZone) -> RoomZone:
-    """A room whose window layers have the resistance that EnergyPlus is told."""
-    windows = tuple(
-        replace(window, states=tuple(as_told(one) for one in window.states))
-        for window in room.zone.windows
-    )
-    zone = replace(room.zone, windows=windows)
-    return replace(room, room=replace(room.room, zone=zone))
 
 
 def _outputs(theirs: pd.DataFrame, name: str) -> Callable[[str], Hours]:
