@@ -18,7 +18,7 @@ from bim.defaults import CLEAR_GLAZING
 from bim.guarded import RoomBoundary, room_boundaries
 from bim.ifc.accounting import account_of
 from bim.ifc.corrections import Corrections, corrections_beside
-from bim.ifc.defects import model_defects
+from bim.ifc.defects import DRAWN_TWICE, model_defects
 from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.found_rooms import found_rooms
 from bim.ifc.furniture import furnished
@@ -93,7 +93,8 @@ def read_ifc(
         found, more = _space(index, boundary, records, around, elements=elements, finishes=finishes)
         spaces += found
         problems += more
-    problems += lost_glass(attached, spaces)
+    again = {problem.where for problem in problems if problem.kind == DRAWN_TWICE}
+    problems += lost_glass(attached, spaces, again)
     problems += boundary_problems(source, spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
     problems += more

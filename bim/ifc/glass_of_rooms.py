@@ -10,7 +10,7 @@ none stays open.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,10 +102,14 @@ def glass_of_rooms(
     )  # fmt: skip
 
 
-def lost_glass(attachments: Sequence[Attachment], spaces: Sequence[Space]) -> list[Problem]:
+def lost_glass(
+    attachments: Sequence[Attachment], spaces: Sequence[Space], repeated: Collection[str]
+) -> list[Problem]:
     """Glass before a room that is no window of the finished room; rooms left out say so themselves.
 
     None is known: the last net under the cutting of solids.
+
+    Args: repeated: GUIDs of windows that are drawn again, of which one counts.
     """
     problems = []
     for space in spaces:
@@ -117,7 +121,7 @@ def lost_glass(attachments: Sequence[Attachment], spaces: Sequence[Space]) -> li
                 continue
             filling, area = one.aperture.filling, one.glass.area
             lost = area - windows.get(filling.guid, 0.0)
-            if lost > LEAST_LOST * area:
+            if lost > LEAST_LOST * area and filling.guid not in repeated:
                 what = f"{filling.ifc_class} {filling.name}: {lost:.2f} m2 before {space.label}"
                 done = "are no window of it: that part gives no daylight"
                 problems.append(Problem(filling.guid, what, done, glass=lost, kind="lost glass"))

@@ -9,6 +9,7 @@ import shapely
 from bim.apertures import Aperture, Filling
 from bim.ifc import building as reading
 from bim.ifc.building import read_ifc
+from bim.ifc.defects import DRAWN_TWICE
 from bim.planes import plane_through
 from bim.rooms import Attachment, room_pieces, room_solid
 from bim.solids import prism
@@ -68,6 +69,17 @@ def test_glass_that_is_lost_in_the_cutting_is_said(tmp_path, monkeypatch):
     (problem,) = lost(path)
     assert problem.glass == pytest.approx(GLASS_AREA, rel=1e-6)
     assert problem.what.startswith("IfcWindow W1: 3.64 m2 before R1")
+
+
+def test_a_window_that_is_drawn_twice_has_lost_nothing(tmp_path):
+    small, walls = box_model()
+    small.window(walls["south"], name="W1 again")
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    assert sum(window.area for window in building.spaces[0].windows) == pytest.approx(GLASS_AREA)
+    assert any(problem.kind == DRAWN_TWICE for problem in building.problems)
+    assert not [problem for problem in building.problems if problem.kind == "lost glass"]
 
 
 def test_glass_above_a_room_and_behind_a_screen_is_said(tmp_path):
