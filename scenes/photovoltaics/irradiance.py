@@ -13,7 +13,8 @@ from bim.model import Element
 from bim.to_tracer import element_surfaces
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, item, silent
-from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
+from mitsuba_cfs.sky.matrix import series_matrix, sky_series
+from mitsuba_cfs.sky.three_part import three_part
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
 from mitsuba_cfs.trace.sun_shade import sunlit_shares
@@ -61,11 +62,12 @@ def cell_irradiance(
     edges = np.concatenate([module.edges for module in modules])
     number = np.repeat(np.arange(len(modules)), [len(module.points) for module in modules])
     normals = np.stack([module.normal for module in modules])[number]
-    series = sky_series(weather, "solar")
+    series = three_part(sky_series(weather, "solar"))
     steps = np.flatnonzero(series.diffuse_horizontal + series.direct_normal > 0)
-    some = weather.select(steps)
-    sky = sky_matrix(some, SUBDIVISION, "solar", "sky").astype(np.float32)
-    sun = sky_matrix(some, SUBDIVISION, "solar", "sun").astype(np.float32)
+    ground = {"ground_reflectance": weather.albedo, "dtype": np.float32}
+    sky, sun = (
+        series_matrix(series, steps, SUBDIVISION, part, **ground) for part in ("sky", "sun")
+    )
     shares = sunlit_shares(
         surfaces, points, normals, series.sun[steps], edges=edges, seed=seed, progress=progress
     )
