@@ -60,7 +60,7 @@ class MoistZone:
     outdoor_air: FloatArray  # [H] [m3/s]
     vapour: FloatArray  # [H] sources [kg/s]
     humidify_to: float = 0.0  # relative humidity held by a humidifier, 0 to 1
-    dehumidify_to: float = 1.0  # held by a cooler; 1: only what condenses
+    dehumidify_to: float = 1.0  # held by a cooler; 1: by none, vapour condenses of itself
 
     def __post_init__(self) -> None:
         order = 0.0 <= self.humidify_to <= self.dehumidify_to <= 1.0
@@ -74,7 +74,7 @@ class Humidity:
     ratio: FloatArray  # [H] [kg/kg]
     relative: FloatArray  # [H] 0 to 1
     humidify: FloatArray  # [H] latent heat given to the air [W]
-    dehumidify: FloatArray  # [H] latent heat taken from it [W]
+    dehumidify: FloatArray  # [H] latent heat that a cooler takes from it [W]
 
 
 def zone_humidity(
@@ -107,12 +107,11 @@ def zone_humidity(
     inflow = flow * outdoor_ratio[:, None] + source
     means, added = _hours(start, flow, density, links, inflow, (mass / row_s, low, high))
     latent = added * (EVAPORATION + VAPOUR_HEAT * air)
+    cooled = np.array([z.dehumidify_to < 1.0 for z in zones])
+    given, taken = np.maximum(latent, 0.0), np.maximum(-latent, 0.0) * cooled
     relative = relative_humidity(means, air, pressure[:, None])
     return tuple(
-        Humidity(
-            means[:, z], relative[:, z], np.maximum(latent[:, z], 0), np.maximum(-latent[:, z], 0)
-        )
-        for z in range(count)
+        Humidity(means[:, z], relative[:, z], given[:, z], taken[:, z]) for z in range(count)
     )
 
 

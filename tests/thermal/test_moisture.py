@@ -70,6 +70,7 @@ def test_closed_room_gathers_its_vapour_and_condenses_at_saturation():
     np.testing.assert_allclose(np.diff(found.ratio[:2]), rise, rtol=1e-6)
     assert found.relative.max() <= 1.0 + 1e-8
     assert found.relative[-1] == pytest.approx(1.0)
+    assert (found.dehumidify == 0).all()  # of itself, on cold walls: no plant's cold
 
 
 def test_air_from_the_next_room_brings_its_vapour():
