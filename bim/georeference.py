@@ -25,10 +25,14 @@ class Georeference:
 def crs_name(text: str) -> str:
     """One spelling of a coordinate reference system: "EPSG:25832" for its code, URN or URL.
 
-    Of a compound system only the name is kept; GeoJSON's CRS84 has one of its own.
+    Of a compound system only the name is kept; GeoJSON's CRS84 has one of its own, and so have the
+    German surveys' ETRS89_UTM31 to 33.
     """
     if re.search(r"CRS84", text, re.IGNORECASE):
         return LONGITUDE_LATITUDE
+    zone = re.search(r"ETRS89_UTM(3[123])(?!\d)", text, re.IGNORECASE)
+    if zone:
+        return f"EPSG:258{zone[1]}"
     found = re.search(r"EPSG\D+(?:[\d.]+[:/]+)?(\d{4,6})\b", text, re.IGNORECASE)
     return f"EPSG:{found[1]}" if found else text.strip()
 

@@ -13,14 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.context.objects import TERRAIN, ContextFile, ContextObject, read_object
+from bim.context.city import FINEST, NO_GEOMETRY, city_object, triangles_of_surfaces
+from bim.context.objects import ContextFile, read_object
 from bim.georeference import crs_name
-from bim.polygon_rooms import triangles_of_rings
 from mitsuba_cfs.errors import DataError
 
 DEPTH = {"MultiSurface": 1, "CompositeSurface": 1, "Solid": 2, "MultiSolid": 3, "CompositeSolid": 3}
-TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "PlantCover")
-FINEST = 3.0  # level of detail below which geometry is taken: 2.2 is, 3 (with openings) is not
 
 
 def read_cityjson(path: Path) -> ContextFile:
@@ -40,13 +38,11 @@ def read_cityjson(path: Path) -> ContextFile:
     for name, thing in things.items():
         geometry = _geometry(thing, name, path)
         if geometry is None:
-            left_out["object(s) without geometry below LoD 3"] += not _has_children(thing)
+            left_out[NO_GEOMETRY] += not _has_children(thing)
             continue
         triangles = _triangles(geometry, vertices, name, path)
         if len(triangles):
-            terrain = thing.get("type") in TERRAINS
-            kind = {"ifc_class": TERRAIN} if terrain else {}
-            objects.append(ContextObject(name, triangles, **kind))
+            objects.append(city_object(name, str(thing.get("type")), triangles))
     metadata = content.get("metadata")
     system = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
     return ContextFile(
@@ -98,16 +94,12 @@ def _triangles(
     geometry: dict[str, Any], vertices: NDArray[np.float64], name: str, path: Path
 ) -> NDArray[np.float64]:
     """Triangles [T, 3, 3] of all surfaces of a geometry."""
-    found = [np.empty((0, 3, 3))]
     try:
-        for surface in _surfaces(geometry["boundaries"], DEPTH[geometry["type"]]):
-            rings = tuple(_ring(ring, vertices) for ring in surface)
-            if rings and min(map(len, rings)) >= 3:
-                found.append(triangles_of_rings(rings))
+        surfaces = _surfaces(geometry["boundaries"], DEPTH[geometry["type"]])
+        return triangles_of_surfaces([_ring(ring, vertices) for ring in one] for one in surfaces)
     except (TypeError, ValueError, KeyError, IndexError):
         message = "expected lists of the numbers of vertices"
         raise DataError(message, file=path, element=name[:60], field="boundaries") from None
-    return np.concatenate(found)
 
 
 def _ring(ring: list[int], vertices: NDArray[np.float64]) -> NDArray[np.float64]:

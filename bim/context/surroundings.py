@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from calendar import month_name
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -13,6 +14,8 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.coarser import coarser_mesh
+from bim.context.citygml import SUFFIXES as CITYGML
+from bim.context.citygml import read_citygml
 from bim.context.cityjson import read_cityjson
 from bim.context.crowns import crown_elements
 from bim.context.footprints import read_footprints
@@ -28,7 +31,7 @@ from bim.model import TREES, Building, Element, Problem
 from bim.outdoors import lifted_sites, unblinded
 from mitsuba_cfs.errors import DataError
 
-READ = (*SUFFIXES, ".city.json", ".geojson", ".json", ".csv", ".toml", *GRIDS)
+READ = (*SUFFIXES, ".city.json", *CITYGML, ".geojson", ".json", ".csv", ".toml", *GRIDS)
 TERRAIN_DEG = 1.0  # between nodes of terrain next to each other
 SEEN_DEG = 0.2  # by which corners may move as seen from the building: less than the sun's disc
 PLAIN = 100  # triangles that an object may keep whatever its distance
@@ -43,8 +46,8 @@ def with_surroundings(
 ) -> Building:
     """The building with what files hold of its surroundings.
 
-    OBJ, STL, PLY, glTF, CityJSON, GeoJSON footprints with heights, terrain as a grid; the horizon
-    of PVGIS; trees as leaves (`bim.context.crowns`), some of them in some months only.  Objects
+    OBJ, STL, PLY, glTF, CityJSON, CityGML, GeoJSON footprints with heights, terrain as a grid; the
+    horizon of PVGIS; trees as leaves (`bim.context.crowns`), some in some months only.  Objects
     on a map are placed by the building's map conversion, else by its latitude and longitude, which
     are then taken as those of its origin; others lie in the building's own metres.  What the
     surroundings hold of the building itself is left out.  Corners of far objects are merged by
@@ -110,6 +113,8 @@ def read_context(path: Path) -> ContextFile:
         return read_footprints(path)
     if ending == ".json":
         return read_cityjson(path)
+    if ending in CITYGML:
+        return read_citygml(path)
     if ending == ".toml":
         return read_trees(path)
     if ending in GRIDS:
@@ -192,6 +197,10 @@ def _placed(
     if context.on_own_map and building.georeference is None:
         message = "lies on a map, and the building has none: give --surroundings-offset"
         raise DataError(message, file=context.path)
+    own = building.georeference.crs if building.georeference is not None else None
+    if context.crs not in (None, own) and not re.fullmatch(r"[A-Za-z]+:\w+", context.crs):
+        message = f"{context.crs[:80]!r} is no EPSG code: give --surroundings-offset"
+        raise DataError(message, file=context.path, field="coordinate system")
     if context.crs is None and not context.on_own_map:
         return list(context.objects)
     return [

@@ -1,7 +1,5 @@
 """A gbXML file as elements without namespaces, with its units: `read_document`.
 
-Entities are refused: a file of a few lines with them can fill the memory or read other files.
-
 Source: gbXML schema 0.37 to 7.03 (https://www.gbxml.org).
 """
 
@@ -12,15 +10,14 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.xml_elements import xml_elements
 from mitsuba_cfs.errors import DataError
 
 MOST_BYTES = 256 << 20
-DEEPEST = 100  # elements within each other
 METRES = {
     "Kilometers": 1e3, "Meters": 1.0, "Centimeters": 0.01, "Millimeters": 1e-3, "Miles": 1609.344,
     "Yards": 0.9144, "Feet": 0.3048, "Inches": 0.0254,
@@ -159,9 +156,7 @@ def read_document(path: Path) -> Document:
 
     Raises: `DataError` for a file that cannot be read, is no gbXML, or declares entities.
     """
-    root = _root(path)
-    if root.tag != "gbXML":
-        raise DataError(f"expected gbXML, got {root.tag[:40]}", file=path)
+    ((root, _),) = xml_elements(path, "gbXML", depth=1, most_bytes=MOST_BYTES)
 
     def factor(field: str, units: dict[str, float], default: str) -> float:
         unit = root.get(field, default)
@@ -175,44 +170,3 @@ def read_document(path: Path) -> Document:
         factor("areaUnit", SQUARE_METRES, "SquareMeters"),
         factor("volumeUnit", CUBIC_METRES, "CubicMeters"),
     )  # fmt: skip
-
-
-def _root(path: Path) -> ElementTree.Element:
-    """The root of an XML file, its elements and attributes without namespaces."""
-    builder = ElementTree.TreeBuilder()
-    parser = expat.ParserCreate(namespace_separator="}")
-    depth = 0
-
-    def local(name: str) -> str:
-        return name.rpartition("}")[2]
-
-    def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > DEEPEST:
-            line = parser.CurrentLineNumber
-            raise DataError(f"line {line}: elements nested too deeply", file=path)
-        builder.start(local(name), {local(key): value for key, value in attributes.items()})
-
-    def end(name: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(local(name))
-
-    def refuse(*_: object) -> None:
-        raise DataError("declares entities, which are not read", file=path)
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler = builder.data
-    parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise DataError(f"is too big: at most {MOST_BYTES >> 20} MiB are read", file=path)
-        parser.Parse(path.read_bytes(), True)
-        return builder.close()
-    except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
-    except (expat.ExpatError, LookupError, ValueError) as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(f"is no XML: {error}", file=path) from None

@@ -43,7 +43,7 @@ aperture_option = click.option(
 )  # fmt: skip
 surroundings_option = click.option(
     "--surroundings", multiple=True, type=FILE,
-    help="What stands around: OBJ, STL, PLY, glTF, CityJSON, GeoJSON; PVGIS's horizon.",
+    help="What stands around: OBJ, STL, PLY, glTF, CityJSON, CityGML, GeoJSON; PVGIS's horizon.",
 )  # fmt: skip
 surroundings_offset_option = click.option(
     "--surroundings-offset", type=float, nargs=3, metavar="X Y Z",
