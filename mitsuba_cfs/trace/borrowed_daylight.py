@@ -14,7 +14,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.image import add_picture_paths
+from mitsuba_cfs.trace.image import add_seen_and_reflected
 from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
@@ -52,7 +52,7 @@ def borrowed_daylight(
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         path = dr.arange(mi.UInt32, dr.width(paths.patch))
-        add_picture_paths(
+        add_seen_and_reflected(
             tracer,
             bins,
             matrix,
@@ -60,8 +60,6 @@ def borrowed_daylight(
             paths.outward,
             mi.Bool(True),
             row=paths.patch,
-            lit=paths.patch,
-            later=paths.patch,
             beta=mi.Float(1),
             stream=paths.patch,
             sample=path - paths.patch * dr.opaque(mi.UInt32, n),

@@ -17,7 +17,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.image import add_picture_paths
+from mitsuba_cfs.trace.image import add_seen_and_reflected
 from mitsuba_cfs.trace.sampling import (
     batch_key,
     empty_sums,
@@ -159,7 +159,7 @@ def _add_paths(
             centre=centre, generator=generator, **paths,
         )  # fmt: skip
         active &= ~met
-    add_picture_paths(
+    add_seen_and_reflected(
         tracer, bins, matrix, start, direction, active,
-        lit=paths["row"], later=paths["row"], beta=mi.Float(1), generator=generator, **paths,
+        beta=mi.Float(1), generator=generator, **paths,
     )  # fmt: skip

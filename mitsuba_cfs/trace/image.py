@@ -23,6 +23,7 @@ from mitsuba_cfs.trace.sampling import (
     batch_key,
     column,
     empty_sums,
+    opaque,
     path_generator,
     pixel_places,
     sums_of,
@@ -213,6 +214,31 @@ def seen_patch(
     glazed = met & (group != OPAQUE)
     local = tracer.to_local(group, direction, glazed)
     return hit, mi.UInt32(group) * mi.UInt32(bins.size) + bins.index(local), glazed & (local.z > 0)
+
+
+def add_seen_and_reflected(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    matrix: mi.Float64,
+    eye: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+    *,
+    row: mi.UInt32,
+    beta: mi.Float,
+    **paths: Any,
+) -> None:
+    """What rays show in one row each: the patch that they meet, L = 1, or what a surface reflects.
+
+    Args: paths: `stream` to `max_depth` of `add_picture_paths`.
+    """
+    hit, patch, glazed = seen_patch(tracer, bins, eye, direction, active)
+    slot = row * opaque(bins.size * len(tracer.groups), mi.UInt32) + patch
+    dr.scatter_add(matrix, mi.Float64(beta), slot, glazed)
+    add_picture_paths(
+        tracer, bins, matrix, eye, direction, hit,
+        active=active, row=row, lit=row, later=row, beta=beta, **paths,
+    )  # fmt: skip
 
 
 def add_picture_paths(

@@ -14,8 +14,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate, cache_entry
-from mitsuba_cfs.trace.image import add_picture_paths, seen_patch
-from mitsuba_cfs.trace.sampling import opaque
+from mitsuba_cfs.trace.image import add_seen_and_reflected
 from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
 
@@ -48,21 +47,14 @@ def window_exchange(
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         normal = tracer.exterior_normal(paths.group)
         path = dr.arange(mi.UInt32, dr.width(paths.patch))
-        start, inward = mi.Point3f(paths.position - normal * tracer.epsilon), paths.inward(tracer)
-        hit, patch, glazed = seen_patch(tracer, bins, start, inward, mi.Bool(True))
-        slot = paths.patch * opaque(columns, mi.UInt32) + patch
-        dr.scatter_add(matrix, mi.Float64(1), slot, glazed)
-        add_picture_paths(
+        add_seen_and_reflected(
             tracer,
             bins,
             matrix,
-            start,
-            inward,
-            hit,
-            active=mi.Bool(True),
+            mi.Point3f(paths.position - normal * tracer.epsilon),
+            paths.inward(tracer),
+            mi.Bool(True),
             row=paths.patch,
-            lit=paths.patch,
-            later=paths.patch,
             beta=mi.Float(1),
             stream=paths.stream,
             sample=path - paths.patch * dr.opaque(mi.UInt32, n),
