@@ -201,6 +201,15 @@ def test_boundary_surfaces_stand_for_a_solid(tmp_path):
     assert enclosed_volume(one.triangles - CORNER) == pytest.approx(312.0, rel=1e-6)
 
 
+def test_a_solid_is_made_of_the_surfaces_that_it_names(tmp_path):
+    """One face is the solid's own, so that the boundary surfaces alone are no closed body."""
+    *linked, last = GABLE
+    inner = solid(2, [*LINKS[:-1], member(GABLE[last])])
+    body = inner + "".join(map(boundary, linked))
+    (one,) = read_context(written(tmp_path, model(gable(body)))).objects
+    assert enclosed_volume(one.triangles - CORNER) == pytest.approx(312.0, rel=1e-6)
+
+
 def test_links_that_lead_nowhere_leave_the_next_complete_geometry(tmp_path):
     whole = gable(solid(2, [*LINKS[:-1], '<gml:surfaceMember xlink:href="#no"/>']) + BOUNDARIES)
     (one,) = read_context(written(tmp_path, model(whole))).objects
