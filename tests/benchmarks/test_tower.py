@@ -7,6 +7,7 @@ import pytest
 from bim.ifc.building import read_ifc
 from bim.shell import open_edges
 from scenes.demo.make_office import HEIGHT
+from scenes.evidence.benchmarks import tower as benchmark
 from scenes.evidence.benchmarks.tower import NORTH, ROOMS, SOUTH, tower
 
 
@@ -26,6 +27,19 @@ def test_each_storey_has_ten_rooms_eleven_windows_and_nine_doors(model):
 def test_half_a_storey_is_refused(rooms):
     with pytest.raises(ValueError, match="a multiple of 10 rooms"):
         tower(rooms)
+
+
+def test_options_behind_two_dashes_go_to_the_command(monkeypatch, capsys):
+    asked = []
+
+    def measured(rooms, options, *, of):
+        asked.append((rooms, options, of))
+        return benchmark.Used(rooms, 10.0, 6.0, 1.0)
+
+    monkeypatch.setattr(benchmark, "measured", measured)
+    benchmark.main(["10", "30", "--of", "check", "--", "--processes", "2"])
+    assert asked == [(10, ["--processes", "2"], "check"), (30, ["--processes", "2"], "check")]
+    assert "| 30 | 10.0 | 6 | 0.33 | 0.00 | 1.00 |" in capsys.readouterr().out
 
 
 @pytest.mark.slow

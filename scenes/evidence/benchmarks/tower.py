@@ -169,11 +169,13 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("rooms", nargs="*", type=int, default=[10, 30, 100, 300])
     parser.add_argument("--of", choices=["run", "check", "thermal"], default="run")
     parser.add_argument("--write", type=Path, help="write the first tower here, and no more")
-    given, options = parser.parse_known_args(arguments)
+    own, options = list(sys.argv[1:] if arguments is None else arguments), []
+    if "--" in own:
+        own, options = own[: own.index("--")], own[own.index("--") + 1 :]
+    given = parser.parse_args(own)
     if given.write is not None:
         tower(given.rooms[0]).write(str(given.write))
         return
-    options = [option for option in options if option != "--"]
     print("| rooms | processor s | elapsed s | by room | of each room more | GB |")
     print("|---" * 6 + "|")
     last = None
