@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from mitsuba_cfs.errors import DataError
 
 PIECES = (
     b"-1e999",
@@ -46,6 +49,29 @@ def mutations(content: bytes, count: int, seed: int = 0) -> Iterator[bytes]:
                         piece = PIECES[int(random.integers(len(PIECES)))]
                         spoilt[numbers[0] : numbers[0] + 1] = piece
         yield bytes(spoilt)
+
+
+def refusals(path: Path, contents: Iterable[bytes], read: Callable[[Path], object]) -> int:
+    """How many of a file's contents are refused, each by one line; the others are read."""
+    refused = 0
+    for content in contents:
+        path.write_bytes(content)
+        try:
+            read(path)
+        except DataError as error:
+            refused += 1
+            assert "\n" not in str(error)
+    return refused
+
+
+def changed(content: Any, *path: str | int, value: Any = None) -> Any:
+    """A JSON document with one value changed, in place."""
+    *above, last = path
+    owner = content
+    for step in above:
+        owner = owner[step]
+    owner[last] = value
+    return content
 
 
 ODD = (None, [], {}, "", "x", True, 0, -1, 0.5, 1e12, 1e308, [1], [[1, 2, 3]], {"type": "x"})

@@ -14,6 +14,7 @@ from mitsuba_cfs.bsdf.spectral_pane import read_spectral_pane
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes import cli
+from tests.bim.bim_fuzz import changed
 
 
 def point(results, wavelengths, polar=8.0, emergence="hemispherical"):
@@ -124,16 +125,6 @@ def test_a_thickness_may_stand_beside_the_file(tmp_path):
         read_spectral_pane(path)
 
 
-def without(content, *path, value=None):
-    """The content with one thing changed."""
-    *above, last = path
-    owner = content
-    for step in above:
-        owner = owner[step]
-    owner[last] = value
-    return content
-
-
 FIRST = ("data", 0, "dataPoints", 0)
 
 
@@ -159,7 +150,7 @@ FIRST = ("data", 0, "dataPoints", 0)
 )  # fmt: skip
 def test_what_is_no_pane_is_named(tmp_path, path, value, words):
     with pytest.raises(DataError, match=words) as caught:
-        read_pane_file(written(tmp_path, without(document(ROWS), *path, value=value)))
+        read_pane_file(written(tmp_path, changed(document(ROWS), *path, value=value)))
     assert "optical.json" in str(caught.value) and "\n" not in str(caught.value)
 
 

@@ -17,7 +17,7 @@ from mitsuba_cfs.bsdf.shade_file import read_shade_file
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes import cli
-from tests.bim.bim_fuzz import mutations, odd_values
+from tests.bim.bim_fuzz import changed, mutations, odd_values
 from tests.bsdf.test_generate import Centres
 
 SPECTRUM = [{"wavelength": w, "T": 0.0, "Rf": 0.2, "Rb": 0.8} for w in (0.3, 0.55, 0.8, 2.5)]
@@ -150,16 +150,6 @@ def test_blinds_are_those_of_windows_engine(variant, real_data, tmp_path, name, 
         off = ours - area @ np.array(theirs.matrix)
         assert np.abs(off).max() < worst, block
         assert np.sqrt((off**2).mean()) < rms, block
-
-
-def changed(content, *path, value=None):
-    """The content with one thing changed."""
-    *above, last = path
-    owner = content
-    for step in above:
-        owner = owner[step]
-    owner[last] = value
-    return content
 
 
 GEOMETRY = ("composition", 0, "extra_data", "geometry")
