@@ -16,7 +16,7 @@ pytest.importorskip("pyradiance")
 pytestmark = [pytest.mark.peer, pytest.mark.usefixtures("variant")]
 
 POINTS = np.array([[1.0, 1.2, 0.85], [2.2, 2.2, 0.85], [1.4, 0.8, 0.85]])
-RUNS = 16
+RUNS = 32
 SUNS = {
     "room": [[0.1, -1, 0.5], [-0.6, -1, 0.9], [0.9, -1, 0.35]],
     "L": [[0.2, -1, 0.6], [-1, 0.1, 1.6], [-1, -0.7, 1.5]],
@@ -76,7 +76,7 @@ def test_scattered_sun(name, tmp_path):
     scattering = KlemsScattering(KLEMS_FULL, system.transmission_front, np.zeros(KLEMS_FULL.size))
     ours = direct_sun_matrix(
         surfaces, outside, groups, [scattering] * len(groups), POINTS,
-        np.tile([0, 0, 1.0], (3, 1)), suns=suns, window_points=1024,
+        np.tile([0, 0, 1.0], (3, 1)), suns=suns, window_points=4096,
     )  # fmt: skip
     theirs = np.stack([radiance_illuminance(name, sun, tmp_path) for sun in suns], axis=2)
     mean, error = theirs.mean(axis=0), theirs.std(axis=0, ddof=1) / np.sqrt(RUNS)
