@@ -18,6 +18,7 @@ SMALLEST_PANE = 0.01  # less glass than this is a spy hole, not a window [m2]
 OUTLINE = 0.004  # round openings become polygons this near [m]
 OUT_OF_WALL = 0.05  # glass this far outside its opening's depth is reported [m]
 ASTRAY = 0.3  # and from here on moved into the opening's middle [m]
+ACROSS = 0.5  # cosine: a window may lean so far from what is across its wall
 PANE_JOINT = 0.002  # gaps between drawn panes up to this are no frame [m]
 
 
@@ -43,6 +44,7 @@ class Filling:
     panes: int | None = None
     is_open: bool = False  # nothing fills it: a doorway between two rooms
     frame_hue: Colour = GREY
+    across: NDArray[np.float64] | None = None  # [3] through its host beside the opening, either way
 
     @property
     def is_door(self) -> bool:
@@ -78,11 +80,13 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     source = clear if len(clear) else filling.triangles
     if filling.opening is not None and not len(clear) and not len(source):
         source = filling.opening
-    direction = main_direction(source)
+    direction = _looking(filling, source)
     if direction is None:
         what = f"{filling.name}: has no extent"
         return None, [Problem(filling.guid, what, "left out", "window")]
     facing = np.abs(_unit(area_vectors(source)) @ direction) > FLAT
+    if not facing.any():
+        return None, [Problem(filling.guid, f"{filling.name}: faces nowhere", "left out", "window")]
     areas = np.linalg.norm(area_vectors(source), axis=1)
     depth = source.mean(axis=1) @ direction
     middle = np.average(depth[facing], weights=areas[facing])
@@ -107,6 +111,18 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
         glass, more = _assumed_glass(filling, opening)
         problems += more
     return Aperture(filling, plane, opening, glass), problems
+
+
+def _looking(filling: Filling, source: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Direction [3] of either sign that a filling looks in: of most area, but across its wall.
+
+    A low window in a thick wall may show more of its sill and reveals than of itself.
+    """
+    direction = main_direction(source)
+    if direction is None or filling.across is None or abs(direction @ filling.across) > ACROSS:
+        return direction
+    towards = np.abs(_unit(area_vectors(source)) @ filling.across) > ACROSS
+    return main_direction(source[towards])
 
 
 def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Problem]]:

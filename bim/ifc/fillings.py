@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
+from dataclasses import replace
 
 import ifcopenshell
 import ifcopenshell.util.element
 import ifcopenshell.util.unit
 import numpy as np
+from numpy.typing import NDArray
 
-from bim.apertures import Filling
+from bim.apertures import Filling, main_direction
 from bim.colours import GREY
 from bim.ifc.project import definitions_of, psets_of
 from bim.ifc.shapes import Shape
@@ -26,6 +29,7 @@ PANELS = (
     "IfcSlab",
     "IfcCovering",
 )
+BESIDE = 0.05  # what of a wall lies this near to an opening is beside it [m]
 LEAST_GLASS = 0.05  # transparent area that makes a panel a window [m2]
 
 
@@ -49,7 +53,9 @@ def read_fillings(
         if shape is None:
             what = f"{element.is_a()} {element.Name or ''}: has no geometry"
             problems.append(Problem(element.GlobalId, what, "drawn as its opening"))
-        fillings.append(_filling(element, shape or body, body, host, scale))
+        one = _filling(element, shape or body, body, host, scale)
+        wall = None if host is None else shapes.get(host.id())
+        fillings.append(replace(one, across=through_host(wall, body)))
     for class_name in PANELS:
         with contextlib.suppress(RuntimeError):  # a class that this schema does not have
             for element in model.by_type(class_name):
@@ -77,6 +83,27 @@ def _opening_and_host(element: ifcopenshell.entity_instance):
             return opening, voids.RelatingBuildingElement
         return opening, None
     return None, None
+
+
+def unfilled_openings(
+    model: ifcopenshell.file,
+) -> Iterator[tuple[ifcopenshell.entity_instance, ifcopenshell.entity_instance | None]]:
+    """Openings that no relation fills, with the element that each is cut out of, if any."""
+    for opening in model.by_type("IfcOpeningElement"):
+        if not getattr(opening, "HasFillings", None):
+            voids = getattr(opening, "VoidsElements", None) or ()
+            yield opening, voids[0].RelatingBuildingElement if voids else None
+
+
+def through_host(host: Shape | None, opening: Shape | None) -> NDArray[np.float64] | None:
+    """Direction [3] of either sign through a wall or roof beside one of its openings."""
+    if host is None or opening is None:
+        return None
+    corners = opening.triangles.reshape(-1, 3)
+    low, high = corners.min(axis=0) - BESIDE, corners.max(axis=0) + BESIDE
+    near = np.all(host.triangles.max(axis=1) > low, axis=1)
+    near &= np.all(host.triangles.min(axis=1) < high, axis=1)
+    return main_direction(host.triangles[near])
 
 
 def _panel(element, shape: Shape | None, scale: float) -> Filling | None:

@@ -18,7 +18,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.apertures import Aperture, Filling, aperture_of, main_direction, shadow
-from bim.ifc.fillings import read_fillings
+from bim.ifc.fillings import read_fillings, unfilled_openings
 from bim.ifc.project import storey_of
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
@@ -265,8 +265,8 @@ def _unfilled(
     lows = {record.solid.guid: float(record.solid.low[2]) for record in records}
     panes = [a.aperture.plane.to_world(shapely.get_coordinates(a.region)) for a in filled]
     middles = np.array([pane.mean(axis=0) for pane in panes]).reshape(-1, 3)
-    for opening, host in _openings(source) if records else ():
-        filling = _pane_of(source, opening, host)
+    for opening, host in unfilled_openings(source.model) if records else ():
+        filling = None if host is None else _pane_of(source, opening, host)
         if filling is None or _holds_one(filling, middles):
             continue
         aperture, _ = aperture_of(filling)
@@ -296,15 +296,6 @@ def _unfilled(
             done, kind = "taken as a window with the default frame", "opening glazed"
         problems.append(Problem(filling.guid, what, done, glass=area, kind=kind))
     return GlassOfRooms(tuple(attachments), tuple(glass), closed, tuple(problems))
-
-
-def _openings(source: Source):
-    """Openings that no relation fills, with the element that each is cut out of."""
-    for opening in source.model.by_type("IfcOpeningElement"):
-        if getattr(opening, "HasFillings", None):
-            continue
-        for voids in getattr(opening, "VoidsElements", None) or ():
-            yield opening, voids.RelatingBuildingElement
 
 
 def _pane_of(source: Source, opening, host) -> Filling | None:

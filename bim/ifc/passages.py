@@ -18,6 +18,7 @@ from trimesh.intersections import slice_faces_plane
 
 from bim.apertures import Aperture, Filling, aperture_of, shadow
 from bim.guarded import Outline
+from bim.ifc.fillings import through_host, unfilled_openings
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.planes import GRID, Facet, Plane, polygons_of, triangulated
@@ -68,15 +69,16 @@ def open_apertures(
     Args: bodies: triangles [N, 3, 3] of all that may stand there [m].
     """
     found = []
-    for opening in source.model.by_type("IfcOpeningElement"):
+    for opening, host in unfilled_openings(source.model):
         shape = source.shapes.get(opening.id())
-        if shape is None or getattr(opening, "HasFillings", None):
+        if shape is None:
             continue
         body = shape.triangles
-        nothing = np.zeros(len(body), dtype=bool)
+        across = None if host is None else through_host(source.shapes.get(host.id()), shape)
         filling = Filling(
-            shape.guid, shape.name, "IfcOpeningElement", body, nothing, opening=body, is_open=True
-        )
+            shape.guid, shape.name, "IfcOpeningElement", body, np.zeros(len(body), dtype=bool),
+            opening=body, is_open=True, across=across,
+        )  # fmt: skip
         aperture, _ = aperture_of(filling)
         if aperture is not None:
             found.append(replace(aperture, glass=aperture.opening))

@@ -16,6 +16,7 @@ from bim.solids import prism
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WIDTH, box_model
 
 RECESS = 0.15  # from the room's faces to the glass [m]
+LOW_WINDOW = (1.0, 1.8, 1.2, 0.4)  # x, sill, width, height [m]
 LEFT, SILL, RIGHT, TOP = 1.0, 0.75, 3.0, 2.25
 
 
@@ -97,6 +98,24 @@ def test_glass_above_a_room_and_behind_a_screen_is_said(tmp_path):
     (problem,) = [p for p in building.problems if p.glass > 0]
     assert problem.glass == pytest.approx(left, rel=1e-3)
     assert "lie above the top of room R1" in problem.what or "no room behind" in problem.what
+
+
+@pytest.mark.parametrize("clear", [False, True], ids=["nothing clear", "all clear"])
+def test_a_low_window_with_a_deep_sill_looks_out_of_its_wall(clear, tmp_path):
+    """Its sill shows more area than itself, and lies flat; Renga draws windows like this."""
+    x, sill, width, height = LOW_WINDOW
+    small, walls = box_model(window=False)
+    window = small.window(walls["south"], glazed=False, place=LOW_WINDOW)
+    look = small.style("look", 0.9, 0.8) if clear else small.style("plain", 0.7)
+    boxes = [((x, -0.18, sill), (width, 0.06, height)), ((x, -0.5, sill), (width, 0.7, 0.02))]
+    small.show(window, [(*box, look) for box in boxes])
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    (found,) = building.spaces[0].windows
+    assert found.area == pytest.approx(width * height * (1.0 if clear else 0.7), rel=0.02)
+    assert found.normal == pytest.approx([0.0, -1.0, 0.0], abs=1e-6)
+    assert building.account.glass_out == pytest.approx(found.area)
 
 
 def lost(path) -> list:

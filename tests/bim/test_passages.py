@@ -33,12 +33,14 @@ def read(small: SmallIfc, path, **options) -> Building:
     return read_ifc(path / "rooms.ifc", **options)
 
 
-def partition(small: SmallIfc, low: float, thick: float, *places: tuple) -> None:
-    """A wall across the box with openings that nothing fills."""
+def partition(
+    small: SmallIfc, low: float, thick: float, *places: tuple, beyond: float = 0.1
+) -> None:
+    """A wall across the box with openings that nothing fills, cut so far beyond it [m]."""
     wall = small.box("IfcWall", "partition", (0, low, 0), (WIDTH, thick, HEIGHT))
     for x, sill, width, height in places:
-        size = (width, thick + 0.2, height)
-        opening = small.box("IfcOpeningElement", "doorway", (x, low - 0.1, sill), size)
+        size = (width, thick + 2 * beyond, height)
+        opening = small.box("IfcOpeningElement", "doorway", (x, low - beyond, sill), size)
         ifcopenshell.api.feature.add_feature(small.model, feature=opening, element=wall)
 
 
@@ -54,6 +56,12 @@ def test_a_doorway_is_a_face_of_both_rooms(tmp_path):
     for room in ("lit", "dark"):
         assert open_areas(building, room) == pytest.approx([2.1], rel=1e-6)
     assert not any(f.pane for s in building.spaces for f in s.faces if f.adjacency != "space")
+
+
+def test_a_doorway_cut_deeper_than_it_is_wide(tmp_path):
+    small = two_rooms(thick=0.2)
+    partition(small, SOUTH, 0.2, DOORWAY, beyond=0.8)
+    assert open_areas(read(small, tmp_path), "dark") == pytest.approx([2.1], rel=1e-6)
 
 
 def test_each_of_two_doorways_is_open(tmp_path):
