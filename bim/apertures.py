@@ -12,13 +12,15 @@ from bim.colours import GREY, Colour
 from bim.defaults import FRAME_FRACTION
 from bim.model import Problem
 from bim.planes import Plane, area_vectors, plane_through, polygons_of, without_slits
+from bim.rays import RayMesh, ray_mesh
 
 FLAT = 0.95  # cosine: panes within 18 degrees of the main direction are in its plane
 SMALLEST_PANE = 0.01  # less glass than this is a spy hole, not a window [m2]
 OUTLINE = 0.004  # round openings become polygons this near [m]
 OUT_OF_WALL = 0.05  # glass this far outside its opening's depth is reported [m]
 ASTRAY = 0.3  # and from here on moved into the opening's middle [m]
-ACROSS = 0.5  # cosine: a window may lean so far from what is across its wall
+LEAST_WITHIN = 0.3  # of the opening: less that a drawn frame leaves free is no glass
+BESIDE = 0.05  # what of a wall lies this near to an opening is beside it [m]
 PANE_JOINT = 0.002  # gaps between drawn panes up to this are no frame [m]
 
 
@@ -44,7 +46,7 @@ class Filling:
     panes: int | None = None
     is_open: bool = False  # nothing fills it: a doorway between two rooms
     frame_hue: Colour = GREY
-    across: NDArray[np.float64] | None = None  # [3] through its host beside the opening, either way
+    beside: NDArray[np.float64] | None = None  # [K, 3, 3] of its host, near the opening
 
     @property
     def is_door(self) -> bool:
@@ -85,8 +87,6 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
         what = f"{filling.name}: has no extent"
         return None, [Problem(filling.guid, what, "left out", "window")]
     facing = np.abs(_unit(area_vectors(source)) @ direction) > FLAT
-    if not facing.any():
-        return None, [Problem(filling.guid, f"{filling.name}: faces nowhere", "left out", "window")]
     areas = np.linalg.norm(area_vectors(source), axis=1)
     depth = source.mean(axis=1) @ direction
     middle = np.average(depth[facing], weights=areas[facing])
@@ -94,7 +94,9 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     if filling.opening is not None:
         plane, more = _in_its_opening(filling, plane)
         problems += more
-    opening = shadow(filling.triangles if filling.opening is None else filling.opening, plane)
+    opening = _filled(
+        shadow(filling.triangles if filling.opening is None else filling.opening, plane)
+    )
     if opening.area < SMALLEST_PANE:
         what = f"{filling.name}: opening has no area"
         return None, [Problem(filling.guid, what, "left out", "window")]
@@ -108,21 +110,45 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     elif filling.is_door:
         glass = shapely.Polygon()
     else:
-        glass, more = _assumed_glass(filling, opening)
+        glass, more = _assumed_glass(filling, plane, opening)
         problems += more
     return Aperture(filling, plane, opening, glass), problems
 
 
 def _looking(filling: Filling, source: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Direction [3] of either sign that a filling looks in: of most area, but across its wall.
+    """Direction [3] of either sign that a filling looks in: of most area, but not into its wall.
 
     A low window in a thick wall may show more of its sill and reveals than of itself.
     """
     direction = main_direction(source)
-    if direction is None or filling.across is None or abs(direction @ filling.across) > ACROSS:
+    if direction is None or filling.opening is None or filling.beside is None:
         return direction
-    towards = np.abs(_unit(area_vectors(source)) @ filling.across) > ACROSS
-    return main_direction(source[towards])
+    centre = 0.5 * sum(getattr(filling.opening, end)(axis=(0, 1)) for end in ("min", "max"))
+    wall = ray_mesh(filling.beside)
+    if _leads_out(direction, centre, filling.opening, wall):
+        return direction
+    rest = filling.opening
+    while len(rest):
+        way = main_direction(rest)
+        if way is None:
+            break
+        facing = np.abs(_unit(area_vectors(source)) @ way) > FLAT
+        if facing.any() and _leads_out(way, centre, filling.opening, wall):
+            return main_direction(source[facing])
+        rest = rest[np.abs(_unit(area_vectors(rest)) @ way) <= FLAT]
+    return direction
+
+
+def _leads_out(
+    way: NDArray[np.float64],
+    centre: NDArray[np.float64],
+    opening: NDArray[np.float64],
+    wall: RayMesh,
+) -> bool:
+    """Whether both ways from the middle of an opening its wall is left without meeting it."""
+    reach = float(np.abs((opening - centre) @ way).max()) + BESIDE
+    _, hit = wall.first_hits(np.stack([centre, centre]), np.stack([way, -way]), reach)
+    return bool(np.all(hit < 0))
 
 
 def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Problem]]:
@@ -162,12 +188,16 @@ def _drawn_glass(
 
 
 def _assumed_glass(
-    filling: Filling, opening: shapely.Geometry
+    filling: Filling, plane: Plane, opening: shapely.Geometry
 ) -> tuple[shapely.Geometry, list[Problem]]:
-    """The opening less a frame of the stated or the default size."""
+    """The opening less a frame of the stated, the drawn or the default size."""
+    frame = shadow(filling.triangles, plane)
+    within = _polygonal(_filled(frame).difference(frame).intersection(opening))
     if filling.glazed_fraction is not None and 0 < filling.glazed_fraction <= 1:
         glass = inset_to_fraction(opening, filling.glazed_fraction)
         source = f"GlazingAreaFraction {filling.glazed_fraction:.2f}"
+    elif within.area > LEAST_WITHIN * opening.area:
+        glass, source = within, "what its drawn frame leaves free"
     elif filling.frame_width is not None and opening.buffer(-filling.frame_width).area > 0:
         glass = opening.buffer(-filling.frame_width, join_style="mitre")
         source = f"frame {filling.frame_width * 1000:.0f} mm wide as stated"
@@ -198,6 +228,11 @@ def shadow(triangles: NDArray[np.float64], plane: Plane) -> shapely.Geometry:
     polygons = shapely.polygons(flat[covering > 1e-9])
     merged = shapely.union_all(shapely.set_precision(polygons, 1e-6))
     return _polygonal(without_slits(merged, PANE_JOINT).simplify(OUTLINE))
+
+
+def _filled(outline: shapely.Geometry) -> shapely.Geometry:
+    """The outline, its holes filled."""
+    return shapely.union_all([shapely.Polygon(p.exterior) for p in polygons_of(outline)])
 
 
 def _polygonal(geometry: shapely.Geometry) -> shapely.Geometry:

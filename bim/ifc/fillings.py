@@ -12,7 +12,7 @@ import ifcopenshell.util.unit
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.apertures import Filling, main_direction
+from bim.apertures import BESIDE, Filling
 from bim.colours import GREY
 from bim.ifc.project import definitions_of, psets_of
 from bim.ifc.shapes import Shape
@@ -29,7 +29,6 @@ PANELS = (
     "IfcSlab",
     "IfcCovering",
 )
-BESIDE = 0.05  # what of a wall lies this near to an opening is beside it [m]
 LEAST_GLASS = 0.05  # transparent area that makes a panel a window [m2]
 
 
@@ -55,7 +54,7 @@ def read_fillings(
             problems.append(Problem(element.GlobalId, what, "drawn as its opening"))
         one = _filling(element, shape or body, body, host, scale)
         wall = None if host is None else shapes.get(host.id())
-        fillings.append(replace(one, across=through_host(wall, body)))
+        fillings.append(replace(one, beside=beside_opening(wall, body)))
     for class_name in PANELS:
         with contextlib.suppress(RuntimeError):  # a class that this schema does not have
             for element in model.by_type(class_name):
@@ -95,15 +94,14 @@ def unfilled_openings(
             yield opening, voids[0].RelatingBuildingElement if voids else None
 
 
-def through_host(host: Shape | None, opening: Shape | None) -> NDArray[np.float64] | None:
-    """Direction [3] of either sign through a wall or roof beside one of its openings."""
+def beside_opening(host: Shape | None, opening: Shape | None) -> NDArray[np.float64] | None:
+    """Triangles [K, 3, 3] of a wall or roof near one of its openings; None without either."""
     if host is None or opening is None:
         return None
     corners = opening.triangles.reshape(-1, 3)
     low, high = corners.min(axis=0) - BESIDE, corners.max(axis=0) + BESIDE
     near = np.all(host.triangles.max(axis=1) > low, axis=1)
-    near &= np.all(host.triangles.min(axis=1) < high, axis=1)
-    return main_direction(host.triangles[near])
+    return host.triangles[near & np.all(host.triangles.min(axis=1) < high, axis=1)]
 
 
 def _panel(element, shape: Shape | None, scale: float) -> Filling | None:

@@ -18,7 +18,7 @@ from trimesh.intersections import slice_faces_plane
 
 from bim.apertures import Aperture, Filling, aperture_of, shadow
 from bim.guarded import Outline
-from bim.ifc.fillings import through_host, unfilled_openings
+from bim.ifc.fillings import beside_opening, unfilled_openings
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.planes import GRID, Facet, Plane, polygons_of, triangulated
@@ -74,10 +74,10 @@ def open_apertures(
         if shape is None:
             continue
         body = shape.triangles
-        across = None if host is None else through_host(source.shapes.get(host.id()), shape)
+        beside = None if host is None else beside_opening(source.shapes.get(host.id()), shape)
         filling = Filling(
             shape.guid, shape.name, "IfcOpeningElement", body, np.zeros(len(body), dtype=bool),
-            opening=body, is_open=True, across=across,
+            opening=body, is_open=True, beside=beside,
         )  # fmt: skip
         aperture, _ = aperture_of(filling)
         if aperture is not None:
