@@ -35,10 +35,10 @@ def matrix_variance(
     for g, row in enumerate(state):
         left = np.zeros(len(found))
         by_rays = reflected is not None and g < outdoors
-        lit = sky.without_sun() if by_rays else sky.whole
         for j in np.unique(row):
             some = row == j
-            mean, sun = lit[:, some].sum(axis=1) / hours, None
+            lit = sky.without_sun(some) if by_rays else sky.whole[:, some]
+            mean, sun = lit.sum(axis=1) / hours, None
             if by_rays:
                 sun = sky.sun[:, some].sum(axis=1) / hours, reflected.replaced(some) / hours
             for q in traced.parts.of(g):
@@ -118,8 +118,9 @@ def _left_by_means(
     """What means over a group's parts change in the sensors' mean [S] in some of the hours."""
     g, j = which
     points, normals = traced.scene.sensors()
-    passed = sky.without_sun() if traced.five_phase else sky.whole
-    mean = coarse_sky(passed[:, some], traced.sampling.subdivision).sum(axis=1, keepdims=True)
+    passed = sky.without_sun(some) if traced.five_phase else sky.whole[:, some]
+    total = passed.sum(axis=1, dtype=float, keepdims=True)
+    mean = coarse_sky(total, traced.sampling.subdivision)  # of the sum: a hundredth of the work
     if g >= len(traced.parts.cells) or not mean.any():
         return np.zeros(len(points))
     through = straight.transmission(g, j)

@@ -33,7 +33,13 @@ from mitsuba_cfs.trace.reflected_sun import (
     view_shares,
     window_shares,
 )
-from mitsuba_cfs.trace.room_beam import RoomCells, room_cells, room_light, room_shares
+from mitsuba_cfs.trace.room_beam import (
+    ReflectingCells,
+    RoomCells,
+    room_cells,
+    room_light,
+    room_shares,
+)
 from mitsuba_cfs.trace.scene import TracedScene, kept_scene
 
 BATCHES = 4  # each with its own paths, places and points
@@ -77,7 +83,7 @@ class ReflectedSun:
         return kept_scene(self.traced.scene.exterior, parts, centre=centre)
 
     @cached_property
-    def cells(self) -> tuple[RoomCells, RoomCells]:
+    def cells(self) -> tuple[RoomCells, ReflectingCells]:
         """The room's surfaces, in cells of two widths."""
         return room_cells(self.inside, self.traced.scene.interior)
 

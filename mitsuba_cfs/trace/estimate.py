@@ -113,10 +113,7 @@ def accumulate(
     try:
         while not finished:
             values = batch(count)
-            step = values - mean
-            mean = mean + step / (count + 1)
-            spread = spread + step * (values - mean)
-            sum_spread = sum_spread + step.sum(axis=-1) * (values - mean).sum(axis=-1)
+            mean, spread, sum_spread = _with_another(values, mean, spread, sum_spread, count)
             count += 1
             state = BatchMean(
                 count, mean, spread, sum_spread, before + time.monotonic() - start, False
@@ -171,6 +168,18 @@ class _Keeper:
         end = time.monotonic()
         self._saved = (state.count, state.finished)
         self._next = end + max(SAVE_SECONDS, SAVE_SHARE * (end - start))
+
+
+def _with_another(
+    values: NDArray[np.float64], mean: Any, spread: Any, sum_spread: Any, count: int
+) -> tuple[Any, Any, Any]:
+    """Mean, sum of squares about it, and that of the last axis' sums, with one more batch."""
+    if not count:  # about itself the first has none
+        return np.array(values), np.zeros_like(values), np.zeros(values.shape[:-1])
+    step = values - mean
+    mean = mean + step / (count + 1)
+    left = values - mean
+    return mean, spread + step * left, sum_spread + step.sum(axis=-1) * left.sum(axis=-1)
 
 
 def _estimate(state: BatchMean) -> Estimate:

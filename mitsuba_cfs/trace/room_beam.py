@@ -15,6 +15,7 @@ diffuse surfaces"; the cells' irradiance is a mean over each.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -23,10 +24,18 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, pixel_places, vectors
+from mitsuba_cfs.trace.sampling import (
+    column,
+    lattice_2d,
+    opaque,
+    opaque_vector,
+    pixel_places,
+    tables,
+    vectors,
+)
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_discs import Scattering
-from mitsuba_cfs.trace.sun_paths import Places, face_places, on_disc_of
+from mitsuba_cfs.trace.sun_paths import Places, met_faces, on_disc_of
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
 CELLS = 4096  # into which the surfaces' area is divided, about, on either side
@@ -37,55 +46,93 @@ LAST = 1e-4  # share of a sensor's light by the last reflection that is counted
 BOUNCES = 256  # at most; light falls to `LAST` before in all but white rooms
 POINTS = 1024  # on each group in each batch, that the sun is followed from
 EDGE_SHARE = 4  # of them, one in so many where the sun reaches all
+SEARCHED = 4  # of the search for a cell: kernels differ by so many halvings of the table
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 RAYS = 2**21  # at once
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RoomCells:
     """Cells of a room's surfaces, cubes by the surface's side."""
 
-    edge: float  # of the cubes [m]
+    edge: float  # of the cubes [m], before they are joined
     low: NDArray[np.float64]  # [3] of all
+    halvings: int  # of the cubes' numbers, which join them
     keys: NDArray[np.int64]  # [c] sorted
     area: NDArray[np.float64]  # [c] [m2]
-    points: Places  # evenly over the area, cell after cell
-    first: NDArray[np.int64]  # [c + 1] of each cell's points
 
     @property
     def size(self) -> int:
         """How many cells there are."""
         return len(self.keys)
 
-    def of(self, places: Places) -> NDArray[np.int64]:
-        """The cell of each place, -1 where there is none."""
-        keys = _keys(places, self.low, self.edge)
-        found = np.minimum(np.searchsorted(self.keys, keys), self.size - 1)
-        return np.where(self.keys[found] == keys, found, -1)
+    @cached_property
+    def _table(self) -> mi.UInt64:
+        return column(self.keys, mi.UInt64)
+
+    def of(self, point: mi.Point3f, normal: mi.Vector3f, active: mi.Bool) -> mi.Int32:
+        """The cell of each place in a kernel, -1 where there is none."""
+        place = (mi.Vector3f(point) - opaque_vector(self.low)) / opaque(self.edge)
+        cube = (mi.Vector3i(dr.floor(place)) & 0xFFFF) >> self.halvings
+        side = mi.Vector3i(dr.round(FACING * normal)) + 1
+        key = mi.UInt64(cube.x) << 37 | mi.UInt64(cube.y) << 21 | mi.UInt64(cube.z) << 5
+        key += mi.UInt64(side.x + 3 * side.y + 9 * side.z)
+        low, high = mi.UInt32(0), opaque(self.size - 1, mi.UInt32)
+        for _ in range(-(-self.size.bit_length() // SEARCHED) * SEARCHED):
+            middle = (low + high) >> 1
+            below = dr.gather(mi.UInt64, self._table, middle, active) < key
+            low = dr.select(below, dr.minimum(middle + 1, high), low)
+            high = dr.select(below, high, middle)
+        found = active & (dr.gather(mi.UInt64, self._table, low, active) == key)
+        return dr.select(found, mi.Int32(low), -1)
 
 
-def room_cells(inside: TracedScene, interior: Surfaces) -> tuple[RoomCells, RoomCells]:
+@dataclass(frozen=True, slots=True)
+class ReflectingCells:
+    """Cells that light is reflected between, and where their rays start."""
+
+    cells: RoomCells  # [w]
+    of: NDArray[np.int64]  # [c] which of them each narrower cell lies in
+    starts: Places  # [w * CELL_RAYS] evenly over each
+
+
+def room_cells(inside: TracedScene, interior: Surfaces) -> tuple[RoomCells, ReflectingCells]:
     """The cells of a room's surfaces, and the wider ones that these lie in."""
     area = float(interior.areas.sum())
     edge = float(np.sqrt(max(area, 1e-6) / CELLS))
     low = (interior.triangles.min(axis=(0, 1)) - inside.centre) - 0.37 * edge
-    points = _points_on(interior, inside)
-    return _cells(points, low, edge, area), _cells(points, low, WIDER * edge, area)
-
-
-def _cells(points: Places, low: NDArray[np.float64], edge: float, area: float) -> RoomCells:
-    """Cells of an edge from points even over the area [m2]."""
-    keys = _keys(points, low, edge)
+    points, side = _points_on(interior, inside)
+    cube = np.floor((points.point - low) / edge).astype(np.int64) & 0xFFFF
+    keys = ((cube[:, 0] << 37) | (cube[:, 1] << 21) | (cube[:, 2] << 5)) + side
     order = np.argsort(keys, kind="stable")
     found, first = np.unique(keys[order], return_index=True)
-    first = np.append(first, len(order))
-    return RoomCells(
-        edge, low, found, np.diff(first) * (area / AREA_POINTS), points.some(order), first
-    )
+    count = np.diff(np.append(first, len(order)))
+    narrow = RoomCells(edge, low, 0, found, count * (area / AREA_POINTS))
+
+    # the wider cells have the points of one narrower cell after the other
+    wide_keys, holder = np.unique(_joined(found), return_inverse=True)
+    wide_area = np.bincount(holder, narrow.area)
+    wide = RoomCells(edge, low, WIDER.bit_length() - 1, wide_keys, wide_area)
+    by_holder = np.argsort(holder, kind="stable")
+    ends = np.cumsum(count[by_holder])
+    shift = np.repeat(first[by_holder] - (ends - count[by_holder]), count[by_holder])
+    number = np.bincount(holder, count).astype(np.int64)
+    share = (np.arange(CELL_RAYS) + 0.5) / CELL_RAYS
+    chosen = (np.cumsum(number) - number)[:, None] + (number[:, None] * share).astype(np.int64)
+    chosen = chosen.ravel()
+    starts = points.some(order[chosen + shift[chosen]])
+    return narrow, ReflectingCells(wide, holder, starts)
+
+
+def _joined(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Keys of the cubes, `WIDER` in a row, that cubes with keys lie in."""
+    halvings, number = WIDER.bit_length() - 1, 0xFFFF
+    cubes = sum((((keys >> s) & number) >> halvings) << s for s in (37, 21, 5))
+    return cubes + (keys & 0x1F)
 
 
 def room_shares(
-    cells: tuple[RoomCells, RoomCells],
+    cells: tuple[RoomCells, ReflectingCells],
     inside: TracedScene,
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
@@ -100,19 +147,40 @@ def room_shares(
     """
     points, normals = (np.atleast_2d(v) for v in sensors)
     local = Places((points - inside.centre).astype(np.float32), normals.astype(np.float32))
-    narrow, wide = cells
-    first = _reflected(narrow, inside, local, local.size, samples, seed ^ 0x6A09E667)
-    holder = wide.of(narrow.points.some(narrow.first[:-1]))  # [c] the wide cell of each
-    entries = np.ones(narrow.size), (np.arange(narrow.size), holder)
+    narrow, wide = cells[0], cells[1].cells
+    every = np.arange(local.size)
+    first = _reflected(
+        narrow, inside, local, every, local.size, samples=samples, seed=seed ^ 0x6A09E667
+    )
+    entries = np.ones(narrow.size), (np.arange(narrow.size), cells[1].of)
     step = (first @ sparse.csr_array(entries, shape=(narrow.size, wide.size))).toarray()
-    between = _reflected(wide, inside, _starts(wide), wide.size, CELL_RAYS, seed)
+    between = _between(cells[1], inside, np.flatnonzero(step.any(axis=0)), seed)
     whole, found = step.sum(), np.zeros_like(step)
     for _ in range(BOUNCES):
         step = step @ between
         found += step
         if step.sum() <= LAST * (whole + found.sum()):
             break
-    return first.toarray() / narrow.area + (found / wide.area)[:, holder]
+    return first.toarray() / narrow.area + (found / wide.area)[:, cells[1].of]
+
+
+def _between(
+    wide: ReflectingCells, inside: TracedScene, met: NDArray[np.int64], seed: int
+) -> sparse.csr_array:
+    """What cells have of each other [w, w]: of those that some meet, and of what these meet.
+
+    The others, most of them the backs of walls, have no part in any sensor's light.
+    """
+    size = wide.cells.size
+    found, known = sparse.csr_array((size, size)), np.zeros(size, dtype=bool)
+    while len(met):
+        known[met] = True
+        found = found + _reflected(
+            wide.cells, inside, wide.starts, met, size, samples=CELL_RAYS, seed=seed
+        )
+        met = np.unique(found.indices)
+        met = met[~known[met]]
+    return found
 
 
 def room_light(
@@ -213,70 +281,76 @@ class _Beam:
         ray, lit = mi.Ray3f(origin, onwards), column(flat > 0, mi.Bool)
         hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=lit)
         lit &= hit.is_valid()
-        places, lit = face_places(inside, origin, onwards, hit, lit, lit)
-        kept = np.flatnonzero(lit)
-        cell = cells.of(places.some(kept))
-        kept, cell = kept[cell >= 0], cell[cell >= 0]
+        cell = cells.of(*met_faces(inside, origin, onwards, hit, lit), lit).numpy()
+        kept = np.flatnonzero(cell >= 0)
+        cell = cell[kept]
         entries = flat[kept].astype(float), (cell, hours[kept // value.shape[1]])
         return sparse.csr_array(sparse.coo_array(entries, shape=(cells.size, count)))
 
 
-def _starts(cells: RoomCells) -> Places:
-    """Points of the cells that their rays start from [c * CELL_RAYS], evenly over each."""
-    share = (np.arange(CELL_RAYS) + 0.5) / CELL_RAYS
-    chosen = cells.first[:-1, None] + (np.diff(cells.first)[:, None] * share).astype(np.int64)
-    return cells.points.some(chosen.ravel())
-
-
 def _reflected(
-    cells: RoomCells, inside: TracedScene, starts: Places, rows: int, samples: int, seed: int
+    cells: RoomCells,
+    inside: TracedScene,
+    starts: Places,
+    rows: NDArray[np.int64],
+    count: int,
+    *,
+    samples: int,
+    seed: int,
 ) -> sparse.csr_array:
-    """Irradiance of rows by a unit of irradiance on each cell that their rays meet [rows, c].
+    """Irradiance of rows by a unit of irradiance on each cell that their rays meet [count, c].
 
-    Args: starts: [rows * n] places that the rays of each row start from, in turn.
+    Args:
+        starts: [count * n] places that the rays of each row start from, in turn.
+        rows: those that rays are sent from; the others are empty.
     """
-    n, found = starts.size // max(rows, 1), sparse.csr_array((rows, cells.size))
+    n, found = starts.size // max(count, 1), sparse.csr_array((count, cells.size))
     block, key = max(1, RAYS // samples), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-    for begin in range(0, rows, block):
-        lane = dr.arange(mi.UInt32, min(block, rows - begin) * samples)
-        row = lane // dr.opaque(mi.UInt32, samples)
-        sample = lane - row * dr.opaque(mi.UInt32, samples)
-        row += dr.opaque(mi.UInt32, begin)
+    points, normals = starts.points(), starts.normals()
+    for begin in range(0, len(rows), block):
+        some = rows[begin : begin + block]
+        lane = dr.arange(mi.UInt32, len(some) * samples)
+        place = lane // dr.opaque(mi.UInt32, samples)
+        sample = lane - place * dr.opaque(mi.UInt32, samples)
+        row = dr.gather(mi.UInt32, column(some, mi.UInt32), place)
         start = row * dr.opaque(mi.UInt32, n) + sample % dr.opaque(mi.UInt32, n)
-        point = dr.gather(mi.Point3f, starts.points(), start)
-        normal = dr.gather(mi.Vector3f, starts.normals(), start)
+        point = dr.gather(mi.Point3f, points, start)
+        normal = dr.gather(mi.Vector3f, normals, start)
         u = lattice_2d(sample, mi.sample_tea_32(row, key)[0], 0)
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
         met = hit.is_valid()
         rho = inside.whole(hit.prim_index, way, met)
-        places, met, rho = face_places(inside, point, way, hit, met, met, rho)
-        kept = np.flatnonzero(met & (rho > 0))
-        cell = cells.of(places.some(kept))
-        kept, cell = kept[cell >= 0], cell[cell >= 0]
-        entries = rho[kept].astype(float) / samples, (begin + kept // samples, cell)
+        met &= rho > 0
+        cell = cells.of(*met_faces(inside, point, way, hit, met), met)
+        cell, rho = tables(cell, rho)
+        kept = np.flatnonzero(cell >= 0)
+        entries = rho[kept].astype(float) / samples, (some[kept // samples], cell[kept])
         found = found + sparse.csr_array(sparse.coo_array(entries, shape=found.shape))
     return found
 
 
-def _keys(places: Places, low: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
-    """One number for each cube and side of the surface [m]."""
-    cube = np.floor((places.point - low) / edge).astype(np.int64) & 0xFFFF
-    side = (np.round(FACING * places.normal).astype(np.int64) + 1) @ np.array([1, 3, 9])
-    return ((cube[:, 0] << 37) | (cube[:, 1] << 21) | (cube[:, 2] << 5)) + side
+@cache
+def _shares_of_corners() -> tuple[NDArray[np.float64], ...]:
+    """What points even over a triangle have of its corners, `AREA_POINTS` in turn."""
+    u, v = pixel_places(AREA_POINTS).T[:, :, None]
+    root = np.sqrt(u)
+    return 1 - root, root * (1 - v), root * v
 
 
-def _points_on(interior: Surfaces, inside: TracedScene) -> Places:
-    """Points even over the area of the surfaces, on both of their sides."""
+def _points_on(interior: Surfaces, inside: TracedScene) -> tuple[Places, NDArray[np.int64]]:
+    """Points even over the area of the surfaces, on both of their sides; numbers of the sides."""
     share = np.cumsum(interior.areas)
     marks = (np.arange(AREA_POINTS) + 0.5) / AREA_POINTS * share[-1]
     triangle = np.minimum(np.searchsorted(share, marks), len(share) - 1)
-    a, b, c = interior.triangles[triangle].swapaxes(0, 1)
-    u, v = pixel_places(AREA_POINTS).T[:, :, None]
-    root = np.sqrt(u)
-    point = a * (1 - root) + b * root * (1 - v) + c * root * v - inside.centre
-    normal = np.cross(b - a, c - a)
+    corners = interior.triangles.swapaxes(0, 1)
+    parts = zip(corners - inside.centre, _shares_of_corners(), strict=True)
+    point = sum(corner.take(triangle, axis=0) * part for corner, part in parts)
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    off = inside.epsilon[0] * normal
-    both = np.concatenate([point + off, point - off]), np.concatenate([normal, -normal])
-    return Places(both[0].astype(np.float32), both[1].astype(np.float32))
+    off = (inside.epsilon[0] * normal).take(triangle, axis=0)
+    both = np.concatenate([normal, -normal]).astype(np.float32)
+    side = (np.round(FACING * both).astype(np.int64) + 1) @ np.array([1, 3, 9])
+    of = np.concatenate([triangle, len(share) + triangle])
+    points = np.concatenate([point + off, point - off]).astype(np.float32)
+    return Places(points, both.take(of, axis=0)), side[of]

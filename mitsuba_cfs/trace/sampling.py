@@ -87,7 +87,9 @@ def column(values: ArrayLike, kind: type | None = None) -> Any:
     Args: kind: `mi.Float` by default.
     """
     kind = mi.Float if kind is None else kind
-    names = {mi.Float: np.float32, mi.UInt32: np.uint32, mi.Bool: np.bool_}
+    names = {
+        mi.Float: np.float32, mi.UInt32: np.uint32, mi.UInt64: np.uint64, mi.Bool: np.bool_,
+    }  # fmt: skip
     given = np.asarray(values, dtype=names[kind])
     memory = np.empty(given.nbytes + ALIGNMENT, dtype=np.uint8)
     start = -memory.ctypes.data % ALIGNMENT

@@ -16,14 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.sun import SUN_RADIUS
-from mitsuba_cfs.trace.sampling import column, lattice, lattice_2d
+from mitsuba_cfs.trace.sampling import column, lattice, lattice_2d, opaque, opaque_vector
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
-from mitsuba_cfs.trace.sun_ways import SunWay
+from mitsuba_cfs.trace.sun_ways import CLEAR, SunWay, meets_box
 
 RIM_RAYS = 16  # between two of them a straight edge hides 0.3 % of the disc at most
 RIM = 0.998  # of the disc's area within them
 DISC_RAYS = 16  # inside, for edges that leave the rim alone
 EDGE_RAYS = 256  # in each batch, to a disc that an edge crosses
+SPREAD = float(1.01 * SUN_RADIUS)  # of directions on the disc about its middle, at most
 LANES = 2**22  # rays at once
 TURN = 0.5 * (3 - 5**0.5)  # of a spiral between neighbours, the golden section of it
 
@@ -62,7 +63,13 @@ class SunDiscs:
     ) -> None:
         """Find the pairs whose disc an edge crosses."""
         self._around, self._scattering = around, scattering
-        sensor, sun = pairs(dr.width(around.place), dr.width(around.towards))
+        chosen = np.flatnonzero(self._before_windows())
+        shape = dr.width(around.place) * dr.width(around.towards)
+        self._whole = [np.zeros(shape, dtype=np.float32) for _ in scattering]
+        self._crossed = chosen
+        if not len(chosen):
+            return
+        sensor, sun = self._pair(column(chosen, mi.UInt32))
         stream = mi.sample_tea_32(sensor, dr.opaque(mi.UInt32, (seed ^ 0x3C6EF372) & 0xFFFFFFFF))[0]
         centre, turn = dr.gather(mi.Vector3f, around.towards, sun), lattice(sensor, stream, 4)
         total, first, alike = [mi.Float(0) for _ in scattering], mi.Int32(0), mi.Bool(True)
@@ -77,20 +84,19 @@ class SunDiscs:
             share = dr.select(inner, mi.Float(1 / DISC_RAYS), 0.0)
             total = [a + share * b for a, b in zip(total, values, strict=True)]
             dr.eval(*total, first, alike)
-        self._whole = [part.numpy() for part in total]
-        self._crossed = np.flatnonzero(~alike.numpy())
+        for whole, part in zip(self._whole, total, strict=True):
+            whole[chosen] = part.numpy()
+        self._crossed = chosen[~alike.numpy()]
 
     def light(self, key: mi.UInt32) -> list[NDArray[np.float32]]:
         """Mean over each disc of cos(sensor) tau(sun) through each group [G][S * Q]."""
-        found, suns = [part.copy() for part in self._whole], dr.width(self._around.towards)
+        found = [part.copy() for part in self._whole]
         step = LANES // EDGE_RAYS
         for start in range(0, len(self._crossed), step):
             crossed = self._crossed[start : start + step]
             lane = dr.arange(mi.UInt32, len(crossed) * EDGE_RAYS)
             row = lane // EDGE_RAYS
-            pair = dr.gather(mi.UInt32, column(crossed, mi.UInt32), row)
-            sensor = pair // dr.opaque(mi.UInt32, suns)
-            sun = pair - sensor * dr.opaque(mi.UInt32, suns)
+            sensor, sun = self._pair(dr.gather(mi.UInt32, column(crossed, mi.UInt32), row))
             centre = dr.gather(mi.Vector3f, self._around.towards, sun)
             # the sensor's alone: an hour's light does not hang on those computed with it
             stream = mi.sample_tea_32(sensor, key)[0]
@@ -98,6 +104,28 @@ class SunDiscs:
             for part, values in zip(found, self._rays(sensor, way)[0], strict=True):
                 part[crossed] = values.numpy().reshape(-1, EDGE_RAYS).mean(axis=1)
         return found
+
+    def _pair(self, number: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32]:
+        """Sensor and sun of pairs by their number."""
+        suns = dr.opaque(mi.UInt32, dr.width(self._around.towards))
+        sensor = number // suns
+        return sensor, number - sensor * suns
+
+    def _before_windows(self) -> NDArray[np.bool_]:
+        """Pairs [S * Q] whose disc may be seen through a window.
+
+        The sensor faces it, and it stands behind the box that holds one of the groups.
+        """
+        around, inside = self._around, self._around.inside
+        sensor, sun = pairs(dr.width(around.place), dr.width(around.towards))
+        towards = dr.gather(mi.Vector3f, around.towards, sun)
+        origin = dr.gather(mi.Point3f, around.place, sensor)
+        facing = dr.dot(dr.gather(mi.Vector3f, around.normal, sensor), towards) > -SPREAD
+        behind = mi.Bool(False)
+        for g, system in enumerate(self._scattering):
+            if system is not None:
+                behind |= _meets_group(inside, g, origin, towards)
+        return np.broadcast_to((facing & behind).numpy(), dr.width(sensor))
 
     def _rays(self, sensor: mi.UInt32, direction: mi.Vector3f) -> tuple[list[mi.Float], mi.Int32]:
         """cos(sensor) tau of rays to the sun through each group; which group passes them."""
@@ -121,6 +149,22 @@ class SunDiscs:
             for g, system in enumerate(self._scattering)
         ]
         return values, passed
+
+
+def _meets_group(
+    inside: TracedScene, group: int, origin: mi.Point3f, towards: mi.Vector3f
+) -> mi.Bool:
+    """Whether a disc about a direction may lie behind the box of a group, in the group's frame."""
+    windows = inside.groups[group].windows
+    corners = np.concatenate([w.triangles for w in windows]).reshape(-1, 3) - inside.centre
+    corners = corners @ inside.groups[group].frame.T
+    start, way = inside.to_group(group, mi.Vector3f(origin)), inside.to_group(group, towards)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    # what a ray to the disc's edge is off the middle's at the far side of the box
+    reach = dr.norm(opaque_vector(0.5 * (low + high)) - start)
+    reach += opaque(0.5 * np.linalg.norm(high - low))
+    margin = SPREAD * reach + CLEAR * inside.epsilon
+    return (way.z > -SPREAD) & meets_box(start, way, (low, high), margin)
 
 
 def pairs(first: int, second: int) -> tuple[mi.UInt32, mi.UInt32]:

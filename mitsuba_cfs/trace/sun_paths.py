@@ -42,8 +42,9 @@ class Places:
         return len(self.point)
 
     def some(self, chosen: NDArray) -> Places:
-        """Some of them."""
-        return Places(self.point[chosen], self.normal[chosen])
+        """Some of them, by number or where a mask holds."""
+        number = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
+        return Places(self.point.take(number, axis=0), self.normal.take(number, axis=0))
 
     def points(self) -> mi.Point3f:
         """The points as a kernel takes them."""
@@ -138,11 +139,21 @@ def face_places(
 
     Returns: the `Places`, then the others as arrays.
     """
+    point, face, *others = tables(*met_faces(tracer, origin, way, hit, found), *others)
+    return Places(point, face), *others
+
+
+def met_faces(
+    tracer: TracedScene,
+    origin: mi.Point3f,
+    way: mi.Vector3f,
+    hit: mi.PreliminaryIntersection3f,
+    found: mi.Bool,
+) -> tuple[mi.Point3f, mi.Vector3f]:
+    """Where rays meet surfaces, clear of them on the side that they come from, and its normal."""
     face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, found)
     face = dr.mulsign(face, -dr.dot(face, way))
-    point = mi.Point3f(origin + way * hit.t + face * tracer.epsilon)
-    point, face, *others = tables(point, face, *others)
-    return Places(point, face), *others
+    return mi.Point3f(origin + way * hit.t + face * tracer.epsilon), face
 
 
 def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:

@@ -11,6 +11,8 @@ from mitsuba_cfs.trace.sampling import opaque_vector
 from mitsuba_cfs.trace.scene import TracedScene
 
 BEFORE = 1e-3  # [m] of a window's plane, that a mirror must reach to send it light
+LEAST = 1e-9  # of a direction along an axis, to divide by
+CLEAR = 10  # steps off a surface that a box is wider by than what it holds
 
 
 class SunWay:
@@ -34,6 +36,7 @@ class SunWay:
             hidden = self._outside.hides(ray, active, coherent=coherent)
             return dr.select(active & ~hidden, mi.Float(1), mi.Float(0))
         gloss = self._outside.gloss
+        active &= self._may_meet(ray)
         hit = self._outside.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
         met = active & hit.is_valid()
         met &= gloss.plane_of(hit.prim_index, met) == self._plane
@@ -44,6 +47,33 @@ class SunWay:
         beyond = mi.Ray3f(place, mi.Vector3f(ray.d + normal * (2 * cosine)))
         met &= ~self._outside.hides(beyond, met, coherent=coherent)
         return dr.select(met, gloss.specular(hit.prim_index, cosine, met), 0.0)
+
+    def _may_meet(self, ray: mi.Ray3f) -> mi.Bool:
+        """Whether rays pass the box that holds the mirrors of the plane."""
+        corners = self._outside.gloss.corners[self._plane] - self._outside.centre
+        box = corners.min(axis=0), corners.max(axis=0)
+        start, margin = mi.Vector3f(ray.o), CLEAR * self._outside.epsilon
+        return meets_box(start, ray.d, box, margin)
+
+
+def meets_box(
+    start: mi.Vector3f,
+    way: mi.Vector3f,
+    box: tuple[NDArray[np.float64], NDArray[np.float64]],
+    margin: mi.Float,
+) -> mi.Bool:
+    """Whether rays meet a box, given by its lowest and highest corner [3], or start within it.
+
+    Args: margin: [m] that the box is made wider by on each side.
+
+    Source: Kay and Kajiya 1986, "Ray tracing complex scenes" (slabs).
+    """
+    low, high = (opaque_vector(corner) for corner in box)
+    least = mi.Vector3f(LEAST)
+    way = dr.select(dr.abs(way) < least, dr.mulsign(least, way), way)
+    first, second = (low - margin - start) / way, (high + margin - start) / way
+    enters, leaves = dr.max(dr.minimum(first, second)), dr.min(dr.maximum(first, second))
+    return leaves >= dr.maximum(enters, 0)
 
 
 def sun_ways(outside: TracedScene) -> list[SunWay]:
