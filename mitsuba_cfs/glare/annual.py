@@ -118,6 +118,9 @@ class Pictures(Protocol):
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """The same without the sun's disc, and the disc [h] as far as it is seen."""
 
+    def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
+        """Add the sun's disc to luminances [h, n] without it: that makes them `values`."""
+
     @property
     def shared(self) -> PictureMatrix:
         """Which pixels share a row of what surfaces reflect."""
@@ -182,6 +185,9 @@ class ThreePhasePictures:
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """See `Pictures`; the sun is part of the patches."""
         return self.values(batch), self.discs(batch)
+
+    def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
+        """See `Pictures`; nothing, for the sun is part of the patches."""
 
     def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
         """See `Pictures`; none, for the sun is part of the patches."""

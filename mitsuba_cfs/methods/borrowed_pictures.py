@@ -62,6 +62,10 @@ class BorrowedPictures:
         values, discs = self._pictures.without_disc(batch)
         return self._with_rooms(values, batch), discs
 
+    def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        self._pictures.add_disc(values, batch)
+
     def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         rows, values = self._pictures.by_rows(batch)

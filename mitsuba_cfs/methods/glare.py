@@ -194,15 +194,13 @@ def rated_pictures(
             bare, disc = light.picture(hour, now, disc=False, progress=steps), light.disc(hour, now)
             shown = light.with_disc(bare, hour, now)
         else:
-            of_hour = light.pictures(np.array([hour]), now)
-            values, discs = of_hour.without_disc(np.array([0]))
-            bare, disc = full_picture(values[0], of_hour.pixels, of_hour.view), discs[0]
-            shown = full_picture(of_hour.values(np.array([0]))[0], of_hour.pixels, of_hour.view)
-            noise = of_hour.noise(np.array([0]))[0]
-            halves = [
-                full_picture(np.maximum(values[0] + side * noise, 0), of_hour.pixels, of_hour.view)
-                for side in (1, -1)
-            ]
+            of_hour, only = light.pictures(np.array([hour]), now), np.array([0])
+            whole = partial(full_picture, pixels=of_hour.pixels, view=of_hour.view)
+            values, discs = of_hour.without_disc(only)
+            bare, disc, noise = whole(values[0]), discs[0], of_hour.noise(only)[0]
+            halves = [whole(np.maximum(values[0] + side * noise, 0)) for side in (1, -1)]
+            of_hour.add_disc(values, only)
+            shown = whole(values[0])
         apart = options.sun == "source"
         own = {"options": options, "disc": disc if apart else None}
         rated = evaluate(bare if apart else shown, geometry, **own)

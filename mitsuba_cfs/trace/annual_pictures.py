@@ -259,7 +259,7 @@ class FivePhasePictures:
     def values(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         values = self._values(batch)
-        self._sun.add_disc(values, self._directions[batch], self._illuminance[batch])
+        self.add_disc(values, batch)
         return values
 
     def without_disc(
@@ -267,6 +267,10 @@ class FivePhasePictures:
     ) -> tuple[NDArray[np.float32], list[SunDisc | None]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
         return self._values(batch), self.discs(batch)
+
+    def add_disc(self, values: NDArray[np.float32], batch: NDArray[np.int64]) -> None:
+        """See `mitsuba_cfs.glare.annual.Pictures`."""
+        self._sun.add_disc(values, self._directions[batch], self._illuminance[batch])
 
     def discs(self, batch: NDArray[np.int64]) -> list[SunDisc | None]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""

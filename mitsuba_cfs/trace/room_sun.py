@@ -30,7 +30,7 @@ from mitsuba_cfs.images.view import View, pixel_solid_angles
 from mitsuba_cfs.trace.bins import DirectionBins
 from mitsuba_cfs.trace.picture_rows import PictureRows, shown_hits
 from mitsuba_cfs.trace.picture_sharing import FACE_STEPS, numbered
-from mitsuba_cfs.trace.sampling import column, lattice_2d
+from mitsuba_cfs.trace.sampling import column, lattice_2d, opaque, tables
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 from mitsuba_cfs.trace.window_paths import WindowPaths, window_batches
@@ -110,7 +110,6 @@ class _Shown:
     """Where rays of pixels meet what reflects; axis r."""
 
     ray: NDArray[np.int64]  # [r] number of the pixel
-    sample: NDArray[np.int64]  # [r] and of the ray in it
     value: NDArray[np.float64]  # [r] rho / pi over the number of the pixel's rays
     places: Places
     reach: NDArray[np.float64]  # [r] how near is near [m]
@@ -172,23 +171,36 @@ class _Look:
 
     def near(self, part: _Pixels, samples: int) -> _Hits:
         """What rays of pixels find near, stratified over the pixels of a row by their number."""
-        shown = self._shown(part, samples)
-        of_row, sample = part.row[shown.ray], part.number[shown.ray] * samples + shown.sample
-        stream = column(of_row + self._seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
-        u = lattice_2d(column(sample, mi.UInt32), stream, 0)
-        point, normal = shown.places.points(), shown.places.normals()
+        tracer, lane = self._tracer, dr.arange(mi.UInt32, len(part.pixel) * samples)
+        pixel = lane // dr.opaque(mi.UInt32, samples)
+        number = column(part.number * samples, mi.UInt32)
+        sample = dr.gather(mi.UInt32, number, pixel) + lane - pixel * dr.opaque(mi.UInt32, samples)
+        stream = column(part.row + self._seed * 1_000_003 & 0xFFFFFFFF, mi.UInt32)
+        value = dr.gather(mi.Float, column(part.weight / (np.pi * samples)), pixel)
+        # ----- What the ray shows, and what is near to that -----
+        eye, way, hit, found = shown_hits(tracer, self._view, part.pixel, samples)
+        start, normal, _ = tracer.surface_at(hit, eye, way, found)
+        value *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
+        reach = dr.maximum(hit.t * opaque(self._near), 1e-6)
+        found &= value > 0
+        u = lattice_2d(sample, dr.gather(mi.UInt32, stream, pixel), 0)
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
-        hit = self._tracer.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
-        found = hit.is_valid()
-        rho = dr.gather(mi.Float, self._tracer.reflectance, hit.prim_index, found)
-        met, found, rho = face_places(self._tracer, point, way, hit, found, found, rho)
-        path = np.arange(len(rho))
-        distance = shown.distance(path, met)
-        weight = np.where(found, rho * shown.value * (1 - shown.far_share(path, met)), 0.0)
-        some = np.flatnonzero(weight > 0)
-        finer = np.log2(self._edge / (FINENESS * np.maximum(distance[some], 1e-6)))
-        halvings = np.clip(np.ceil(finer), 0, HALVINGS).astype(np.int64)
-        return _Hits(of_row[some], weight[some], met.some(some), halvings)
+        ray = mi.Ray3f(start, way)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=found)
+        found &= hit.is_valid()
+        point, face, _ = tracer.surface_at(hit, start, way, found)
+        value *= dr.gather(mi.Float, tracer.reflectance, hit.prim_index, found)
+        distance = dr.norm(point - start)
+        value *= 1 - dr.clip(2 * distance / reach - 1, 0.0, 1.0)
+        finer = dr.log2(opaque(self._edge / FINENESS) / dr.maximum(distance, 1e-6))
+        halvings = dr.clip(dr.ceil(finer), 0.0, HALVINGS)
+        # ----- Those that count, a third or less of all -----
+        met = [value, pixel, halvings, *point, *face]
+        dr.eval(met, found)
+        some = dr.compress(found & (value > 0))
+        weight, pixel, halvings, *axes = tables(*(dr.gather(type(a), a, some) for a in met))
+        places = Places(np.stack(axes[:3], axis=1), np.stack(axes[3:], axis=1))
+        return _Hits(part.row[pixel], weight, places, halvings.astype(np.int64))
 
     def _shown(self, part: _Pixels, samples: int) -> _Shown:
         tracer = self._tracer
@@ -198,7 +210,7 @@ class _Look:
         kept = np.flatnonzero(found & (rho > 0))
         reach = np.maximum(self._near * far[kept], 1e-6)
         value = rho[kept] * part.weight[kept // samples] / (np.pi * samples)
-        return _Shown(kept // samples, kept % samples, value, places.some(kept), reach)
+        return _Shown(kept // samples, value, places.some(kept), reach)
 
 
 def sun_elements(
@@ -298,33 +310,34 @@ def _elements(
     Returns: [q]; the places in the elements' order [q]; and of each element the cube's numbers, the
     side and the halvings [e, 7], sorted.
     """
-    places = hits.places
-    cube = np.floor(places.point * (0.5**-hits.halvings / edge)[:, None]).astype(np.int64)
-    side = np.round(places.normal * FACE_STEPS).astype(np.int64)
-    table = np.concatenate([cube, side, hits.halvings[:, None]], axis=1)
+    places, table = hits.places, np.empty((7, len(hits.row)), dtype=np.int64)
+    table[:3] = np.floor(places.point.T * (0.5**-hits.halvings / edge))
+    table[3:6] = np.round(places.normal.T * FACE_STEPS)
+    table[6] = hits.halvings
     keys = _keys(table, table)
-    found = np.unique(keys)
-    element = np.searchsorted(found, keys)
+    found, element = np.unique(keys, return_inverse=True)
     # by numbers that hold both, which NumPy sorts several times as fast as it finds an order
     order = np.sort((element << 32) + np.arange(len(keys))) & 0xFFFFFFFF
     first = order[np.searchsorted(element[order], np.arange(len(found)))]
-    return element, order, table[first]
+    return element, order, table[:, first].T
 
 
 def _keys(some: NDArray[np.int64], table: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of rows [n, 7] in their order, of one outside the table none of the table's."""
-    if not len(table):  # no element
+    """Numbers of columns [7, n] in their order, of one outside the table none of the table's."""
+    if not table.shape[1]:  # no element
         return np.empty(0, dtype=np.int64)
-    low, high = table.min(axis=0) - 1, table.max(axis=0) + 1
-    return np.ravel_multi_index(tuple((np.clip(some, low, high) - low).T), tuple(high - low + 1))
+    low, high = table.min(axis=1) - 1, table.max(axis=1) + 1
+    shifted = tuple(some - low[:, None])
+    return np.ravel_multi_index(shifted, tuple(high - low + 1), mode="clip")
 
 
 def _beside(cubes: NDArray[np.int64]) -> sparse.csr_array:
     """1 for elements [f, f] of one size that share an edge, and for those that hold another."""
-    count, keys = len(cubes), _keys(cubes, cubes)
+    count, cubes = len(cubes), np.ascontiguousarray(cubes.T)
+    keys = _keys(cubes, cubes)
     pairs = [np.empty((2, 0), dtype=np.int64)]
-    holders = np.column_stack([cubes[:, :3] // 2, cubes[:, 3:6], cubes[:, 6] - 1])
-    for others in (holders, *(cubes + step for step in np.eye(7, dtype=np.int64)[:3])):
+    holders = np.concatenate([cubes[:3] // 2, cubes[3:6], cubes[6:] - 1])
+    for others in (holders, *(cubes + step[:, None] for step in np.eye(7, dtype=np.int64)[:3])):
         wanted = _keys(others, cubes)
         place = np.minimum(np.searchsorted(keys, wanted), count - 1)
         found = np.flatnonzero(keys[place] == wanted)

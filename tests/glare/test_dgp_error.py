@@ -50,6 +50,7 @@ VIEW = fisheye((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 48)
 PIXELS = np.arange(48 * 48)
 LUMINANCE = np.where(PIXELS % 48 < 24, 500.0, 4_000.0).astype(np.float32)
 SHARE = 0.2  # of the luminance that half pictures are off
+DISC = 100.0  # of the sun, in the first pixel [cd/m2]
 
 
 class Rated:
@@ -64,6 +65,10 @@ class Rated:
     @staticmethod
     def without_disc(batch):
         return Rated.values(batch), [None] * len(batch)
+
+    @staticmethod
+    def add_disc(values, batch):
+        values[:, 0] += DISC
 
     @staticmethod
     def noise(batch):
@@ -87,7 +92,9 @@ def test_the_error_of_a_shown_picture_is_that_of_its_halves() -> None:
     light = SimpleNamespace(
         filled=filled, sky=SimpleNamespace(lit=np.zeros(1)), pictures=lambda hours, now: Rated()
     )
-    ((_, rated),) = rated_pictures(light, np.array([0]))
+    ((shown, rated),) = rated_pictures(light, np.array([0]))
+    assert shown[0, 0] == LUMINANCE[0] + DISC  # which a source's rating takes apart
+    np.testing.assert_array_equal(shown.ravel()[1:], LUMINANCE[1:])
     expected = abs(dgp_of(1 + SHARE) - dgp_of(1 - SHARE)) / 2
     assert rated.dgp_standard_error == pytest.approx(expected, rel=1e-5)
 
