@@ -14,6 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
+from mitsuba_cfs.trace.kept_mesh import (
+    KeptMesh,
+    SharedScene,
+    kept_mesh,
+    scene_of,
+    unit_normals,
+)
 from mitsuba_cfs.trace.random_walk import diffuse_direction
 from mitsuba_cfs.trace.sampling import (
     DiscreteDistribution,
@@ -62,7 +69,6 @@ class TracedScene:
             raise ValueError("a scene needs a window group or a centre")
         glazed = np.concatenate([np.empty((0, 3, 3)), *(w.triangles for _, w in windows)])
         glazed_group = np.concatenate([np.full(len(w.triangles), g) for g, w in windows] or [[]])
-        keep = triangle_areas(surfaces.triangles) > 1e-10  # [m2] slivers have no normal
 
         self.groups = tuple(groups)
         self._panes = windows_block and bool(windows)
@@ -73,7 +79,7 @@ class TracedScene:
         glazed_reflectance = np.asarray(window_reflectance, float)[glazed_group.astype(int)]
         blocking = slice(None) if windows_block else slice(0)
         self._load_mesh(
-            surfaces, keep, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
+            surfaces, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
         )
         if windows:
             self._load_windows(glazed, glazed_group)
@@ -81,18 +87,18 @@ class TracedScene:
     def _load_mesh(
         self,
         surfaces: Surfaces,
-        keep: NDArray[np.bool_],
         glazed: NDArray[np.float64],
         glazed_group: NDArray[np.int64],
         glazed_reflectance: NDArray[np.float64],
     ) -> None:
         """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
-        solid = surfaces.some(keep)
+        mesh = kept_mesh(surfaces.triangles)
+        solid = surfaces if mesh.keep.all() else surfaces.some(mesh.keep)
         if not len(solid.triangles) + len(glazed):
             solid = _speck(self.centre)
-        triangles = np.concatenate([solid.triangles, glazed]) - self.centre
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+            mesh = KeptMesh(solid.triangles)
+        panes = glazed - self.centre
+        normals = np.concatenate([mesh.normals, unit_normals(panes)])
         reflectance = np.concatenate([solid.reflectance, glazed_reflectance])
         surface = np.concatenate([solid.surface, np.zeros(len(glazed))])
         no_group = np.full(len(solid.triangles), OPAQUE)
@@ -107,9 +113,14 @@ class TracedScene:
             if (solid.glossy)
             else None
         )
-        self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(triangles)})
+        self.scene: mi.Scene | SharedScene
+        if mesh.is_shared:
+            self.scene = SharedScene(mesh, panes, self.centre)
+        else:
+            self.scene = scene_of(np.concatenate([solid.triangles - self.centre, panes]))
+        radius = max(mesh.radius(self.centre) if len(solid.triangles) else 0.0, _greatest(panes))
         # Offset along the normal that keeps a ray clear of the face it starts on [m]
-        self.epsilon = opaque(2e-5 * max(1.0, 0.05 * float(np.abs(triangles).max())))
+        self.epsilon = opaque(2e-5 * max(1.0, 0.05 * radius))
 
     def _load_windows(self, glazed: NDArray[np.float64], glazed_group: NDArray[np.int64]) -> None:
         """Tables by glazed triangle and by group, to sample points on the windows."""
@@ -347,15 +358,8 @@ def _middle(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:
     return np.concatenate(windows).mean(axis=(0, 1))
 
 
-def _mesh(triangles: NDArray[np.float64]) -> mi.Mesh:
-    """One Mitsuba mesh of triangles [N, 3, 3] without shared vertices."""
-    n = len(triangles)
-    mesh = mi.Mesh("surfaces", vertex_count=3 * n, face_count=n)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = mi.Float(triangles.reshape(-1).astype(np.float32))
-    parameters["faces"] = mi.UInt32(np.arange(3 * n, dtype=np.uint32))
-    parameters.update()
-    return mesh
+def _greatest(coordinates: NDArray[np.float64]) -> float:
+    return float(np.abs(coordinates).max()) if coordinates.size else 0.0
 
 
 def _speck(centre: NDArray[np.float64]) -> Surfaces:

@@ -183,13 +183,17 @@ def _checked(
 
 def _print_plan(plan: StudyPlan) -> None:
     """Why methods were chosen, and what was noticed of the weather."""
-    from scenes.run.inputs import read_weather
+    from scenes.room.operation import read_operation
+    from scenes.study.one_case import case_weather
 
     for why in dict.fromkeys(case.chosen for case in plan.cases if case.chosen):
         click.echo(f"auto: {why}")
-    for path in dict.fromkeys(case.weather.path for case in plan.cases):
-        for note in read_weather(path).notes:
-            click.echo(f"note: {note}")
+    notes: dict[str, None] = {}
+    for case in {(case.weather, case.operation): case for case in plan.cases}.values():
+        operation = None if case.operation is None else read_operation(case.operation.path)
+        notes |= dict.fromkeys(case_weather(case, operation).notes)
+    for note in notes:
+        click.echo(f"note: {note}")
 
 
 def _print_outcome(result: StudyResult, out: Path) -> None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.sky.heat_island import in_city
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, Given, States
 from scenes.fenestration.thermal_system import checked_system
@@ -42,7 +41,9 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
 
         box_building(study.box)
     if study.measured is None:
-        weather = _read_weather(study, file)
+        weather = read_weather(study.weather)
+        if study.heat_island is not None:
+            weather = study.heat_island.warmed(weather, file)
     else:
         weather = read_measured(study.weather, study.measured)
         _fits_measured(study, weather, file)
@@ -60,17 +61,6 @@ def _given(study: StudyFile, systems: tuple[FenestrationSystem, ...]) -> Given:
     for table, system in zip(study.system, systems, strict=True):
         states[table.windows] = (*states.get(table.windows, ()), system)
     return Given(states.pop((), ()), named=tuple(states.items()), ask="a [[system]]")
-
-
-def _read_weather(study: StudyFile, file: Path | None) -> Weather:
-    """The weather of a study's year, with the air of a street where the study states one."""
-    weather, island = read_weather(study.weather), study.heat_island
-    if island is None:
-        return weather
-    try:
-        return in_city(weather, island.sky_view, island.vegetation, island.hourly_shares)
-    except ValueError as error:
-        raise DataError(str(error), file=file, field="heat_island") from error
 
 
 def _fits_measured(study: StudyFile, weather: Weather, file: Path | None) -> None:

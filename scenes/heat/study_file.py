@@ -117,20 +117,11 @@ class WindowStateTable(StateTable):
     windows: tuple[str, ...] = ()  # names or GUIDs
 
 
-class HeatIslandTable(TomlTable):
-    """The street that the outdoor air is in, as of `mitsuba_cfs.sky.heat_island`."""
-
-    sky_view: Share
-    vegetation: Share
-    hourly_shares: Annotated[tuple[Share, ...], Field(min_length=24, max_length=24)]
-
-
 class StudyFile(OperationTables):
     """A whole study; paths are relative to the file."""
 
     weather: Path  # an EPW file, or with `measured` a CSV file
     measured: MeasuredTable | None = None
-    heat_island: HeatIslandTable | None = None  # the air of a street in place of the station's
     building: Path | None = None
     spaces: tuple[str, ...] = ()
     join: tuple[str, ...] = ()  # rooms to make one, as "Hall + Living"

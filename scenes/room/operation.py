@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.pane_system import system_of_panes
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.tables import StateTable
@@ -34,6 +35,14 @@ class Operation:
         panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
         named = [None if table.bsdf is None else self.file.parent / table.bsdf for table in states]
         return tuple(path for path in (*named, *panes, *tables) if path is not None)
+
+    def outdoors(self, weather: Weather) -> Weather:
+        """The weather of its rooms: with the air of a street where it states one.
+
+        Raises: `DataError` out of the range of the heat island's equation.
+        """
+        island = self.tables.heat_island
+        return weather if island is None else island.warmed(weather, self.file)
 
 
 def read_operation(path: str | PathLike[str]) -> Operation:

@@ -13,6 +13,7 @@ from scenes import plausible
 from scenes.fenestration.tables import StateTable
 from scenes.room.air_tables import AirTable
 from scenes.room.envelope_tables import EnvelopeTable
+from scenes.room.heat_island import HeatIslandTable
 from scenes.room.load_tables import LoadsTable, PlantTable
 from scenes.room.schedules import (
     CLOCK,
@@ -128,6 +129,7 @@ class OperationTables(TomlTable):
     terrain: Literal["country", "suburbs", "city"] = (
         "suburbs"  # what the weather station's wind becomes
     )
+    heat_island: HeatIslandTable | None = None  # the air of a street in place of the station's
     rooms: tuple[RoomsTable, ...] = ()  # the first that names a room holds for it
     schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
     calendar: CalendarTable = CalendarTable()

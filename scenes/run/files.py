@@ -64,6 +64,7 @@ def read_files(options: JobOptions) -> JobFiles:
     if operation is not None:
         _check_operation(operation, system)
         check_schedules(operation.tables, weather, operation.file)
+        operation.outdoors(weather)  # a street out of range is named before the building is read
     _check_sun(hours, weather)
     states = () if operation is None else operation.systems
     states = states if system is None else (system,)

@@ -71,6 +71,7 @@ def job_inputs(
     windows = [window for space in traced.values() for window in space.windows]
     systems = fill_windows(windows, files.given, building.file)
     if operation is not None:
+        weather = operation.outdoors(weather)
         check_states(operation, max(len(states) for states in systems.values()))
     several = ()
     if operation is None:  # the building's file says how rooms are used, not how shades move

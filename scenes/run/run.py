@@ -252,6 +252,7 @@ def _manifest(
         },
         "building": inputs.building.name,
         "site": inputs.weather.site,
+        "weather_notes": list(inputs.weather.notes),
         "system": ", ".join(dict.fromkeys(system.name for system in used)),
         "fenestration": used_sources(inputs),
         "options": {

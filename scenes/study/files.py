@@ -34,6 +34,7 @@ def check_files(study: Study) -> None:
         for operation in operations:
             if operation is not None:
                 check_schedules(operation.tables, weather, operation.file)
+                operation.outdoors(weather)
     for system in study.system:
         if system.bsdf is not None:
             read = read_system(system.bsdf, u_value=system.u_value, g_value=system.g_value)

@@ -77,7 +77,7 @@ class CaseRoom:
             check_states(operation, max(map(len, systems.values())))
         else:
             systems = {guid: states[:1] for guid, states in systems.items()}
-        weather = _weather(case.weather, case.orientation_deg)
+        weather = case_weather(case, operation)
         return cls(building, space, systems, weather, used_operation(operation, building))
 
     def year(self, case: Case, **chosen: Unpack[RoomChoices]) -> RoomYear:
@@ -127,6 +127,9 @@ def _computed(case: Case) -> CaseResult:
     used = [state for states in systems.values() for state in states]
     heats = {id(system): thermal_system(system).named_model for system in used}
     figures["window_model"] = " ".join(dict.fromkeys(heats.values()))
+    of_file = _weather(case.weather, case.orientation_deg).notes
+    if street := [note for note in weather.notes if note not in of_file]:
+        figures["heat_island"] = " ".join(street)
     if trees := tree_notes(held.building):
         figures["trees"] = " ".join(trees)
     figures["seconds"] = round(time.monotonic() - start, 3)
@@ -170,6 +173,12 @@ def _read_weather(source: InputFile) -> Weather:
 
 def _weather(source: InputFile, angle: float) -> Weather:
     return _read_weather(source).turned(angle)
+
+
+def case_weather(case: Case, operation: Operation | None) -> Weather:
+    """The weather of a case, turned as its building is, with the air that its operation states."""
+    weather = _weather(case.weather, case.orientation_deg)
+    return weather if operation is None else operation.outdoors(weather)
 
 
 @lru_cache(maxsize=1)  # some 100 MB each; neighbours in the grid share it
