@@ -108,7 +108,7 @@ def _pane(element, triangles: NDArray, clear: NDArray, spaces: Sequence[NDArray]
         return Pane(outline.area, "drawn", _before_a_room(outline, frame, spaces))
     if not element.is_a("IfcWindow"):
         return Pane(0.0, "none")
-    outline, frame = _outline(triangles)
+    outline, frame = _outline(triangles, _stated_area(element))
     lining = _lining(element)
     glass = outline.buffer(-lining, join_style="mitre") if lining else outline
     area = glass.area if lining else FRAMED * outline.area
@@ -132,15 +132,24 @@ def _names(element) -> str:
     return " ".join([*(m.Name or "" for m in element_of.get_materials(element)), *styles])
 
 
-def _outline(triangles: NDArray) -> tuple[shapely.Geometry, tuple[NDArray, NDArray]]:
-    """Outline across the direction of the largest faces, and the plane: a point, axes [3, 3]."""
+def _outline(
+    triangles: NDArray, stated: float = 0.0
+) -> tuple[shapely.Geometry, tuple[NDArray, NDArray]]:
+    """Outline across the direction of the largest faces, and the plane: a point, axes [3, 3].
+
+    Args: stated: area [m2] that the whole is said to have: it tells the direction, where known.
+    """
     vectors = 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     areas = np.linalg.norm(vectors, axis=1)
     solid = areas > 1e-9
     units = vectors[solid] / areas[solid, None]
     aligned = np.abs(units @ units.T) > 0.95
-    normal = units[np.argmax(aligned @ areas[solid])]
-    facing = aligned[np.argmax(aligned @ areas[solid])]
+    weight = aligned @ areas[solid]
+    if stated:
+        hulls = [_hull_area(triangles, normal) for normal in units]
+        weight = -np.abs(np.log(np.maximum(hulls, 1e-9) / stated))
+    normal = units[np.argmax(weight)]
+    facing = aligned[np.argmax(weight)]
     aside = np.eye(3)[np.argmin(np.abs(normal))]
     u = np.cross(aside, normal) / np.linalg.norm(np.cross(aside, normal))
     axes = np.stack([u, np.cross(normal, u), normal])
@@ -148,6 +157,19 @@ def _outline(triangles: NDArray) -> tuple[shapely.Geometry, tuple[NDArray, NDArr
     flat = shapely.polygons((own @ axes.T)[..., :2])
     outline = shapely.union_all(shapely.buffer(flat, 1e-4))
     return outline, ((own.reshape(-1, 3) @ normal).mean() * normal, axes)
+
+
+def _hull_area(triangles: NDArray, normal: NDArray) -> float:
+    """Area [m2] of the convex hull of triangles seen along a direction."""
+    flat = triangles.reshape(-1, 3) @ np.linalg.svd(normal[None])[2][1:].T
+    return shapely.convex_hull(shapely.multipoints(flat)).area
+
+
+def _stated_area(element) -> float:
+    """Width by height as the file states them [m2]; 0 where it does not."""
+    scale = ifcopenshell.util.unit.calculate_unit_scale(element.file)
+    width, height = getattr(element, "OverallWidth", None), getattr(element, "OverallHeight", None)
+    return (width or 0.0) * (height or 0.0) * scale**2
 
 
 def _before_a_room(outline, frame, spaces: Sequence[NDArray]) -> float:
