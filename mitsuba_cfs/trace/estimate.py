@@ -179,7 +179,10 @@ def _with_another(
     step = values - mean
     mean = mean + step / (count + 1)
     left = values - mean
-    return mean, spread + step * left, sum_spread + step.sum(axis=-1) * left.sum(axis=-1)
+    sum_spread = sum_spread + step.sum(axis=-1) * left.sum(axis=-1)
+    left *= step  # the states given out hold other arrays
+    left += spread
+    return mean, left, sum_spread
 
 
 def _estimate(state: BatchMean) -> Estimate:

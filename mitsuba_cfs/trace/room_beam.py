@@ -34,7 +34,7 @@ from mitsuba_cfs.trace.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.scene import TracedScene
-from mitsuba_cfs.trace.sun_discs import Scattering
+from mitsuba_cfs.trace.sun_discs import SPREAD, Scattering
 from mitsuba_cfs.trace.sun_paths import Places, met_faces, on_disc_of
 from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
@@ -231,8 +231,11 @@ class _Beam:
         """Luminous flux on the cells [c, h], per unit illuminance normal to the sun."""
         found = sparse.csr_array((cells.size, len(suns)))
         for by in sun_ways(self.scenes[1]):
-            hours = np.arange(len(suns))
-            value, position, to_sun = self._entering(by, suns, self.fewer)
+            before = by.turned(suns) @ self.scenes[0].groups[self.group].frame[2] > -SPREAD
+            hours = np.flatnonzero(before)
+            if not len(hours):
+                continue
+            value, position, to_sun = self._entering(by, suns[hours], self.fewer)
             lit = value > 0
             crossed = lit.any(axis=1) & ~lit.all(axis=1)
             value[crossed] = 0
