@@ -135,8 +135,10 @@ def _summed(
     """
     seen = []
     for block in blocks:
+        first, end = block.row[0], block.row[-1] + 1  # they rise
+        place = slice(first, end) if end - first == len(block.row) else block.row
         for rows, values in zip(sums, (block.later, block.lit), strict=True):
-            rows[block.row] += values.reshape(len(values), -1)
+            rows[place] += values.reshape(len(values), -1)
         seen.append(block.seen)
     ones = np.ones(len(number), dtype=np.float32)
     of_pixel = sparse.csr_array((ones, (number, np.arange(len(number)))))

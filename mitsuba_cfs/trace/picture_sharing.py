@@ -18,7 +18,8 @@ from mitsuba_cfs.images.view import View, pixel_solid_angles
 TILE, LARGEST_TILE = np.radians(0.9), 16  # across; [px]
 MARGIN = 8  # [tiles] round the picture, so that no tile's neighbour is another row's end
 STEPS = (1, 2)  # [tiles] of the smoothing, one after the other
-BALANCINGS = 64  # rounds, by which the sums agree to 1e-4
+BALANCINGS = 64  # rounds at most, by which the sums agree to 1e-4
+BALANCED = 1e-9  # of its weight: a round that changes none by more is the last
 FACE_STEPS = 8  # normals that differ less than 1/16 in each component are one face
 
 
@@ -107,7 +108,9 @@ def smoothing(
         if close is not None and step > 1:
             near = _apart(near, close)
         for _ in range(BALANCINGS):
-            x = np.sqrt(x / (near @ (count * x)))
+            before, x = x, np.sqrt(x / (near @ (count * x)))
+            if np.all(np.abs(x - before) <= BALANCED * x):
+                break
         weights = sparse.diags_array(x) @ near @ sparse.diags_array(x * count)
         rows = sparse.diags_array(1 / np.maximum(weights.sum(axis=1), 1e-300))
         whole = sparse.csr_array(rows @ weights @ whole)
