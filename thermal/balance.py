@@ -140,11 +140,12 @@ def simulate_zones(
     days = kernel.warm_up(net, state, work, weather, drive, method, rows=rows)
     means = kernel.hourly_means(climate.hours, state)
     kernel.advance(net, state, work, weather, drive, method, climate.hours, means)
-    terms = np.divide(means.terms, steps, out=means.terms)
+    terms, state_of_hour = np.divide(means.terms, steps, out=means.terms), drive.state
+    del drive  # the sun of all faces: as much as the results that are made now
     if progress:
         progress(1.0)
     return tuple(
-        _result(zone, net, z, means, terms[:, z], days=days, state=drive.state)
+        _result(zone, net, z, means, terms[:, z], days=days, state=state_of_hour)
         for z, zone in enumerate(zones)
     )
 

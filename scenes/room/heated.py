@@ -85,8 +85,9 @@ def heat_of(
     )
     moist = room_humidity(zones, found, weather, air_links=air_links)
     heats: list[Heat] = []
-    for room, balance, humidity in zip(rooms, found, moist, strict=True):
-        tables = room.tables or OperationTables()
+    found.reverse()  # a balance holds both faces of every surface: let go once its room is done
+    for room, humidity in zip(rooms, moist, strict=True):
+        balance, tables = found.pop(), room.tables or OperationTables()
         felt = felt_by(tables.comfort, balance, humidity)
         heat = thermal_result(room.zone, balance, weather, felt, iter(room.fenestration))
         ran = None
