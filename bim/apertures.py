@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ OUTLINE = 0.004  # round openings become polygons this near [m]
 OUT_OF_WALL = 0.05  # glass this far outside its opening's depth is reported [m]
 ASTRAY = 0.3  # and from here on moved into the opening's middle [m]
 LEAST_WITHIN = 0.3  # of the opening: less that a drawn frame leaves free is no glass
+LEAST_FACING = 0.05  # of a body's area: less that faces a direction is a bevel or a handle
 BESIDE = 0.05  # what of a wall lies this near to an opening is beside it [m]
 PANE_JOINT = 0.002  # gaps between drawn panes up to this are no frame [m]
 
@@ -86,7 +88,7 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     if direction is None:
         what = f"{filling.name}: has no extent"
         return None, [Problem(filling.guid, what, "left out", "window")]
-    facing = np.abs(_unit(area_vectors(source)) @ direction) > FLAT
+    facing = _facing(source, direction)
     areas = np.linalg.norm(area_vectors(source), axis=1)
     depth = source.mean(axis=1) @ direction
     middle = np.average(depth[facing], weights=areas[facing])
@@ -116,27 +118,59 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
 
 
 def _looking(filling: Filling, source: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Direction [3] of either sign that a filling looks in: of most area, but not into its wall.
+    """Direction [3] of either sign that a filling looks in; None without any extent.
 
-    A low window in a thick wall may show more of its sill and reveals than of itself.
+    It looks across its panes, or across most of its faces; one without panes that no opening holds
+    looks where it is broadest.  None looks into the wall that holds it: where it would (a low
+    window whose sill shows more area than itself, a body that cuts deeper than it is wide), it is
+    the opening's one direction that its wall leaves open.
     """
-    direction = main_direction(source)
-    if direction is None or filling.opening is None or filling.beside is None:
+    direction, body = main_direction(source), filling.opening
+    if body is None and not filling.transparent.any():
+        return max(_ways(source), key=lambda way: _breadth(source, way), default=direction)
+    if direction is None or body is None or filling.beside is None:
         return direction
-    centre = 0.5 * sum(getattr(filling.opening, end)(axis=(0, 1)) for end in ("min", "max"))
     wall = ray_mesh(filling.beside)
-    if _leads_out(direction, centre, filling.opening, wall):
+    if _walls_met(direction, body, wall) < 2:
         return direction
-    rest = filling.opening
-    while len(rest):
-        way = main_direction(rest)
-        if way is None:
-            break
-        facing = np.abs(_unit(area_vectors(source)) @ way) > FLAT
-        if facing.any() and _leads_out(way, centre, filling.opening, wall):
-            return main_direction(source[facing])
-        rest = rest[np.abs(_unit(area_vectors(rest)) @ way) <= FLAT]
-    return direction
+    ways = list(_ways(body))
+    met = [_walls_met(way, body, wall) for way in ways]
+    if met.count(0) != 1:  # not cut, or open in more than one direction
+        return direction
+    facing = _facing(source, ways[met.index(0)])
+    return main_direction(source[facing]) if facing.any() else direction
+
+
+def _facing(triangles: NDArray[np.float64], way: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which triangles [N] face a direction or the other way."""
+    return np.abs(_unit(area_vectors(triangles)) @ way) > FLAT
+
+
+def _walls_met(way: NDArray[np.float64], opening: NDArray[np.float64], wall: RayMesh) -> int:
+    """On how many sides of the middle of an opening, 0 to 2, its wall is met along a direction."""
+    middle = 0.5 * (opening.min(axis=(0, 1)) + opening.max(axis=(0, 1)))
+    reach = float(np.abs((opening - middle) @ way).max()) + BESIDE
+    _, hit = wall.first_hits(np.stack([middle, middle]), np.stack([way, -way]), reach)
+    return int(np.count_nonzero(hit >= 0))
+
+
+def _ways(triangles: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    """Directions [3] that triangles face with a share of their area, of either sign."""
+    vectors = area_vectors(triangles)
+    normals, areas = _unit(vectors), np.linalg.norm(vectors, axis=1)
+    least = LEAST_FACING * areas.sum()
+    while (way := main_direction(triangles)) is not None:
+        left = np.abs(normals @ way) <= FLAT
+        if areas[~left].sum() < least:
+            return
+        yield way
+        triangles, normals, areas = triangles[left], normals[left], areas[left]
+
+
+def _breadth(triangles: NDArray[np.float64], way: NDArray[np.float64]) -> float:
+    """Area [m2] of the convex outline of triangles, seen along a direction."""
+    flat = plane_through(np.zeros(3), way).to_plane(triangles.reshape(-1, 3))[:, :2]
+    return shapely.convex_hull(shapely.multipoints(flat)).area
 
 
 def _leads_out(

@@ -140,6 +140,30 @@ def test_a_drawn_frame_without_a_pane_leaves_its_glass_free(hosted, tmp_path):
     )
 
 
+@pytest.mark.parametrize("frame_first", [True, False])
+@pytest.mark.parametrize("glazed", [True, False])
+def test_a_frame_drawn_for_itself_around_a_window_is_no_second_one(frame_first, glazed, tmp_path):
+    """As a school by DDS has them: the frame one IfcWindow, what stands in it another."""
+    small, walls = box_model(window=False)
+    if not frame_first:
+        small.window(walls["south"], glazed=glazed)
+    frame = small.window(walls["south"], hosted=False, name="frame")
+    if frame_first:
+        small.window(walls["south"], glazed=glazed)
+    x, sill, width, height = OPENING
+    look, thin = small.style("plain", 0.7), 0.02
+    outer = [((left, -0.2, sill), (thin, 0.1, height)) for left in (x, x + width - thin)]
+    outer += [((x, -0.2, low), (width, 0.1, thin)) for low in (sill, sill + height - thin)]
+    small.show(frame, [(*box, look) for box in outer])
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    expected = GLASS_AREA if glazed else 0.7 * width * height
+    assert sum(w.area for w in building.spaces[0].windows) == pytest.approx(expected, rel=2e-3)
+    assert building.account.glass_out == pytest.approx(expected, rel=2e-3)
+    assert [p.kind for p in building.problems].count("frame of a window") == 1
+
+
 def lost(path) -> list:
     """What is said of glass that became no window."""
     return [problem for problem in read_ifc(path).problems if problem.kind == "lost glass"]

@@ -22,6 +22,7 @@ NAMES = re.compile(
 BAR = 0.2  # narrower members are bars [m]
 CLEAR = 0.25  # transparency of a style from which on it is glass
 FRAMED = 0.7  # of a window whose glass is not drawn
+UNLIKE, ALIKE = 0.1, 0.05  # logarithms of ratios of a drawn to a stated area
 STEPS = np.array([0.15, 0.3, 0.5, 0.8])  # off the glass, where a room is looked for [m]
 POINTS = 100  # of a pane
 
@@ -137,7 +138,8 @@ def _outline(
 ) -> tuple[shapely.Geometry, tuple[NDArray, NDArray]]:
     """Outline across the direction of the largest faces, and the plane: a point, axes [3, 3].
 
-    Args: stated: area [m2] that the whole is said to have: it tells the direction, where known.
+    Args: stated: area [m2] that the whole is said to have: where that across the largest faces is
+        another and that across others agrees, these are the front.
     """
     vectors = 0.5 * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     areas = np.linalg.norm(vectors, axis=1)
@@ -146,8 +148,10 @@ def _outline(
     aligned = np.abs(units @ units.T) > 0.95
     weight = aligned @ areas[solid]
     if stated:
-        hulls = [_hull_area(triangles, normal) for normal in units]
-        weight = -np.abs(np.log(np.maximum(hulls, 1e-9) / stated))
+        hulls = np.array([_hull_area(triangles, normal) for normal in units])
+        off = np.abs(np.log(np.maximum(hulls, 1e-9) / stated))
+        if off[np.argmax(weight)] > UNLIKE and off.min() < ALIKE:
+            weight = -off
     normal = units[np.argmax(weight)]
     facing = aligned[np.argmax(weight)]
     aside = np.eye(3)[np.argmin(np.abs(normal))]
