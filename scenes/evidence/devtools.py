@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import json
 import os
 import select
 import shutil
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -14,6 +16,7 @@ from types import TracebackType
 from typing import Any
 
 WAIT = 120  # [s] for an answer: the processor may be shared with many
+CLOSING = 5  # [s] for the browser to end by itself
 LEFT = ("navigated or closed", "Cannot find context", "context was destroyed")  # the page asked
 KEYS = {
     "ArrowRight": 39, "ArrowLeft": 37, "ArrowDown": 40, "ArrowUp": 38, " ": 32, "Tab": 9,
@@ -46,7 +49,7 @@ class Page:
         shell = ["bash", "-c", f'exec "$@" 3<&{to_read} 4>&{to_write}', "bash", *map(str, command)]
         self._process = subprocess.Popen(
             shell, pass_fds=(to_read, to_write), stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
         os.close(to_read)
         os.close(to_write)
@@ -79,8 +82,13 @@ class Page:
         self.close()
 
     def close(self) -> None:
-        """End the browser."""
-        self._process.kill()
+        """End the browser and its helpers, which else write to its profile while that goes."""
+        with contextlib.suppress(OSError):
+            os.write(self._write, b'{"id": 0, "method": "Browser.close"}\0')
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(CLOSING)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         os.close(self._write)
         os.close(self._read)
