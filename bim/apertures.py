@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +23,8 @@ ASTRAY = 0.3  # and from here on moved into the opening's middle [m]
 LEAST_WITHIN = 0.3  # of the opening: less that a drawn frame leaves free is no glass
 LEAST_FACING = 0.05  # of a body's area: less that faces a direction is a bevel or a handle
 BESIDE = 0.05  # what of a wall lies this near to an opening is beside it [m]
+ONE_WINDOW = 0.3  # glass no farther apart, one before the other, is one window's [m]
+MOSTLY = 0.7  # of a glass that is not drawn: where another window has so much of it, it is that's
 PANE_JOINT = 0.002  # gaps between drawn panes up to this are no frame [m]
 
 
@@ -117,6 +119,55 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     return Aperture(filling, plane, opening, glass), problems
 
 
+def framed_by(apertures: Sequence[Aperture]) -> list[Aperture | None]:
+    """The window that each one without a drawn pane lies around, or None; as its frame."""
+    boxes = [_box(aperture.filling.triangles) for aperture in apertures]
+    return [_framed_by(number, apertures, boxes) for number in range(len(apertures))]
+
+
+def _box(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Low and high corner [2, 3] of triangles [N, 3, 3]; of none a box that meets no other."""
+    low = triangles.min(axis=(0, 1), initial=np.inf)
+    return np.stack([low, triangles.max(axis=(0, 1), initial=-np.inf)])
+
+
+def _framed_by(
+    number: int, apertures: Sequence[Aperture], boxes: Sequence[NDArray[np.float64]]
+) -> Aperture | None:
+    """The window that one without a drawn pane lies around, or None; of two the lesser is kept.
+
+    Args: boxes: low and high corner [2, 3] of what each of the apertures is drawn as.
+    """
+    one = apertures[number]
+    if one.filling.transparent.any() or one.glass.is_empty:
+        return None
+    low, high = boxes[number]
+    for place, other in enumerate(apertures):
+        if place == number or other.glass.is_empty:
+            continue
+        their_low, their_high = boxes[place]
+        if np.any(their_high < low) or np.any(their_low > high):
+            continue
+        if not _lies_around(one, other):
+            continue
+        lesser = (round(other.glass.area, 3), place) < (round(one.glass.area, 3), number)
+        if lesser or other.filling.transparent.any() or not _lies_around(other, one):
+            return other
+    return None
+
+
+def _lies_around(one: Aperture, other: Aperture) -> bool:
+    """Whether the glass that one is taken to have is mostly the glass of another one."""
+    if abs(one.plane.normal @ other.plane.normal) < FLAT:
+        return False
+    if abs(one.plane.to_plane(other.plane.origin)[2]) > ONE_WINDOW:
+        return False
+    theirs = shapely.transform(
+        other.glass, lambda p: one.plane.to_plane(other.plane.to_world(p))[:, :2]
+    )
+    return theirs.intersection(one.glass).area > MOSTLY * one.glass.area
+
+
 def _looking(filling: Filling, source: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Direction [3] of either sign that a filling looks in; None without any extent.
 
@@ -173,18 +224,6 @@ def _breadth(triangles: NDArray[np.float64], way: NDArray[np.float64]) -> float:
     return shapely.convex_hull(shapely.multipoints(flat)).area
 
 
-def _leads_out(
-    way: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    opening: NDArray[np.float64],
-    wall: RayMesh,
-) -> bool:
-    """Whether both ways from the middle of an opening its wall is left without meeting it."""
-    reach = float(np.abs((opening - centre) @ way).max()) + BESIDE
-    _, hit = wall.first_hits(np.stack([centre, centre]), np.stack([way, -way]), reach)
-    return bool(np.all(hit < 0))
-
-
 def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Problem]]:
     """The glazing plane, moved to the middle of the opening where it was far off."""
     heights = plane.to_plane(filling.opening)[..., 2]
@@ -225,13 +264,11 @@ def _assumed_glass(
     filling: Filling, plane: Plane, opening: shapely.Geometry
 ) -> tuple[shapely.Geometry, list[Problem]]:
     """The opening less a frame of the stated, the drawn or the default size."""
-    frame = shadow(filling.triangles, plane)
-    within = _polygonal(_filled(frame).difference(frame).intersection(opening))
     if filling.glazed_fraction is not None and 0 < filling.glazed_fraction <= 1:
         glass = inset_to_fraction(opening, filling.glazed_fraction)
         source = f"GlazingAreaFraction {filling.glazed_fraction:.2f}"
-    elif within.area > LEAST_WITHIN * opening.area:
-        glass, source = within, "what its drawn frame leaves free"
+    elif (free := _left_free(filling, plane, opening)).area > LEAST_WITHIN * opening.area:
+        glass, source = free, "what its drawn frame leaves free"
     elif filling.frame_width is not None and opening.buffer(-filling.frame_width).area > 0:
         glass = opening.buffer(-filling.frame_width, join_style="mitre")
         source = f"frame {filling.frame_width * 1000:.0f} mm wide as stated"
@@ -240,6 +277,12 @@ def _assumed_glass(
         source = f"default frame fraction {FRAME_FRACTION}"
     what = f"{filling.name}: no transparent pane drawn"
     return _polygonal(glass), [Problem(filling.guid, what, f"glass from {source}")]
+
+
+def _left_free(filling: Filling, plane: Plane, opening: shapely.Geometry) -> shapely.Geometry:
+    """What the drawn frame leaves free of the opening within itself."""
+    frame = shadow(filling.triangles, plane)
+    return _polygonal(_filled(frame).difference(frame).intersection(opening))
 
 
 def inset_to_fraction(outline: shapely.Geometry, fraction: float) -> shapely.Geometry:

@@ -78,10 +78,14 @@ def _length_scale(model: ifcopenshell.file) -> float:
 def _opening_and_host(element: ifcopenshell.entity_instance):
     for relation in getattr(element, "FillsVoids", None) or ():
         opening = relation.RelatingOpeningElement
-        for voids in getattr(opening, "VoidsElements", None) or ():
-            return opening, voids.RelatingBuildingElement
-        return opening, None
+        return opening, _host_of(opening)
     return None, None
+
+
+def _host_of(opening: ifcopenshell.entity_instance) -> ifcopenshell.entity_instance | None:
+    """The element that an opening is cut out of, if any."""
+    voids = getattr(opening, "VoidsElements", None) or ()
+    return voids[0].RelatingBuildingElement if voids else None
 
 
 def unfilled_openings(
@@ -90,8 +94,7 @@ def unfilled_openings(
     """Openings that no relation fills, with the element that each is cut out of, if any."""
     for opening in model.by_type("IfcOpeningElement"):
         if not getattr(opening, "HasFillings", None):
-            voids = getattr(opening, "VoidsElements", None) or ()
-            yield opening, voids[0].RelatingBuildingElement if voids else None
+            yield opening, _host_of(opening)
 
 
 def beside_opening(host: Shape | None, opening: Shape | None) -> NDArray[np.float64] | None:

@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.apertures import FLAT, Aperture, Filling, aperture_of, main_direction, shadow
+from bim.apertures import Aperture, Filling, aperture_of, framed_by, main_direction, shadow
 from bim.ifc.fillings import read_fillings, unfilled_openings
 from bim.ifc.project import storey_of
 from bim.ifc.source import Source
@@ -35,8 +35,6 @@ DOOR_SILL, DOOR_WIDTH = 0.3, 1.3  # an opening to the floor up to this width is 
 ASIDE = 0.5  # points asked on both sides of glass lie this far from it [m]
 CLEAR_WAY = 1.0  # an opening goes through where nothing stands in it this far to both sides [m]
 LEAST_LOST = 0.01  # share of a pane from which on what is missing is said
-ONE_WINDOW = 0.3  # glass no farther apart, one before the other, is one window's [m]
-MOSTLY = 0.7  # of a glass that is not drawn: where another window has so much of it, it is that's
 TALLEST_GAP = 30.0  # between the top of a room and glass above it [m]
 DOOR_NAME = re.compile(r"\b(tur|tuer|door|porte?|deur|puerta|porta|ajto|drzwi|dvere|ovi)", re.I)
 NOT_FILLED = "IfcOpeningElement"
@@ -74,8 +72,7 @@ def apertures_in(source: Source) -> tuple[list[Aperture], list[Problem]]:
         problems += more
         apertures += [] if aperture is None else [aperture]
     kept = []
-    for number, aperture in enumerate(apertures):
-        other = _framed_by(number, apertures)
+    for aperture, other in zip(apertures, framed_by(apertures), strict=True):
         if other is None:
             kept.append(aperture)
             continue
@@ -84,37 +81,6 @@ def apertures_in(source: Source) -> tuple[list[Aperture], list[Problem]]:
         done = "its frame: the glass is counted once"
         problems.append(Problem(filling.guid, what, done, kind="frame of a window"))
     return kept, problems
-
-
-def _framed_by(number: int, apertures: Sequence[Aperture]) -> Aperture | None:
-    """The window that one without a drawn pane lies around, or None; of two the lesser is kept."""
-    one = apertures[number]
-    if one.filling.transparent.any() or one.glass.is_empty:
-        return None
-    low, high = (f(one.filling.triangles, axis=(0, 1)) for f in (np.min, np.max))
-    for place, other in enumerate(apertures):
-        theirs = other.filling.triangles
-        if place == number or other.glass.is_empty or not len(theirs):
-            continue
-        if np.any(theirs.max(axis=(0, 1)) < low) or np.any(theirs.min(axis=(0, 1)) > high):
-            continue
-        back = not other.filling.transparent.any() and _lies_around(other, one)
-        smaller = (round(other.glass.area, 3), place) < (round(one.glass.area, 3), number)
-        if _lies_around(one, other) and (smaller or not back):
-            return other
-    return None
-
-
-def _lies_around(one: Aperture, other: Aperture) -> bool:
-    """Whether the glass that one is taken to have is mostly the glass of another one."""
-    if abs(one.plane.normal @ other.plane.normal) < FLAT:
-        return False
-    if abs(one.plane.to_plane(other.plane.origin)[2]) > ONE_WINDOW:
-        return False
-    theirs = shapely.transform(
-        other.glass, lambda p: one.plane.to_plane(other.plane.to_world(p))[:, :2]
-    )
-    return theirs.intersection(one.glass).area > MOSTLY * one.glass.area
 
 
 def glass_of_rooms(

@@ -109,7 +109,7 @@ def _pane(element, triangles: NDArray, clear: NDArray, spaces: Sequence[NDArray]
         return Pane(outline.area, "drawn", _before_a_room(outline, frame, spaces))
     if not element.is_a("IfcWindow"):
         return Pane(0.0, "none")
-    outline, frame = _outline(triangles, _stated_area(element))
+    outline, frame = _outline(triangles, stated_area(element))
     lining = _lining(element)
     glass = outline.buffer(-lining, join_style="mitre") if lining else outline
     area = glass.area if lining else FRAMED * outline.area
@@ -169,7 +169,7 @@ def _hull_area(triangles: NDArray, normal: NDArray) -> float:
     return shapely.convex_hull(shapely.multipoints(flat)).area
 
 
-def _stated_area(element) -> float:
+def stated_area(element) -> float:
     """Width by height as the file states them [m2]; 0 where it does not."""
     scale = ifcopenshell.util.unit.calculate_unit_scale(element.file)
     width, height = getattr(element, "OverallWidth", None), getattr(element, "OverallHeight", None)

@@ -13,12 +13,11 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-import ifcopenshell.util.unit
-
 from bim.ifc.corrections import Corrections
 from bim.ifc.glass_of_rooms import apertures_in
 from bim.ifc.source import read_source
 from mitsuba_cfs.errors import CfsError
+from scenes.evidence.validation.real_glass import stated_area
 
 LEAST, MOST = 0.75, 1.33  # ratios of found to stated area that agree
 
@@ -26,24 +25,20 @@ LEAST, MOST = 0.75, 1.33  # ratios of found to stated area that agree
 def compared(path: Path) -> tuple[int, list[str]]:
     """How many windows and doors state their size, and lines of those that differ."""
     source = read_source(path, Corrections(), lambda stage, part: None)
-    scale = ifcopenshell.util.unit.calculate_unit_scale(source.model)
     count, off = 0, []
     for aperture in apertures_in(source)[0]:
         filling = aperture.filling
         if not filling.ifc_class.startswith(("IfcWindow", "IfcDoor")):
             continue
-        element = source.model.by_guid(filling.guid)
-        width = (getattr(element, "OverallWidth", None) or 0.0) * scale
-        height = (getattr(element, "OverallHeight", None) or 0.0) * scale
-        if width * height <= 0:
+        stated = stated_area(source.model.by_guid(filling.guid))
+        if stated <= 0:
             continue
         count += 1
-        ratio = aperture.opening.area / (width * height)
-        if not LEAST < ratio < MOST:
+        if not LEAST < aperture.opening.area / stated < MOST:
             normal = " ".join(f"{part:.2f}" for part in aperture.plane.normal)
             off.append(
                 f"{filling.ifc_class} {filling.guid}: {aperture.opening.area:.2f} m2 towards "
-                f"({normal}) for {width:.2f} x {height:.2f} m"
+                f"({normal}) for {stated:.2f} m2"
             )
     return count, off
 
