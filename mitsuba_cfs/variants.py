@@ -67,6 +67,16 @@ def share_cores(processes: int) -> None:
     _tracer("drjit").set_thread_count(max((os.cpu_count() or 1) // processes, 1))
 
 
+def return_memory() -> None:
+    """Give freed memory back to the system, which Dr.Jit and the C library keep for later.
+
+    After a room's stage that is as much as the next one needs, in arrays of other sizes.
+    """
+    _tracer("drjit").flush_malloc_cache()
+    if sys.platform == "linux" and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):
+        trim(0)  # glibc's
+
+
 def choose(*, vectorised: bool = True) -> Choice:
     """The variant that suits this machine, with the reason; activates nothing."""
     gpu_fault = cuda_fault()

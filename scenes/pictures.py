@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize, hsv_to_rgb
 from matplotlib.figure import Figure
-from matplotlib.image import imsave
+from matplotlib.image import AxesImage, imsave
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
@@ -53,13 +55,22 @@ def write_falsecolour(
     """
     low, high = limits or scale_limits(luminance if seen is None else luminance[seen])
     shown = np.maximum(luminance, low) if logarithmic else luminance
-    shown = np.ma.masked_array(shown, None if seen is None else ~seen)
-    norm = LogNorm(low, high, clip=True) if logarithmic else Normalize(low, high, clip=True)
-    figure = _figure(luminance.shape)
-    axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
-    image = axes.imshow(shown, cmap=COLOURS, norm=norm, interpolation="nearest")
-    axes.set_axis_off()
+    figure, axes, image = _falsecolour_frame(luminance.shape, low, high, logarithmic)
+    image.set_data(np.ma.masked_array(shown, None if seen is None else ~seen))
     axes.set_title(title, **TITLE)
+    _save(figure, path)
+
+
+@lru_cache(maxsize=8)  # the pictures of a run share a few; making one takes as long as drawing it
+def _falsecolour_frame(
+    shape: tuple[int, int], low: float, high: float, logarithmic: bool
+) -> tuple[Figure, Axes, AxesImage]:
+    """A figure with a scale, and in it the place of a picture and its title."""
+    norm = LogNorm(low, high, clip=True) if logarithmic else Normalize(low, high, clip=True)
+    figure = _figure(shape)
+    axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
+    image = axes.imshow(np.full(shape, low), cmap=COLOURS, norm=norm, interpolation="nearest")
+    axes.set_axis_off()
     bar = figure.colorbar(image, cax=figure.add_axes((0.83, 0.08, 0.035, 0.78)))
     bar.ax.set_title("cd/m²", **TITLE)
     bar.ax.tick_params(labelsize=8)
@@ -67,7 +78,7 @@ def write_falsecolour(
         bar.ax.yaxis.set_major_locator(LogLocator(10, subs=(1.0, 3.0), numticks=20))
         bar.minorticks_off()  # a quarter of the time of the picture, without a number beside one
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
-    _save(figure, path)
+    return figure, axes, image
 
 
 def tone_mapped(pixels: NDArray, *, white: float | None = None) -> NDArray[np.uint8]:

@@ -171,7 +171,10 @@ def run_to_folder(
         progress("results", 0.0)
         report = partial(write_report, page=page_options)
         explorer = write_explorer if options.explore else None
-        write_results(result, folder, report, explorer, netcdf=options.netcdf)
+        write_results(
+            result, folder, report, explorer,
+            netcdf=options.netcdf, processes=processes, progress=progress,
+        )  # fmt: skip
         progress("results", 1.0)
     for note in result.notes:
         if note != quick_run.NOTE:

@@ -17,6 +17,7 @@ from bim.outer_faces import OuterFaces, outer_faces
 from bim.seasons import in_month, season_of, seasons
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
+from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
@@ -135,9 +136,10 @@ class RoomSimulation:
         self.seconds: dict[str, float] = {}
 
     def timed(self, stage: str, work: Callable[[], T]) -> T:
-        """What the work gives; its time is noted."""
+        """What the work gives; its time is noted, and memory that it needs no more goes back."""
         start = time.monotonic()
         result = work()
+        variants.return_memory()
         self.seconds[stage] = round(time.monotonic() - start, 2)
         return result
 

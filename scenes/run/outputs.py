@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
@@ -12,6 +13,7 @@ import pandas as pd
 from bim.names import folder_names
 from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
+from mitsuba_cfs.progress import Progress, silent
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.result_folder import EXPLORER, ResultFolder
 from scenes.results import GridDaylight, RoomYear, RunResult
@@ -21,8 +23,10 @@ from scenes.run.csv_text import csv_text
 from scenes.run.netcdf import NAME as NETCDF
 from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
+from scenes.workers import Tasks
 
 REPORT = "report.html"
+ROOMS_A_PROCESS = 8
 
 
 def write_results(
@@ -32,6 +36,8 @@ def write_results(
     write_explorer=None,
     *,
     netcdf: bool = False,
+    processes: int = 1,
+    progress: Progress = silent,
 ) -> None:
     """Write all files of a run; earlier results are replaced at the end.
 
@@ -39,6 +45,7 @@ def write_results(
         write_report: `scenes.report.write_report`, or None for no report.
         write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
         netcdf: whether all numbers are written as one netCDF file besides.
+        processes: that many rooms' files are written at a time.
 
     A fault of the program in one of these pages is raised when all else is in place.
     """
@@ -46,19 +53,17 @@ def write_results(
     with folder.replaced() as temporary:
         several = len(result.spaces) > 1
         names = folder_names([room.space for room in result.spaces])
-        for room, name in zip(result.spaces, names, strict=True):
-            place = temporary / name if several else temporary
-            place.mkdir(exist_ok=True)
-            _write_room(result, room, place)
+        places = [temporary / name if several else temporary for name in names]
+        _write_rooms(result, places, processes, progress)
         write_table(_problems(result), temporary / "problems.csv", index=False)
         if netcdf:
             write_netcdf(result, temporary / NETCDF)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
             if write is not None:
                 faults += _faults(write, result, temporary / page)
-        places = (name if several else "." for name in names)
         guids = (room.space.guid for room in result.spaces)
-        folders = dict(zip(guids, places, strict=True))  # of each room's tables
+        within = (name if several else "." for name in names)
+        folders = dict(zip(guids, within, strict=True))  # of each room's tables
         text = json.dumps(result.manifest | {"folders": folders}, indent=2, ensure_ascii=False)
         write_text(temporary / "run.json", text + "\n")
     if faults:
@@ -85,15 +90,48 @@ def _faults(
     return []
 
 
-def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
-    table = illuminance_table(room.daylight, result.times)
+def _write_rooms(
+    result: RunResult, places: Sequence[Path], processes: int, progress: Progress
+) -> None:
+    """The files of each room in its folder."""
+    rooms = list(zip(result.spaces, places, strict=True))
+    tasks = Tasks(
+        rooms, _Files(result.times), _fault,
+        key=lambda item: item[0].space.guid, scene=lambda item: item[0].space.guid,
+    )  # fmt: skip
+    # a process takes as long to begin as it does to write some rooms
+    processes = min(processes, len(rooms) // ROOMS_A_PROCESS)
+    for number, error in enumerate(tasks.results(processes=processes), 1):
+        if error is not None:
+            raise error
+        progress("results", number / (len(rooms) + 1))
+
+
+def _fault(item: tuple[RoomYear, Path], error: BaseException) -> BaseException:
+    return error
+
+
+@dataclass(frozen=True, slots=True)
+class _Files:
+    """Writes the files of a room."""
+
+    times: pd.DatetimeIndex
+
+    def __call__(self, item: tuple[RoomYear, Path]) -> None:
+        room, place = item
+        place.mkdir(exist_ok=True)
+        _write_room(room, self.times, place)
+
+
+def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
+    table = illuminance_table(room.daylight, times)
     write_table(table, place / "illuminance.parquet")
     metrics = room.daylight.sensor_metrics.copy()
     metrics["relative_standard_error"] = room.daylight.relative_error
     _csv(metrics, place / "daylight_metrics.csv")
     _csv(pd.DataFrame([room.daylight.room_metrics]), place / "room_metrics.csv", index=False)
     _write_grids(room.daylight.grids, place)
-    _csv(glare_table(room.glare, result.times), place / "dgp.csv")
+    _csv(glare_table(room.glare, times), place / "dgp.csv")
     heat = room.heat
     _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
     if room.operation is not None:
@@ -103,14 +141,14 @@ def _write_room(result: RunResult, room: RoomYear, place: Path) -> None:
         _csv(room.annual_glare, place / "annual_glare.csv")
     _csv(pd.DataFrame([heat.comfort_summary]), place / "comfort.csv", index=False)
     for picture in room.glare.pictures:
-        name = f"view_{result.times[picture.hour]:%m-%d_%Hh}"
+        name = f"view_{times[picture.hour]:%m-%d_%Hh}"
         write_hdr(place / f"{name}.hdr", picture.luminance, room.glare.view)
-        title = f"{result.times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
+        title = f"{times[picture.hour]:%d %B %H:%M}, DGP {picture.glare['dgp']:.2f}"
         write_falsecolour(place / f"{name}.png", picture.luminance, title=title)
     if (colour := room.glare.colour) is not None:
-        name = f"view_{result.times[colour.hour]:%m-%d_%Hh}_colour"
+        name = f"view_{times[colour.hour]:%m-%d_%Hh}_colour"
         write_hdr(place / f"{name}.hdr", colour.radiance, room.glare.view)
-        title = f"{result.times[colour.hour]:%d %B %H:%M}"
+        title = f"{times[colour.hour]:%d %B %H:%M}"
         write_tone_mapped(place / f"{name}.png", colour.radiance, scale=True, title=title)
 
 

@@ -37,6 +37,7 @@ class RoomSeries(Generic[R]):
     on_room: Callable[[R], None] = lambda result: None  # called with each result in turn
     given: str = "results are"  # what an equal room has of the one that was computed
     beside: Beside[R] | None = None  # computes rooms beside each other in place of `compute`
+    kept: Callable[[R], R] = lambda result: result  # what is held of each
 
     def results(self, progress: Progress = silent) -> tuple[list[R], list[Problem], list[str]]:
         """The results in the rooms' order, what was left out, and what was given twice.
@@ -54,7 +55,10 @@ class RoomSeries(Generic[R]):
                 wanted = (twin or space).guid
                 while wanted not in computed:
                     guid, result = next(ahead, (space.guid, None))
-                    computed[guid] = self.compute(space, steps) if result is None else result
+                    result = self.compute(space, steps) if result is None else result
+                    if not isinstance(result, BaseException):
+                        result = self.kept(result)
+                    computed[guid] = result
                 result = computed[wanted]
                 if isinstance(result, BaseException):
                     raise result

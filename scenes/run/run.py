@@ -47,6 +47,7 @@ from scenes.run.notes import model_notes, site_notes
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import RoomWork, Workers
+from scenes.run.stored_pictures import StoredPictures
 
 R = TypeVar("R")
 
@@ -225,6 +226,7 @@ def _series(
             and alike(one, other)
         ),
         beside=None if workers is None else partial(work.beside, workers=workers),
+        kept=StoredPictures().kept if len(work.spaces) > 1 else lambda result: result,
     )
 
 
