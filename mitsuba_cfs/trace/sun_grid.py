@@ -33,6 +33,7 @@ from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 
 STEP = float(np.radians(4.0))  # between nodes, about the zenith
 CHECKED = 8  # of places whose nodes agree, one in so many has a ray to the sun itself
+MIRRORED = 32  # the same of the sun in a mirror, which few places have
 KEY = 2**32  # of a node's number along one axis, to hold both
 
 
@@ -44,7 +45,7 @@ class SunGrid:
     nodes: NDArray[np.float64]  # [n, 3] unit
     corner: NDArray[np.int64]  # [h, 3] number of the nodes about each sun
     weight: NDArray[np.float64]  # [h, 3] of each, 1 in sum
-    first: NDArray[np.int64]  # [h] of `CHECKED` places in a row, the one that is checked
+    first: NDArray[np.int64]  # [h] of `MIRRORED` places in a row, one that is checked
 
     @classmethod
     def about(cls, suns: NDArray[np.float64]) -> SunGrid:
@@ -64,7 +65,7 @@ class SunGrid:
         weight = np.column_stack([1 - more, more - less, less])
         bits = suns.astype(np.float32).view(np.uint32).astype(np.uint64)
         mixed = (bits @ np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], dtype=np.uint64)) >> 12
-        return cls(suns, nodes, corner.reshape(-1, 3), weight, mixed.astype(np.int64) % CHECKED)
+        return cls(suns, nodes, corner.reshape(-1, 3), weight, mixed.astype(np.int64) % MIRRORED)
 
     def light(self, way: SunWay, places: Places) -> mi.Float:
         """Cosine times the share of the suns that reaches places by a way [m * h]."""
@@ -75,6 +76,7 @@ class SunGrid:
         count = dr.opaque(mi.UInt32, len(suns))
         place = dr.arange(mi.UInt32, places.size * len(suns))
         place, hour = place // count, place % count
+        each = MIRRORED if way.mirrors else CHECKED
         start, share, lit = place * dr.opaque(mi.UInt32, len(nodes)), mi.Float(0), mi.UInt32(0)
         for corner, weight in zip(self.corner.T, self.weight.T, strict=True):
             number = dr.gather(mi.UInt32, column(corner, mi.UInt32), hour)
@@ -86,10 +88,11 @@ class SunGrid:
             dr.gather(mi.Vector3f, vectors(suns), hour),
         )
         differ, level = (lit > 0) & (lit < 3), dr.abs(cosine) <= SPREAD
-        checked = (place + dr.gather(mi.UInt32, column(self.first, mi.UInt32), hour)) % CHECKED == 0
+        first = dr.gather(mi.UInt32, column(self.first, mi.UInt32), hour)
+        checked = (place + first) % each == 0
         own = level | ((cosine > 0) & (differ | checked))
         found = dr.select((cosine > 0) & ~level, cosine * share, 0.0)
-        times = dr.select(differ | level, mi.Float(1), mi.Float(CHECKED))
+        times = dr.select(differ | level, mi.Float(1), mi.Float(each))
         dr.eval(found, own, times)
         pair = dr.compress(own)
         if dr.width(pair):
