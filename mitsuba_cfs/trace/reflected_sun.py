@@ -29,12 +29,8 @@ from mitsuba_cfs.trace.sampling import batch_key, column, lattice_2d, opaque, ta
 from mitsuba_cfs.trace.scene import TracedScene
 from mitsuba_cfs.trace.straight_view import straight_rays
 from mitsuba_cfs.trace.sun_discs import Scattering
-from mitsuba_cfs.trace.sun_paths import (
-    Places,
-    face_places,
-    reflecting_places,
-    sunlight,
-)
+from mitsuba_cfs.trace.sun_grid import sunlight_of_many
+from mitsuba_cfs.trace.sun_paths import Places, face_places, reflecting_places
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
 PLACES = 1024  # that stand for all that paths meet, at most and where nothing is said
@@ -146,9 +142,10 @@ def outdoor_light(
     Args: suns: [h, 3]; strength: [h] irradiance normal to it.
     """
     found = np.zeros((shares.share.shape[0], len(suns)), dtype=np.float32)
+    share, strength = shares.share.astype(np.float32), strength.astype(np.float32)
     for hours in _blocks(shares.places.size, len(suns)):
-        light = sunlight(outside, shares.places, suns[hours])
-        found[:, hours] = shares.share @ light * strength[hours]
+        light = sunlight_of_many(outside, shares.places, suns[hours])
+        found[:, hours] = share @ light * strength[hours]
     if shares.rough is None:
         return found
     count = len(shares.rough.weight)

@@ -178,8 +178,9 @@ def _between(
         found = found + _reflected(
             wide.cells, inside, wide.starts, met, size, samples=CELL_RAYS, seed=seed
         )
-        met = np.unique(found.indices)
-        met = met[~known[met]]
+        others = np.zeros(size, dtype=bool)
+        others[found.indices] = True
+        met = np.flatnonzero(others & ~known)
     return found
 
 

@@ -72,21 +72,30 @@ class SunDiscs:
         sensor, sun = self._pair(column(chosen, mi.UInt32))
         stream = mi.sample_tea_32(sensor, dr.opaque(mi.UInt32, (seed ^ 0x3C6EF372) & 0xFFFFFFFF))[0]
         centre, turn = dr.gather(mi.Vector3f, around.towards, sun), lattice(sensor, stream, 4)
-        total, first, alike = [mi.Float(0) for _ in scattering], mi.Int32(0), mi.Bool(True)
-        for k in range(RIM_RAYS + DISC_RAYS):
-            number = dr.opaque(mi.UInt32, k)
+        total, alike = self._looked(sensor, centre, turn, stream)
+        dr.eval(total, alike)
+        for whole, part in zip(self._whole, total, strict=True):
+            whole[chosen] = part.numpy()
+        self._crossed = chosen[~alike.numpy()]
+
+    @dr.syntax
+    def _looked(
+        self, sensor: mi.UInt32, centre: mi.Vector3f, turn: mi.Float, stream: mi.UInt32
+    ) -> tuple[list[mi.Float], mi.Bool]:
+        """What rays inside the discs have on average, and whether all and the rim's are alike."""
+        total, first, alike = [mi.Float(0) for _ in self._scattering], mi.Int32(0), mi.Bool(True)
+        number = mi.UInt32(0)
+        while number < RIM_RAYS + DISC_RAYS:
             inner = number >= RIM_RAYS
             rim = mi.Point2f(RIM, (mi.Float(number) + turn) / RIM_RAYS)
             u = dr.select(inner, _spiral(number - RIM_RAYS, DISC_RAYS, stream), rim)
             values, passed = self._rays(sensor, disc_direction(centre, u))
-            first = passed if k == 0 else first
+            first = dr.select(number == 0, passed, first)
             alike &= passed == first
             share = dr.select(inner, mi.Float(1 / DISC_RAYS), 0.0)
-            total = [a + share * b for a, b in zip(total, values, strict=True)]
-            dr.eval(*total, first, alike)
-        for whole, part in zip(self._whole, total, strict=True):
-            whole[chosen] = part.numpy()
-        self._crossed = chosen[~alike.numpy()]
+            total = _added(total, values, share)
+            number += 1
+        return total, alike
 
     def light(self, key: mi.UInt32) -> list[NDArray[np.float32]]:
         """Mean over each disc of cos(sensor) tau(sun) through each group [G][S * Q]."""
@@ -149,6 +158,10 @@ class SunDiscs:
             for g, system in enumerate(self._scattering)
         ]
         return values, passed
+
+
+def _added(total: list[mi.Float], values: list[mi.Float], share: mi.Float) -> list[mi.Float]:
+    return [a + share * b for a, b in zip(total, values, strict=True)]
 
 
 def _meets_group(

@@ -164,10 +164,10 @@ def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
 
 
 def place_and_hour(
-    places: Places, suns: NDArray[np.float64]
+    places: Places, suns: NDArray[np.float64], pair: mi.UInt32 | None = None
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
-    """Point, normal and a direction to the sun of all pairs of places and hours [m * h]."""
-    lane = dr.arange(mi.UInt32, places.size * len(suns))
+    """Point, normal and a direction to the sun of pairs of places and hours, of all [m * h]."""
+    lane = dr.arange(mi.UInt32, places.size * len(suns)) if pair is None else pair
     count = dr.opaque(mi.UInt32, len(suns))
     place = lane // count
     towards = dr.gather(mi.Vector3f, vectors(suns), lane - place * count)
@@ -186,6 +186,15 @@ def sunlight(
         middle = column((places.normal @ turned.T).ravel())
         light += _shone(way, point, normal, to_sun, middle)
     return light.numpy().reshape(places.size, len(suns))
+
+
+def sunlight_of_pairs(
+    way: SunWay, places: Places, suns: NDArray[np.float64], pair: mi.UInt32
+) -> mi.Float:
+    """The same of some pairs by one way, from whose end the suns are seen."""
+    point, normal, to_sun = place_and_hour(places, suns, pair)
+    middle = dr.gather(mi.Vector3f, vectors(suns), pair % dr.opaque(mi.UInt32, len(suns)))
+    return _shone(way, point, normal, to_sun, dr.dot(normal, middle))
 
 
 def sunlight_of_each(

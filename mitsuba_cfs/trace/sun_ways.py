@@ -23,6 +23,11 @@ class SunWay:
         self._outside, self._plane = outside, plane
         self.free = plane is None and not outside.surface_count  # nothing stands before the windows
 
+    @property
+    def mirrors(self) -> bool:
+        """Whether the light comes by a mirror."""
+        return self._plane is not None
+
     def turned(self, suns: NDArray[np.float64]) -> NDArray[np.float64]:
         """Directions [Q, 3] that the light of the suns [Q, 3] comes from."""
         if self._plane is None:
