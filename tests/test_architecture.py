@@ -38,7 +38,8 @@ SOLVERS = tuple(
     for name in (
         "borrowed_pictures", "by_name", "colour_view", "exact_sun", "glare", "group_light",
         "optics", "path_light", "phase_error",
-        "phase_light", "phase_scene", "reflected_sun", "seasonal_light", "straight_views",
+        "phase_light", "phase_scene", "reflected_sun", "seasonal_light", "sensor_coefficients",
+        "straight_views",
         "view_cache",
         "window_reflection",
     )

@@ -35,11 +35,16 @@ class WindowLight:
 
 @dataclass(frozen=True, slots=True)
 class SensorLight:
-    """What a window group in one state gives to the sensors, the eye last [lx]."""
+    """What a window group in one state gives to the sensors, the eye last.
 
-    diffuse: NDArray[np.float64]  # [S, L] V T D s - V_d T D_d s_d + the reflected beam's own angle
-    sun: NDArray[np.float64] | None  # [S, L] C_ds s_sun
-    sun_error: NDArray[np.float64] | float  # [S] of the hours' sum of it and of the reflected sun
+    Whatever the hours' skies multiply is kept by their patches: the groups are added up before.
+    """
+
+    whole: NDArray[np.float64]  # [S, P] per unit luminance of the sky, `SensorCoefficients`
+    by_sun: NDArray[np.float64] | None = None  # [S, P] of the sun alone, to take away
+    added: NDArray[np.float64] | None = None  # [S, L] the reflected sun in its place [lx]
+    sun: NDArray[np.float64] | None = None  # [S, L] C_ds s_sun [lx]
+    sun_error: NDArray[np.float64] | float = 0.0  # [S] of the hours' sums of these two
 
 
 def window_light(traced: PhaseScene, q: int, optics: SystemOptics, sky: AnnualSky) -> WindowLight:

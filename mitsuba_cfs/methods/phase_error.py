@@ -37,10 +37,10 @@ def matrix_variance(
         by_rays = reflected is not None and g < outdoors
         for j in np.unique(row):
             some = row == j
-            lit = sky.without_sun(some) if by_rays else sky.whole[:, some]
-            mean, sun = lit.sum(axis=1) / hours, None
+            whole, of_sun, rest = sky.totals(some)
+            mean, sun = (rest if by_rays else whole) / hours, None
             if by_rays:
-                sun = sky.sun[:, some].sum(axis=1) / hours, reflected.replaced(some) / hours
+                sun = of_sun / hours, reflected.replaced(some) / hours
             for q in traced.parts.of(g):
                 found += _part_variance(traced, straight, (g, j, q), mean, sun)
             seen = straight.matrix(g, j)
@@ -70,13 +70,13 @@ def exchange_variance(
     inwards, outwards = mirrored.reflects(optics), mirrored.reflects_outdoors(optics)
     if not inwards and not outwards:
         return found
-    before = traced.daylight.values @ (sky.whole[:, hours].sum(axis=1) / len(sky.lit))
+    some = np.isin(np.arange(len(sky.lit)), hours)
+    before = traced.daylight.values @ (sky.totals(some)[0] / len(sky.lit))
     if inwards:
         through = np.stack([o.transmission @ i for o, i in zip(optics, before, strict=True)])
         found += mirrored.variance_by_room(optics, through)
     if outwards:
         if reflected is not None:
-            some = np.isin(np.arange(len(sky.lit)), hours)
             before = before + reflected.replaced(some) / len(sky.lit)
         found += mirrored.variance_by_outdoors(optics, before)
     return found
@@ -118,8 +118,8 @@ def _left_by_means(
     """What means over a group's parts change in the sensors' mean [S] in some of the hours."""
     g, j = which
     points, normals = traced.scene.sensors()
-    passed = sky.without_sun(some) if traced.five_phase else sky.whole[:, some]
-    total = passed.sum(axis=1, dtype=float, keepdims=True)
+    whole, _, rest = sky.totals(some)
+    total = (rest if traced.five_phase else whole)[:, None]
     mean = coarse_sky(total, traced.sampling.subdivision)  # of the sum: a hundredth of the work
     if g >= len(traced.parts.cells) or not mean.any():
         return np.zeros(len(points))

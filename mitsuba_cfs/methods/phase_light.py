@@ -17,6 +17,7 @@ from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, hourl
 from mitsuba_cfs.methods.phase_error import exchange_variance, matrix_variance
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
+from mitsuba_cfs.methods.sensor_coefficients import SensorCoefficients
 from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.progress import Progress, silent
@@ -44,6 +45,7 @@ class PhaseSystems:
         self.straight = StraightViews(traced, systems)
         self.reflected_sun = ReflectedSun(traced, systems, self.straight)
         self.mirrored = WindowReflection(traced)
+        self.sensors = SensorCoefficients(traced, systems, self.straight, self.mirrored)
 
     @property
     def states(self) -> int:
@@ -64,23 +66,12 @@ class PhaseSystems:
 
         V T D, with what windows reflect, and the straight view of groups that are cut.
         """
-        optics = self.optics([state] * len(self.systems))
-        view, daylight = self.traced.sensors.values, self.traced.daylight.values
-        found = self.through(optics, view.reshape(len(view), -1))
-        if self.mirrored.reflects(optics):
-            found += self.through(optics, self.mirrored.sensors(optics))
-        if self.mirrored.reflects_outdoors(optics):
-            before = self.mirrored.outdoors(optics, self.mirrored.shares(optics))
-            found += before @ daylight.reshape(-1, daylight.shape[-1])
-        for g in range(len(self.systems)):
-            found += self.straight.coefficients(g, min(state, len(self.systems[g]) - 1))
+        kind = [min(state, len(states) - 1) for states in self.systems]
+        found = sum(self.sensors.of_group(g, j) for g, j in enumerate(kind))
+        shares, _ = self.sensors.reflected(kind)
+        if shares is not None:
+            found = found + self.sensors.of_sky(shares)
         return found[: len(self.traced.scene.points)]
-
-    def through(self, optics: Sequence[SystemOptics], shares: NDArray) -> NDArray[np.float64]:
-        """Shares [n, Q * K] of the windows' luminance, T D before them, as of the sky's [n, P]."""
-        parts = np.split(shares, len(optics), axis=1)
-        rows = zip(parts, optics, self.traced.daylight.values, strict=True)
-        return sum(part @ o.transmission @ d for part, o, d in rows)
 
     def seen_sun(self, state: tuple[int, ...]) -> tuple[PictureSun, OutdoorCoefficients]:
         """The sun and the outdoors in the view's pixels, with each group in a state."""
@@ -261,38 +252,32 @@ class PhaseLight:
         return shining_hours(self._traced, self.sky)
 
     def _sensor_light(self, g: int, j: int, exact: list[Estimate | None]) -> SensorLight:
-        diffuse = self._diffuse_light(g, j) + self.filled.straight.light(g, j, self.sky)
+        filled, outdoors = self.filled, g < len(self._traced.scene.outdoor_groups)
+        whole = filled.sensors.of_group(g, j)
         if not self._traced.five_phase:
-            return SensorLight(diffuse, None, 0.0)
-        error = 0.0
-        outdoors = g < len(self._traced.scene.outdoor_groups)
-        if self._reflected_sun is not None and outdoors:
-            beam = bool(self.filled.straight.held(g, j).any())
+            return SensorLight(whole)
+        by_sun, added, error = filled.sensors.by_sun_patches(g, j), None, 0.0
+        if self._reflected_sun is None:
+            added = self._at_sun(g, j)
+        elif outdoors:
+            beam = bool(filled.straight.held(g, j).any())
             more = self._reflected_sun.sensors(g, j, beam=beam)
-            diffuse, error = diffuse + more.values, more.sum_error
-        sun, shining = np.zeros_like(diffuse), self._shining
+            added, error = more.values, more.sum_error
+        sun, shining = np.zeros((len(whole), len(self.sky.lit))), self._shining
         if exact[j] is None:
-            return SensorLight(diffuse, sun, error)
+            return SensorLight(whole, by_sun, added, sun, error)
         luminance = self.sky.illuminance[shining] / SUN_SOLID_ANGLE
         found = exact[j].part(np.s_[g])
         sun[:, shining] = found.values * luminance
-        return SensorLight(diffuse, sun, np.hypot(error, found.error_of(luminance)))
+        return SensorLight(whole, by_sun, added, sun, np.hypot(error, found.error_of(luminance)))
 
-    def _diffuse_light(self, g: int, j: int) -> NDArray[np.float64]:
-        """What a group gives to the sensors [S, L] but for the sun straight: few before many."""
-        traced, sky, straight = self._traced, self.sky, self.filled.straight
-        T, parts = straight.transmission(g, j), traced.parts.of(g)
-        view, daylight = traced.sensors.values, traced.daylight.values
-        found = sum(view[:, q] @ T @ daylight[q] for q in parts) @ sky.whole
-        if not traced.five_phase:
-            return found
-        held, direct, by_sun = straight.held(g, j), traced.direct_sensors, traced.direct_daylight
-        shares = ((q, direct[:, q] @ T + (view[:, q] - direct[:, q]) @ held) for q in parts)
-        found -= phases.times_sky(sum(share @ by_sun[q] for q, share in shares), sky.lit_sun)
-        if self._reflected_sun is None and held.any():
-            for q in parts:
-                found += (view[:, q] - direct[:, q]) @ self.windows[q][j].beam_at_sun
-        return found
+    def _at_sun(self, g: int, j: int) -> NDArray[np.float64] | None:
+        """The beam that the room reflects, at the sun's own angle [S, L]; None without a beam."""
+        if not self.filled.straight.held(g, j).any():
+            return None
+        indirect = self._traced.sensors.values - self._traced.direct_sensors
+        parts = self._traced.parts.of(g)
+        return sum(indirect[:, q] @ self.windows[q][j].beam_at_sun for q in parts)
 
     def _of_all(self, state: State | None) -> NDArray[np.float64]:
         """Illuminance of sensors and eye [S + 1, L] by all groups; that of the last state is kept.
@@ -307,36 +292,35 @@ class PhaseLight:
         return self._last[1]
 
     def _sum_of_all(self, state: State | None) -> NDArray[np.float64]:
-        rows = list(enumerate(self._state(state)))
-        diffuse = sum(self._chosen(g, "diffuse", row) for g, row in rows)
-        diffuse = diffuse + self._reflected(state)
+        rows, eyes = self._state(state), len(self._traced.scene.sensors()[0])
+        diffuse = np.zeros((eyes, rows.shape[1]))
+        for kind, hours in combinations(rows):
+            diffuse[:, hours] = self._diffuse(kind, hours)
         if not self._traced.five_phase:
             return diffuse
-        return np.maximum(diffuse, 0.0) + sum(self._chosen(g, "sun", row) for g, row in rows)
+        sun = (self._chosen(g, "sun", row) for g, row in enumerate(rows))
+        return np.maximum(diffuse, 0.0, out=diffuse) + sum(sun)
 
-    def _reflected(self, state: State | None) -> NDArray[np.float64] | float:
-        """What the windows reflect, into the room and outdoors, to sensors and eye [S + 1, L]."""
-        rows, mirrored, found = self._state(state), self.filled.mirrored, None
-        for kind, hours in combinations(rows):
-            optics, added = self.filled.optics(kind), []
-            if mirrored.reflects(optics):
-                shares = self.filled.through(optics, mirrored.sensors(optics))
-                added.append(shares @ self._lit(hours))
-            if mirrored.reflects_outdoors(optics):
-                added.append(self._by_outdoors(optics, mirrored.shares(optics), hours))
-            if added:
-                found = np.zeros((len(added[0]), rows.shape[1])) if found is None else found
-                found[:, hours] = sum(added)
-        return 0.0 if found is None else found
+    def _diffuse(self, kind: Sequence[int], hours: NDArray[np.int64]) -> NDArray[np.float64]:
+        """All but the sun straight [S, h] in hours with each group in a state [G].
 
-    def _by_outdoors(
-        self, optics: Sequence[SystemOptics], shares: NDArray, hours: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
-        """What shares [n, Q * K] of what windows reflect outdoors and get back are [n, h]."""
-        shares, daylight = self.filled.mirrored.outdoors(optics, shares), self._traced.daylight
-        found = shares @ daylight.values.reshape(shares.shape[1], -1) @ self._lit(hours)
-        if self._reflected_sun is not None:
-            found += self._reflected_sun.before(shares, hours)
+        Few sensors before many hours, and the groups as one.
+        """
+        filled, sky = self.filled.sensors, self._lit(hours)
+        chosen = [self.sensors[g][j] for g, j in enumerate(kind)]
+        (shares, outwards), whole = filled.reflected(kind), sum(light.whole for light in chosen)
+        if shares is not None:
+            whole = whole + filled.of_sky(shares)
+        # in the sky's single precision: the noise of the sums is ten thousand times its rounding
+        found = (whole.astype(sky.dtype) @ sky).astype(float)
+        if not self._traced.five_phase:
+            return found
+        found -= phases.times_sky(sum(light.by_sun for light in chosen), self._lit_sun(hours))
+        for light in chosen:
+            if light.added is not None:
+                found += light.added if self._all(hours) else light.added[:, hours]
+        if outwards is not None and self._reflected_sun is not None:
+            found += self._reflected_sun.before(outwards, hours)
         return found
 
     def _before(self, hours: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -350,6 +334,13 @@ class PhaseLight:
     def _lit(self, hours: NDArray[np.int64]) -> NDArray[np.floating]:
         """The sky of some of its hours [P, h]; a year's is not copied."""
         return self.sky.whole if self._all(hours) else self.sky.whole[:, hours]
+
+    def _lit_sun(self, hours: NDArray[np.int64]) -> phases.Sky:
+        """The sun alone in some of the sky's hours, as products take it."""
+        sun = self.sky.lit_sun
+        if self._all(hours):
+            return sun
+        return sun[:, hours] if isinstance(sun, np.ndarray) else sun[hours]
 
     def _all(self, hours: NDArray[np.int64]) -> bool:
         """Whether they are the sky's hours, each in its place."""

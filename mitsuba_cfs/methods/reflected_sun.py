@@ -167,7 +167,7 @@ class ReflectedSunLight:
             return np.zeros(self._shape)
         some = hours[self._shining].astype(np.float32)
         mean = sum(self._windows(b) @ some for b in range(BATCHES)) / BATCHES
-        return mean - self._reflected_daylight() @ self._sky.sun[:, hours].sum(axis=1)
+        return mean - self._reflected_daylight() @ self._sky.totals(hours)[1]
 
     def before(self, shares: Array | None, hours: NDArray[np.int64]) -> Array:
         """The same of each of some hours [h], as rows of shares [n, Q * K] have it [n, h].
@@ -182,11 +182,10 @@ class ReflectedSunLight:
         some = number[hours][number[hours] >= 0]
         if not self._found.outdoors_reflects or not len(some):
             return found
-        batches = (self._flat(b)[:, some] for b in range(BATCHES))
+        light = sum(self._flat(b)[:, some] for b in range(BATCHES)) / np.float32(BATCHES)
         if shares is not None:  # in single precision, as the windows' light is
-            single = shares.astype(np.float32)
-            batches = (single @ light for light in batches)
-        found[:, number[hours] >= 0] = sum(batches) / BATCHES
+            light = shares.astype(np.float32) @ light
+        found[:, number[hours] >= 0] = light
         return found - times_sky(by_patches, self._sky.sun[:, hours])
 
     def _batch(self, number: int, g: int, j: int, *, beam: bool) -> Array:
@@ -215,9 +214,11 @@ class ReflectedSunLight:
         traced, straight, sun = self._found.traced, self._found.straight, self._sky.lit_sun
         daylight = self._reflected_daylight()
         parts = traced.parts.of(g)
-        light = sum(straight.rest(g, j, q) @ times_sky(daylight[q], sun) for q in parts)
+        found = sum(straight.rest(g, j, q) @ daylight[q] for q in parts)
         whole, direct = straight.matrix(g, j), straight.matrix(g, j, direct=True)
-        return light if whole is None else light + times_sky(whole.values - direct.values, sun)
+        if whole is not None:
+            found = found + whole.values - direct.values
+        return times_sky(found, sun)
 
     def _reflected_daylight(self) -> Array:
         """D - D_d [Q, K, P]."""

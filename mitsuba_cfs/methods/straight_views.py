@@ -8,12 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_scene import OUTDOOR_DEPTH, PhaseScene
-from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.direct_sun import patch_beams
 from mitsuba_cfs.trace.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.straight_view import straight_view_matrix
@@ -108,31 +106,3 @@ class StraightViews:
         if self.matrix(g, j) is None:
             return found
         return found - self._traced.direct_sensors[:, q] * self.beam(g, j)
-
-    def coefficients(self, g: int, j: int) -> NDArray[np.float64] | float:
-        """B - V_d diag(tau) D [S, P]."""
-        whole = self.matrix(g, j)
-        if whole is None:
-            return 0.0
-        return whole.values - self._in_patches(g, j, self._traced.daylight.values)
-
-    def light(self, g: int, j: int, sky: AnnualSky) -> NDArray[np.float64] | float:
-        """What a group in a state gives to the sensors in addition [S, L].
-
-        The sun itself is not among it where there are five phases.
-        """
-        whole = self.matrix(g, j)
-        if whole is None:
-            return 0.0
-        traced = self._traced
-        found = self.coefficients(g, j) @ sky.whole
-        if traced.five_phase:
-            direct = self.matrix(g, j, direct=True)
-            direct = direct.values - self._in_patches(g, j, traced.direct_daylight)
-            found -= phases.times_sky(direct, sky.lit_sun)
-        return found
-
-    def _in_patches(self, g: int, j: int, daylight: NDArray[np.float64]) -> NDArray[np.float64]:
-        """V_d diag(tau) D [S, P]."""
-        beam, direct = self.beam(g, j), self._traced.direct_sensors
-        return sum((direct[:, q] * beam) @ daylight[q] for q in self._traced.parts.of(g))

@@ -14,6 +14,7 @@ from mitsuba_cfs.trace.estimate import Estimate
 
 # of reflection in the windows: a fifth is below 0.001 in a bright room with a front of glass
 ORDERS = 4
+MOST_KEPT = 8  # combinations of states whose reflection to the sensors is held
 OUTDOOR_ORDERS = 2  # fins send back a tenth of what panes reflect, which is a seventh
 
 
@@ -32,6 +33,7 @@ class WindowReflection:
     def __init__(self, traced: PhaseScene) -> None:
         """Of a scene; nothing is traced before a system reflects."""
         self._traced = traced
+        self._sensors: dict[tuple[int, ...], tuple[list[SystemOptics], NDArray[np.float32]]] = {}
 
     def reflects(self, optics: Sequence[SystemOptics]) -> bool:
         """Whether anything comes back from the parts' systems [Q]."""
@@ -61,17 +63,27 @@ class WindowReflection:
             added, source, met = added + back, back, np.zeros(1)
         return added
 
-    def sensors(self, optics: Sequence[SystemOptics]) -> NDArray[np.float64]:
-        """V (R W + (R W)^2 + ...) [S, Q * K]: light of the sensors by reflection in windows."""
-        traced = self._traced
-        view, found, total = traced.sensors.values, traced.sensors.values, 0.0
+    def sensors(self, optics: Sequence[SystemOptics]) -> NDArray[np.float32]:
+        """V (R W + (R W)^2 + ...) [S, Q * K]: light of the sensors by reflection in windows.
+
+        In single precision: the noise of W is a hundred thousand times its rounding.
+        """
+        key = tuple(map(id, optics))
+        if key not in self._sensors:
+            if len(self._sensors) >= MOST_KEPT:
+                self._sensors.clear()
+            self._sensors[key] = list(optics), self._by_reflection(optics)
+        return self._sensors[key][1]
+
+    def _by_reflection(self, optics: Sequence[SystemOptics]) -> NDArray[np.float32]:
+        exchange = self._traced.exchange.values
+        width = exchange.shape[-1]
+        exchange = exchange.reshape(width, width).astype(np.float32)
+        found = self._traced.sensors.values.reshape(-1, width).astype(np.float32)
+        total = np.zeros_like(found)
         for _ in range(ORDERS):
-            back = np.zeros((len(view), view[0].size))
-            for q, one in enumerate(optics):
-                if one.reflection is not None:
-                    back += (found[:, q] @ one.reflection) @ traced.exchange.values[q]
-            found = back.reshape(view.shape)
-            total = total + back
+            found = self._by_part(optics, "reflection", found) @ exchange
+            total += found
         return total
 
     def variance_by_room(
@@ -120,16 +132,12 @@ class WindowReflection:
         Args: shares: F [n, Q * K] of what comes to the windows otherwise.
         """
         exchange, K = self._traced.outdoor_exchange.values, KLEMS_FULL.size
-        found, parts = shares.reshape(len(shares), -1), len(exchange)
-        flat, total = exchange.reshape(parts * K, -1), np.zeros(found.shape)
+        found, mine = shares.reshape(len(shares), -1), len(exchange) * K
+        flat, total = exchange.reshape(mine, -1), np.zeros(found.shape)
         for _ in range(OUTDOOR_ORDERS):
-            sent = found[:, : parts * K] @ flat
-            found = np.zeros_like(total)
-            for q, one in enumerate(optics[:parts]):
-                if one.outdoor_reflection is not None:
-                    mine = slice(q * K, (q + 1) * K)
-                    found[:, mine] = sent[:, mine] @ one.outdoor_reflection
-            total += found
+            sent = found[:, :mine] @ flat
+            found = self._by_part(optics[: len(exchange)], "outdoor_reflection", sent)
+            total[:, :mine] += found
         return total
 
     def returned(
@@ -155,10 +163,29 @@ class WindowReflection:
     def shares(self, optics: Sequence[SystemOptics]) -> NDArray[np.float64]:
         """What the sensors have of the light before the parts' windows, by patches [S, Q * K]."""
         view = self._traced.sensors.values
+        view = view.reshape(len(view), -1)
         if self.reflects(optics):
-            view = view + self.sensors(optics).reshape(view.shape)
-        through = [view[:, q] @ one.transmission for q, one in enumerate(optics)]
-        return np.concatenate(through, axis=1)
+            view = view + self.sensors(optics)
+        return self.through(optics, view)
+
+    @classmethod
+    def through(
+        cls, optics: Sequence[SystemOptics], shares: NDArray[np.floating]
+    ) -> NDArray[np.float64]:
+        """Shares [n, Q * K] of the windows' luminance as of what is before them."""
+        return cls._by_part(optics, "transmission", shares)
+
+    @staticmethod
+    def _by_part(
+        optics: Sequence[SystemOptics], name: str, shares: NDArray[np.floating]
+    ) -> NDArray[np.floating]:
+        """Shares [n, Q * K] by a matrix [K, K] of each part's system; nothing where it has none."""
+        K, found = KLEMS_FULL.size, np.zeros_like(shares)
+        for q, one in enumerate(optics):
+            matrix, mine = getattr(one, name), slice(q * K, (q + 1) * K)
+            if matrix is not None:
+                found[:, mine] = shares[:, mine] @ matrix.astype(shares.dtype)
+        return found
 
 
 def _row_variance(exchange: Estimate, luminance: NDArray[np.floating]) -> NDArray[np.float64]:

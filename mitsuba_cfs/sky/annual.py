@@ -37,6 +37,7 @@ class AnnualSky:
     sun: NDArray[np.floating] | None = None  # [P, L] the sun alone, spread over patches [cd/m2]
     solar: NDArray[np.floating] | None = None  # [P, L] radiance, the sun among it [W/m2/sr]
     _lit_sun: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
+    _totals: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def lit_sun(self) -> NDArray[np.floating] | csr_array:
@@ -52,6 +53,24 @@ class AnnualSky:
         if self.sun is None:
             raise ValueError(NO_SUN)
         return np.maximum(self.whole[:, hours] - self.sun[:, hours], 0.0)
+
+    def totals(self, hours: NDArray[np.bool_]) -> tuple[NDArray[np.float64], ...]:
+        """Sums over some of the hours [L]: whole, the sun alone, and the rest [P] [cd/m2].
+
+        The last two are 0 where the sky was made without the sun alone.  Those of all hours are
+        made once for all rooms.
+        """
+        if self._totals and hours.all():
+            return self._totals[0]
+        some = slice(None) if hours.all() else hours
+        whole = self.whole[:, some].sum(axis=1, dtype=float)
+        sun = rest = np.zeros_like(whole)
+        if self.sun is not None:
+            sun = self.sun[:, some].sum(axis=1, dtype=float)
+            rest = self.without_sun(some).sum(axis=1, dtype=float)
+        if hours.all():
+            self._totals.append((whole, sun, rest))
+        return whole, sun, rest
 
     def part(self, hours: ArrayLike) -> AnnualSky:
         """Some of the hours L, given by their numbers among them."""

@@ -94,7 +94,10 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     straight, more = filled.straight, filled.reflected_sun.light(sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
     expected += more.sensors(0, 0, beam=True).values + more.sensors(1, 0, beam=False).values
-    expected += straight.light(0, 0, sky)
+    whole, direct = straight.matrix(0, 0).values, straight.matrix(0, 0, direct=True).values
+    lost = direct_view[:, 0] * straight.beam(0, 0)
+    expected += (whole - lost @ matrices.daylight.values[0]) @ sky.whole
+    expected -= (direct - lost @ matrices.direct_daylight[0]) @ sky.sun
     assert straight.matrix(1, 0) is None  # the diffuser has no beam
     expected += exact.values * sky.illuminance / SUN_SOLID_ANGLE
     assert found == pytest.approx(expected, rel=1e-5)  # window luminances in single precision

@@ -181,6 +181,33 @@ def test_an_hour_alone_is_what_it_is_among_others() -> None:
     np.testing.assert_allclose(shares @ filled.mirrored.returned(optics, sky), expected, rtol=1e-9)
 
 
+def test_each_hour_has_the_reflection_of_its_own_state() -> None:
+    """Among hours of other states as with its system alone."""
+    from mitsuba_cfs.methods.phase_light import PhaseSystems
+    from mitsuba_cfs.methods.phase_scene import PhaseScene
+    from mitsuba_cfs.methods.sampling import Sampling
+
+    few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2)
+    states = [mirroring(0.4, 0.1), mirroring(0.0, 0.4)]
+    traced = PhaseScene(replace(between_fins(), view=None), few)
+    sky = hours(1).part([0, 1, 1, 0])
+    alone = [PhaseSystems(traced, [[one]]).light(sky).illuminance() for one in states]
+    light = PhaseSystems(traced, [states]).light(sky)
+    assert np.abs(alone[0] / alone[1] - 1).min() > 0.003
+    for chosen in ([0, 1, 0, 1], [1, 1, 0, 1], [1, 1, 1, 1]):
+        expected = np.stack([alone[j][:, h] for h, j in enumerate(chosen)], axis=1)
+        np.testing.assert_allclose(light.illuminance(np.array(chosen)), expected, rtol=1e-9)
+
+
+def test_totals_of_some_hours_are_theirs_whatever_was_asked_for_before() -> None:
+    sky = hours(1)
+    for some in ([True, True], [True, False], [True, True], [False, True]):
+        whole, sun, rest = sky.totals(np.array(some))
+        np.testing.assert_allclose(whole, sky.whole[:, some].sum(axis=1))
+        np.testing.assert_allclose(sun, sky.sun[:, some].sum(axis=1))
+        np.testing.assert_allclose(rest, whole - sun, rtol=1e-9)
+
+
 @pytest.mark.parametrize("shares", [(0.4, 0.0), (0.0, 0.4)], ids=["outdoors", "room"])
 def test_the_stated_error_has_the_noise_of_what_windows_send_one_another(shares) -> None:
     """All else is that of one seed; the spread over 24 seeds by chi-square, one time in 1,000."""

@@ -215,8 +215,8 @@ def beside_window(lit: LitScene, hours: int) -> Iterator[str]:
     chosen = cfs.Sampling(patch_samples=4096, sensor_samples=16384, window_parts=1)
     sky = lit.drawn(hours, 0)
     filled = cfs.PhaseSystems(cfs.PhaseScene(scene, chosen), lit.systems)
-    exact = filled.straight.matrix(0, 0).values
-    patches = exact - filled.straight.coefficients(0, 0)
+    exact, traced = filled.straight.matrix(0, 0).values, filled.traced
+    patches = (traced.direct_sensors[:, 0] * filled.straight.beam(0, 0)) @ traced.daylight.values[0]
     ratio = (patches @ sky.without_sun()) / (exact @ sky.without_sun())
     for row, y in zip(ratio.reshape(len(DISTANCES), len(HEIGHTS), -1), DISTANCES, strict=True):
         yield f"| {y} | " + " | ".join(f"{r.min():.2f} to {r.max():.2f}" for r in row) + " |"
