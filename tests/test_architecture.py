@@ -36,7 +36,7 @@ TRACING = (
 SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
-        "borrowed_pictures", "by_name", "colour_view", "exact_sun", "glare", "group_light",
+        "borrowed_pictures", "by_name", "colour_view", "exact_sun", "few_pictures", "glare", "group_light",
         "optics", "path_light", "phase_error",
         "phase_light", "phase_scene", "reflected_sun", "seasonal_light", "sensor_coefficients",
         "straight_views",

@@ -10,8 +10,8 @@ whose equation (20) has the sun twice if its s_d holds it: here s_sky is the sky
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -23,8 +23,10 @@ from mitsuba_cfs.glare.annual import FIGURES, AnnualGlare, annual_glare, figures
 from mitsuba_cfs.glare.dgp_error import dgp_errors, hours_by_halves
 from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
+from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import CacheEntry, kept_or_found
+from mitsuba_cfs.methods.few_pictures import pictures_by_state
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
@@ -151,10 +153,7 @@ def pictures(
             steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
             found[i] = light.picture(int(hours[i]), now, progress=steps)
         return list(found.values())
-    kinds, kind = np.unique(rows, axis=1, return_inverse=True)
-    for i, combination in enumerate(kinds.T):
-        columns = np.flatnonzero(kind.ravel() == i)
-        of_kind = light.pictures(hours[columns], combination)
+    for columns, of_kind in pictures_by_state(light, hours, rows):
         values = of_kind.values(np.arange(len(columns)))
         for c, row in zip(columns.tolist(), values, strict=True):
             found[c] = full_picture(row, of_kind.pixels, of_kind.view)
@@ -181,52 +180,80 @@ def rated_pictures(
     hours, options = np.asarray(hours, dtype=np.int64), options or GlareOptions()
     rows = hourly_states(state, len(light.filled.systems), len(light.sky.lit))[:, hours]
     if isinstance(light, SeasonalLight):
-        return [
-            one
-            for hour, now in zip(hours.tolist(), rows.T, strict=True)
-            for one in _rated_in_season(light, hour, now, options, progress)
-        ]
-    found, geometry = [], GlareView(_view(light))
+        return _rated_in_seasons(light, hours, rows, options, progress)
+    found: dict[int, tuple[NDArray[np.float32], GlareResult]] = {}
+    geometry, apart = GlareView(_view(light)), options.sun == "source"
+    if isinstance(light, PathLight):
+        made = _by_paths(light, hours, rows, progress)
+    else:
+        made = _by_phases(light, hours, rows)
+    for one in made:
+        own = {"options": options, "disc": one.disc if apart else None}
+        rated = evaluate(one.bare if apart else one.shown, geometry, **own)
+        if one.halves:
+            add = 0 if apart else one.shown - one.bare
+            first, second = (evaluate(half + add, geometry, **own).dgp for half in one.halves)
+            rated = replace(rated, dgp_standard_error=abs(first - second) / 2)
+        found[one.number] = one.shown, rated
+        progress("pictures", len(found) / len(hours))
+    return [found[i] for i in range(len(hours))]
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """One of several pictures, before it is rated."""
+
+    number: int  # among them
+    bare: NDArray[np.float32]  # [ny, nx] without the sun's disc
+    disc: SunDisc | None
+    shown: NDArray[np.float32]  # with the disc
+    halves: Sequence[NDArray[np.float32]]  # of the paths, without the disc; none: not known
+
+
+def _by_paths(
+    light: PathLight, hours: NDArray[np.int64], rows: NDArray[np.int64], progress: Progress
+) -> Iterator[_Made]:
+    """Pictures of hours [n] in their states [G, n], each of its own paths."""
     for i, (hour, now) in enumerate(zip(hours.tolist(), rows.T, strict=True)):
         steps = part(progress, i / len(hours), (i + 1) / len(hours), "pictures")
-        halves: list[NDArray[np.float32]] = []
-        if isinstance(light, PathLight):
-            bare, disc = light.picture(hour, now, disc=False, progress=steps), light.disc(hour, now)
-            shown = light.with_disc(bare, hour, now)
-        else:
-            of_hour, only = light.pictures(np.array([hour]), now), np.array([0])
-            whole = partial(full_picture, pixels=of_hour.pixels, view=of_hour.view)
-            values, discs = of_hour.without_disc(only)
-            bare, disc, noise = whole(values[0]), discs[0], of_hour.noise(only)[0]
+        bare = light.picture(hour, now, disc=False, progress=steps)
+        yield _Made(i, bare, light.disc(hour, now), light.with_disc(bare, hour, now), ())
+
+
+def _by_phases(
+    light: PhaseLight, hours: NDArray[np.int64], rows: NDArray[np.int64]
+) -> Iterator[_Made]:
+    """Pictures of hours [n] in their states [G, n] from matrices."""
+    for numbers, found in pictures_by_state(light, hours, rows):
+        whole = partial(full_picture, pixels=found.pixels, view=found.view)
+        for i, number in enumerate(numbers.tolist()):
+            only = np.array([i])
+            values, discs = found.without_disc(only)
+            noise, bare = found.noise(only)[0], whole(values[0])
             halves = [whole(np.maximum(values[0] + side * noise, 0)) for side in (1, -1)]
-            of_hour.add_disc(values, only)
-            shown = whole(values[0])
-        apart = options.sun == "source"
-        own = {"options": options, "disc": disc if apart else None}
-        rated = evaluate(bare if apart else shown, geometry, **own)
-        if halves:
-            one, other = (
-                evaluate(half + (0 if apart else shown - bare), geometry, **own).dgp
-                for half in halves
-            )
-            rated = replace(rated, dgp_standard_error=abs(one - other) / 2)
-        found.append((shown, rated))
-        steps("pictures", 1.0)
-    return found
+            found.add_disc(values, only)
+            yield _Made(number, bare, discs[0], whole(values[0]), halves)
 
 
-def _rated_in_season(
+def _rated_in_seasons(
     light: SeasonalLight,
-    hour: int,
-    state: NDArray[np.int64],
+    hours: NDArray[np.int64],
+    rows: NDArray[np.int64],
     options: GlareOptions,
     progress: Progress,
 ) -> list[tuple[NDArray[np.float32], GlareResult]]:
-    """The picture of one hour with each window group in a state [G], and its glare."""
-    own, hours = next((own, hours) for own, hours in light.parts() if hour in hours)
-    states = np.tile(state[:, None], len(hours))
-    at = np.searchsorted(hours, [hour])
-    return rated_pictures(own, at, states, options=options, progress=progress)
+    """The pictures of hours [n] in their states [G, n], season by season, and their glare."""
+    found: dict[int, tuple[NDArray[np.float32], GlareResult]] = {}
+    for own, season in light.parts():
+        columns = np.flatnonzero(np.isin(hours, season))
+        if not len(columns):
+            continue
+        at = np.searchsorted(season, hours[columns])
+        states = np.zeros((len(rows), len(season)), dtype=np.int64)
+        states[:, at] = rows[:, columns]
+        rated = rated_pictures(own, at, states, options=options, progress=progress)
+        found |= dict(zip(columns.tolist(), rated, strict=True))
+    return [found[i] for i in range(len(hours))]
 
 
 def _view(light: PhaseLight | PathLight) -> View | None:

@@ -196,15 +196,16 @@ class PhaseLight:
         return error[: len(self._traced.scene.points)]
 
     def pictures(
-        self, hours: NDArray[np.int64], state: Sequence[int], *, direct: bool = False
-    ) -> Pictures:
+        self, hours: NDArray[np.int64], state: Sequence[int], *, direct: bool = False,
+        few: bool = False,
+    ) -> Pictures:  # fmt: skip
         """Pictures of some hours [n] with each window group in a state [G].
 
-        Args: direct: without what the room or the outdoors reflect more than once, for eDGP.
+        Args: direct: no second reflection, for eDGP; few: see `pictures_by_state`.
         """
         traced, sky = self._traced, self.sky
         rows = np.tile(np.asarray(state)[:, None], len(hours))
-        matrices, daylight = traced.view, traced.daylight.values
+        matrices, daylight = None if few else traced.view, traced.daylight.values
         if direct:
             matrices, daylight = traced.direct_view, traced.direct_daylight
             T = [o.transmission for o in self.filled.optics(state)]
@@ -220,7 +221,7 @@ class PhaseLight:
             if mirrored.reflects(optics):
                 in_sun = self._in_sun(rows, hours) if traced.five_phase else None
                 luminance = luminance + mirrored.windows(optics, luminance, in_sun)
-        if not traced.five_phase:
+        if matrices is not None and not traced.five_phase:
             found = matrices.three_phase(luminance)
             return found if direct else traced.looked_through(found, sky.whole[:, hours])
         sun, seen = self.filled.seen_sun(tuple(int(j) for j in state))
@@ -231,7 +232,7 @@ class PhaseLight:
         )  # fmt: skip
         outdoors = daylight, traced.direct_daylight, sky.without_sun(hours), sky.sun[:, hours]
         five.show_outdoors(seen, *outdoors, light=self.filled.beam_light(tuple(map(int, state))))
-        return five if direct else traced.looked_through(five, sky.whole[:, hours])
+        return five if direct or few else traced.looked_through(five, sky.whole[:, hours])
 
     def _in_sun(self, rows: NDArray[np.int64], hours: NDArray[np.int64]) -> list[NDArray]:
         """The windows' beams [Q, K, h], and what meets them of these from the room [Q * K, h]."""

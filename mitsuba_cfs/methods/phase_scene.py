@@ -20,7 +20,7 @@ from mitsuba_cfs.methods.borrowed_pictures import BorrowedPictures
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
-from mitsuba_cfs.methods.view_cache import kept_view
+from mitsuba_cfs.methods.view_cache import holds_view, kept_view
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
@@ -31,6 +31,7 @@ from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
 from mitsuba_cfs.trace.estimate import Estimate, Stopping, joined
+from mitsuba_cfs.trace.patch_light import PatchLight
 from mitsuba_cfs.trace.room_sun import SunElements, window_elements
 from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.trace.view_matrix import view_matrix
@@ -44,6 +45,7 @@ EXCHANGE_SHARE = 64  # paths of a patch for D, for each that looks into the room
 OUTDOOR_SHARE = 4  # ... that looks outdoors: few meet a mirrored sun, and they are short
 PART_BATCHES = 2  # of D where groups are cut
 INNER_PART = 0.75  # of glass between rooms, about: in the room beyond D changes along it [m]
+FEW = 4  # times as many patches as pictures, from which on the view is traced for these alone
 INNER_SHARE = 8  # paths of a patch for D, for each of a part of glass between rooms
 
 
@@ -222,6 +224,21 @@ class PhaseScene:
         """V of the view's pixels without what the room reflects more than once."""
         return self._view(1)
 
+    def few(self, pictures: int) -> bool:
+        """Whether to trace the view for so many pictures alone: V of all patches is not at hand.
+
+        Not behind glass to other rooms or with gloss indoors, which are held patch by patch.
+        """
+        scene, patches = self.scene, len(self.parts.groups) * KLEMS_FULL.size
+        apart = self.five_phase and not scene.beyond and not scene.interior.glossy
+        if not apart or pictures * FEW > patches or "view" in self.__dict__ or scene.view is None:
+            return False
+        return not holds_view(self.cache, scene.view, self._view_inputs(INDOOR_DEPTH))
+
+    def view_of(self, light: PatchLight) -> ViewMatrices:
+        """V of the view's pixels times the windows' luminance in some hours, their columns."""
+        return self._view(INDOOR_DEPTH, light)
+
     @cached_property
     def geometry(self) -> GlareView:
         """What glare needs of the view."""
@@ -354,20 +371,26 @@ class PhaseScene:
             cache=self.cache,
         )
 
-    def _view(self, depth: int) -> ViewMatrices:
+    def _view_inputs(self, depth: int) -> tuple:
+        """What the matrices of the view's pixels follow from."""
+        chosen = self.sampling
+        inputs = self.scene.interior, self.parts.groups, chosen.view_samples, chosen.seed, depth
+        return variants.activate(), *inputs
+
+    def _view(self, depth: int, light: PatchLight | None = None) -> ViewMatrices:
         scene, chosen = self.scene, self.sampling
         if scene.view is None:
             raise ValueError("the scene has no view to make pictures of")
-        parts = self.parts.groups
-        inputs = scene.interior, parts, chosen.view_samples, chosen.seed, depth
+        of_hours = () if light is None else (light.lit, light.later)
         return kept_view(
             self.cache,
             scene.view,
-            (variants.activate(), *inputs),
+            (*self._view_inputs(depth), *of_hours),
             lambda: view_matrices(
                 scene.interior,
-                parts,
+                self.parts.groups,
                 scene.view,
+                light=light,
                 samples=chosen.view_samples,
                 seed=chosen.seed,
                 memory=chosen.memory,

@@ -32,7 +32,7 @@ def kept_view(
     """
     if cache is None:
         return trace()
-    path = cache.entry("view pictures", view, *inputs, by=view_matrices.__module__).path
+    path = _place(cache, view, inputs)
     try:
         return _read(path, view)
     except FileNotFoundError:
@@ -44,6 +44,15 @@ def kept_view(
         _write(path, found)
         cache.trim(keep=path)
     return found
+
+
+def holds_view(cache: MatrixCache | None, view: View, inputs: tuple) -> bool:
+    """Whether the cache has the matrices of a view; arguments as of `kept_view`."""
+    return cache is not None and _place(cache, view, inputs).is_file()
+
+
+def _place(cache: MatrixCache, view: View, inputs: tuple) -> Path:
+    return cache.entry("view pictures", view, *inputs, by=view_matrices.__module__).path
 
 
 def _read(path: Path, view: View) -> ViewMatrices:

@@ -10,7 +10,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.image import PictureBlock, picture_part_blocks
+from mitsuba_cfs.trace.patch_light import PatchLight
 from mitsuba_cfs.trace.picture_beam import BeamLight, faces_luminance
 from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_rows import PictureRows
@@ -54,7 +55,10 @@ class ViewNoise:
 
 @dataclass(frozen=True, slots=True)
 class ViewMatrices:
-    """A view's matrix in three parts, none of which is negative: V = indirect + lit + seen."""
+    """A view's matrix in three parts, none of which is negative: V = indirect + lit + seen.
+
+    Of hours, the first two hold what the pixels show of the windows' luminance in each of them.
+    """
 
     view: View
     pixels: NDArray[np.int64]  # [n] row * width + column of the pixels that show something
@@ -63,6 +67,13 @@ class ViewMatrices:
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel, in V_d
     noise: ViewNoise
     elements: SunElements | None = None  # of the rows of `indirect`, for the sun's beam
+
+    def of_columns(self, part: slice) -> ViewMatrices:
+        """The same of some columns alone: of some of the hours, where these are the columns."""
+        parts = [PictureMatrix(p.rows[:, part], p.row, p.share) for p in (self.indirect, self.lit)]
+        of_halves = {name: getattr(self.noise, name)[:, part] for name in ("indirect", "lit")}
+        noise = replace(self.noise, **of_halves)
+        return replace(self, indirect=parts[0], lit=parts[1], noise=noise)
 
     def three_phase(self, luminance: ArrayLike) -> ThreePhasePictures:
         """Pictures of hours with window luminances T D s [G, K, H]."""
@@ -81,6 +92,7 @@ def view_matrices(
     memory: float = MEMORY,
     folder: Path | None = None,
     window_reflectance: ArrayLike | None = None,
+    light: PatchLight | None = None,
     progress: Progress = silent,
     **options: Any,
 ) -> ViewMatrices:
@@ -93,15 +105,17 @@ def view_matrices(
         folder: of the files where they lie on disk (they go with the process); the system's
             temporary folder by default.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
+        light: of hours, which the matrices' columns are then and not the patches.
         options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
     tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
     shared = PictureRows.of_view(tracer, view, tile)
     pixels, row, half, m = shared.pixels, shared.row, shared.half, len(shared.keys)
-    shape = (2 * m, len(groups) * options.get("basis", KLEMS_FULL).size)
+    patches = len(groups) * options.get("basis", KLEMS_FULL).size
+    shape = (2 * m, patches if light is None else light.hours)
     sums = [_storage(shape, 8 * math.prod(shape) > memory, folder) for _ in range(2)]
-    options["window_reflectance"] = window_reflectance
+    options.update(window_reflectance=window_reflectance, light=light)
     times = shared.times(smoothed=True)
     number = np.repeat(np.arange(len(pixels)), times)
     options.update(pixels=pixels[number], row=half[number], weight=(1 / times)[number])
@@ -138,7 +152,7 @@ def _summed(
         first, end = block.row[0], block.row[-1] + 1  # they rise
         place = slice(first, end) if end - first == len(block.row) else block.row
         for rows, values in zip(sums, (block.later, block.lit), strict=True):
-            rows[place] += values.reshape(len(values), -1)
+            rows[place] += values
         seen.append(block.seen)
     ones = np.ones(len(number), dtype=np.float32)
     of_pixel = sparse.csr_array((ones, (number, np.arange(len(number)))))
@@ -186,7 +200,7 @@ class FivePhasePictures:
 
     def __init__(
         self,
-        matrices: ViewMatrices,
+        matrices: ViewMatrices | None,
         sun: PictureSun,
         luminance: ArrayLike,
         direct_luminance: ArrayLike,
@@ -198,6 +212,7 @@ class FivePhasePictures:
         """From the hours' skies.
 
         Args:
+            matrices: of patches; None: `see_by` gives those of the hours.
             luminance: [G, K, H] of the windows towards the room, T D s [cd/m2].
             direct_luminance: [G, K, H] T D_d s_d: D_d with `max_depth=1` and the seed and samples
                 of D, s_d the sun alone (`sky_matrix(..., parts="sun")`).
@@ -205,17 +220,19 @@ class FivePhasePictures:
             beam: [G, K, H] the beam's part b of T D_d s_d, which the matrices' elements replace;
                 without, the patches' stays.
         """
-        self.view, self.pixels = matrices.view, matrices.pixels
-        self._matrices, self._sun = matrices, sun
-        self._whole = flat(luminance, matrices.lit.rows.shape[1])
-        rest = self._whole - flat(direct_luminance, matrices.lit.rows.shape[1])
+        self.view, self.pixels = sun.view, sun.pixels
+        self._matrices, self._sun, self._of_hours = matrices, sun, False
+        patches = math.prod(np.shape(luminance)[:-1])
+        patches = patches if matrices is None else matrices.lit.rows.shape[1]
+        self._whole = flat(luminance, patches)
+        rest = self._whole - flat(direct_luminance, patches)
         if rest.min(initial=0) < -NEGATIVE * self._whole.max(initial=0):
             raise ValueError("the direct sun's luminance exceeds the whole: D_d is not part of D")
         self._rest = np.maximum(rest, 0)
-        self._reflected, self._elements = self._whole, None
-        if beam is not None and matrices.elements is not None:  # below 0 by rounding alone
+        self._reflected = self._whole
+        self._by_elements = beam is not None and (matrices is None or matrices.elements is not None)
+        if beam is not None and self._by_elements:  # below 0 by rounding alone
             self._reflected = np.maximum(self._whole - flat(beam, len(self._whole)), 0)
-            self._elements = matrices.elements
         self._scattered, self._outdoors = self._rest, None
         self._lighting, self._light = self._rest, None
         self._directions = np.asarray(directions, dtype=float)
@@ -253,6 +270,18 @@ class FivePhasePictures:
             self._faces = faces_luminance(daylight, direct, sky + sun)
             self._light = light
 
+    def light(self, batch: NDArray[np.int64]) -> PatchLight:
+        """What the view's paths meet in the windows in some hours."""
+        rest, suns, strength = (
+            self._lighting[:, batch], self._directions[batch], self._illuminance[batch]
+        )  # fmt: skip
+        scattered = self._sun.scattered_luminance(suns, strength)
+        return PatchLight(rest + scattered.reshape(rest.shape), self._reflected[:, batch])
+
+    def see_by(self, matrices: ViewMatrices) -> None:
+        """Take matrices whose columns are the hours, traced under `light` of them all."""
+        self._matrices, self._of_hours = matrices, True
+
     @property
     def hours(self) -> int:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
@@ -285,12 +314,12 @@ class FivePhasePictures:
 
     def noise(self, batch: NDArray[np.int64]) -> NDArray[np.float32]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
-        m, noise, rest = self._matrices, self._matrices.noise, self._lighting[:, batch]
+        m, noise = self._matrices, self._matrices.noise
         suns, strength = self._directions[batch], self._illuminance[batch]
-        scattered = self._sun.scattered_luminance(suns, strength).reshape(rest.shape)
-        rows = m.indirect.with_rows(noise.indirect).of_rows(self._reflected[:, batch])
-        rows += m.lit.with_rows(noise.lit).of_rows(rest + scattered)
-        if self._elements is not None and noise.elements is not None:
+        lit, later = self._columns(batch)
+        rows = m.indirect.with_rows(noise.indirect).of_rows(later)
+        rows += m.lit.with_rows(noise.lit).of_rows(lit)
+        if self._by_elements and noise.elements is not None:
             rows += self._sun.on_elements(noise.elements, suns, strength).T
         if self._light is not None:
             rows += self._light.noise(self._sky[:, batch], self._faces[:, batch])
@@ -306,9 +335,8 @@ class FivePhasePictures:
 
     def by_rows(self, batch: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """See `mitsuba_cfs.glare.annual.Pictures`."""
-        m, rest = self._matrices, self._lighting[:, batch]
+        m, (lit, later) = self._matrices, self._columns(batch)
         suns, strength = self._directions[batch], self._illuminance[batch]
-        scattered = self._sun.scattered_luminance(suns, strength)
         values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
         add_seen(values, m.seen, self._scattered[:, batch])
         seen = self._outdoors
@@ -318,14 +346,22 @@ class FivePhasePictures:
             seen.sun.add_to(values, suns, strength, seen.reflected @ sky)
             if seen.rough is not None:
                 seen.rough.add_to(values, suns, strength)
-        rows = m.indirect.of_rows(self._reflected[:, batch])
-        rows += m.lit.of_rows(rest + scattered.reshape(rest.shape))
+        rows = m.indirect.of_rows(later)
+        rows += m.lit.of_rows(lit)
         if self._light is not None:
             rows += self._light.rows(self._sky[:, batch], self._faces[:, batch])
-        if self._elements is not None:
-            rows += self._sun.on_elements(self._elements, suns, strength).T
+        if self._by_elements:
+            rows += self._sun.on_elements(m.elements, suns, strength).T
         self._sun.add_to(values, suns, strength)
         return rows, values
+
+    def _columns(self, batch: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
+        """What the columns of `lit` and of `indirect` are in some hours [.., h]."""
+        if self._of_hours:
+            own = np.eye(self.hours, dtype=np.float32)[:, batch]
+            return own, own
+        light = self.light(batch)
+        return light.lit, light.later
 
 
 def _storage(shape: tuple[int, int], on_disk: bool, folder: Path | None) -> NDArray[np.float32]:

@@ -257,7 +257,7 @@ class _MetInRoom:
             stream=mi.sample_tea_32(streams, key)[0],
             generator=path_generator(column(path & 0xFFFFFFFF, mi.UInt32), key),
             max_depth=dr.opaque(mi.UInt32, max_depth), active=mi.Bool(True),
-            carried=None, mirrored=None,
+            carried=None, mirrored=None, light=None,
         )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.patch_light import PatchLight
 from mitsuba_cfs.trace.picture_sharing import numbered
 from mitsuba_cfs.trace.sampling import (
     batch_key,
@@ -76,18 +77,23 @@ def picture_matrix_blocks(
     """
     for block in picture_part_blocks(surfaces, groups, view, **options):
         reflected = block.lit + block.later
-        yield block.pixels, block.seen.toarray().reshape(reflected.shape) + reflected
+        whole = block.seen.toarray() + reflected
+        yield block.pixels, whole.reshape(len(whole), len(groups), -1)
 
 
 @dataclass(frozen=True, slots=True)
 class PictureBlock:
-    """Rows of the view matrix of some pixels [n], by what the light has met before the eye."""
+    """Rows of the view matrix of some pixels [n], by what the light has met before the eye.
+
+    Under the patches' luminances in some hours, what surfaces reflect has hours, c of them, in
+    place of the patches G * K.
+    """
 
     pixels: NDArray[np.int64]  # [n] row * width + column
     seen: sparse.csr_array  # [n, G * K] the windows that a pixel shows, few of all
     row: NDArray[np.int64]  # [b] numbers of the rows that pixels share
-    lit: NDArray[np.float32]  # [b, G, K] what surfaces that they show reflect of the windows' light
-    later: NDArray[np.float32]  # [b, G, K] what comes after more reflections
+    lit: NDArray[np.float32]  # [b, c] what surfaces that they show reflect of the windows' light
+    later: NDArray[np.float32]  # [b, c] what comes after more reflections
 
 
 def picture_part_blocks(
@@ -103,6 +109,7 @@ def picture_part_blocks(
     pixels: NDArray[np.int64] | None = None,
     row: NDArray[np.int64] | None = None,
     weight: NDArray[np.floating] | None = None,
+    light: PatchLight | None = None,
     progress: Progress = silent,
 ) -> Iterator[PictureBlock]:
     """Blocks of the view matrix of a picture in its parts, of the same paths.
@@ -115,18 +122,22 @@ def picture_part_blocks(
         pixels: [n] those to trace; one that comes again has other paths, stratified with its first.
         row: [n] that each pixel adds what it shows by reflection to; by default one of its own.
         weight: [n] of each pixel's light in its rows; 1 by default.
+        light: luminances of hours that the paths add up, not the patches; not of glossy rooms.
     """
     tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
+    if light is not None and tracer.gloss is not None:
+        raise ValueError("what gloss shows of the patches is held patch by patch, not by hours")
     bins = DirectionBins(basis)
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
     row = np.arange(len(shown)) if row is None else row
     weight = np.ones(len(shown)) if weight is None else weight
     held = 2 * len(np.unique(row)) / max(len(row), 1)  # rows for each pixel
     held += tracer.gloss is not None
-    size = max(256, int(BLOCK_BYTES / (8 * held * len(groups) * bins.size)))
+    columns = len(groups) * bins.size if light is None else light.hours
+    size = max(256, int(BLOCK_BYTES / (8 * held * columns)))
     size = min(size, max(1, 2**31 // samples))
     time = numbered(shown)
-    options = {"samples": samples, "max_depth": max_depth, "seed": seed}
+    options = {"samples": samples, "max_depth": max_depth, "seed": seed, "light": light}
     for start in range(0, len(shown), size):
         end = start + size
         part = shown[start:end], time[start:end], row[start:end], weight[start:end]
@@ -143,6 +154,7 @@ def _block(
     samples: int,
     max_depth: int,
     seed: int,
+    light: PatchLight | None,
 ) -> PictureBlock:
     """The rows of some pixels.
 
@@ -152,7 +164,8 @@ def _block(
     rows, place = np.unique(row, return_inverse=True)
     n, b = len(pixels), len(rows)
     own = n if tracer.gloss is not None else 0  # rows of what pixels show by gloss
-    shape = own + 2 * b, len(tracer.groups), bins.size
+    columns = len(tracer.groups) * bins.size
+    shape = own + 2 * b, columns if light is None else light.hours
     matrix, patches = empty_sums(math.prod(shape)), []
     eye, share = tracer.place(view.position), column(weight)
     number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
@@ -180,12 +193,13 @@ def _block(
             sample=first + dr.opaque(mi.UInt32, j),
             generator=path_generator(path, batch_key(seed, j)),
             max_depth=dr.opaque(mi.UInt32, max_depth),
+            light=light,
         )
         patches.append(tables(dr.select(glazed, mi.Int32(patch), NO_PATCH), matrix)[0])
     sums = np.divide(sums_of(matrix, shape), samples, dtype=np.float32, casting="same_kind")
-    seen = _shares(np.stack(patches), weight / samples, math.prod(shape[1:]))
+    seen = _shares(np.stack(patches), weight / samples, columns)
     if own:
-        seen = seen + sparse.csr_array(sums[:own].reshape(own, -1))
+        seen = seen + sparse.csr_array(sums[:own])
     return PictureBlock(pixels, seen, rows, sums[own : own + b], sums[own + b :])
 
 
@@ -237,7 +251,7 @@ def add_seen_and_reflected(
     dr.scatter_add(matrix, mi.Float64(beta), slot, glazed)
     add_picture_paths(
         tracer, bins, matrix, eye, direction, hit,
-        active=active, row=row, lit=row, later=row, beta=beta, **paths,
+        active=active, row=row, lit=row, later=row, beta=beta, light=None, **paths,
     )  # fmt: skip
 
 
@@ -258,6 +272,7 @@ def add_picture_paths(
     sample: mi.UInt32,
     generator: mi.PCG32,
     max_depth: mi.UInt32,
+    light: PatchLight | None,  # of `add_view_paths`; without gloss alone
 ) -> None:
     """One path for each lane: rho / pi E of the surface that is met, nothing of a patch.
 
@@ -282,6 +297,7 @@ def add_picture_paths(
         active=mi.Bool(active),
         carried=None,
         mirrored=None,
+        light=light,
     )
     if tracer.gloss is not None:
         add_mirrored(

@@ -68,7 +68,7 @@ class PictureSun:
         mirrors = sun_ways(self._outside)[1:] if way is None else []
         self._mirrors = [PictureSun(*around, basis=basis, way=mirror) for mirror in mirrors]
         self._scattering, self._bins = tuple(scattering), DirectionBins(basis)
-        self._view = view
+        self.view = view
         directions, counts = pixel_directions(view)
         shown = np.flatnonzero(counts.reshape(-1))
         self.pixels = shown
@@ -193,7 +193,7 @@ class PictureSun:
         towards = vectors(ways.reshape(-1, 3))
         tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
         tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
-        for hour, way, part in zip(lit, ways, tau * before_eye(self._view, ways), strict=True):
+        for hour, way, part in zip(lit, ways, tau * before_eye(self.view, ways), strict=True):
             found[hour] = seen_disc(way, part * (illuminance[hour] / SUN_SOLID_ANGLE))
         return found
 
@@ -235,7 +235,7 @@ class PictureSun:
 
         That is where the sun falls on its middle and not on a neighbour's, or the reverse.
         """
-        hour, pixel = edge_pixels(found > 0, self.pixels[self._surface], self._view)
+        hour, pixel = edge_pixels(found > 0, self.pixels[self._surface], self.view)
         order = np.argsort(pixel, kind="stable")  # each is looked at once for all of its hours
         hour, pixel = hour[order], pixel[order]
         step = LANES // EDGE_PLACES
@@ -267,7 +267,7 @@ class PictureSun:
 
         The reflectance is 0 where they show none.
         """
-        tracer, direction = self._inside, vectors(places_in_pixels(self._view, pixels))
+        tracer, direction = self._inside, vectors(places_in_pixels(self.view, pixels))
         ray = mi.Ray3f(self._eye, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True)
         shown = hit.is_valid()
@@ -374,7 +374,7 @@ class PictureSun:
         if not len(hour):
             return
         pixel = np.concatenate([found for found in near if found]).astype(np.int64)
-        pair, way, share = disc_rays(self._view, self.pixels[pixel], suns[hour], self._size)
+        pair, way, share = disc_rays(self.view, self.pixels[pixel], suns[hour], self._size)
         if not len(pair):
             return
         towards = vectors(way)

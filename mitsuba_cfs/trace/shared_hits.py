@@ -85,6 +85,7 @@ def indirect_rows(
         active=dr.gather(mi.Float, weight, hit) > 0,
         carried=dr.gather(mi.Float, weight, hit),
         mirrored=None,
+        light=None,
     )
     return (exchange * share) @ sums_of(rows, (M, columns))
 

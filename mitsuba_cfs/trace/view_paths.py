@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from mitsuba_cfs.trace.bins import DirectionBins
+from mitsuba_cfs.trace.patch_light import PatchLight
 from mitsuba_cfs.trace.sampling import lattice_2d, opaque
 from mitsuba_cfs.trace.scene import OPAQUE, TracedScene
 
@@ -30,6 +31,7 @@ def add_view_paths(
     active: mi.Bool,
     carried: mi.Float | None,  # no default: `dr.syntax` loses those of keywords
     mirrored: mi.Vector3f | None,  # where paths go that start by a surface's gloss
+    light: PatchLight | None,  # rows of the hours' luminance, not of the patches
 ) -> None:
     """Add beta * d(irradiance at the start) / d(radiance of each patch) to the matrix.
 
@@ -43,6 +45,7 @@ def add_view_paths(
     """
     K = mi.UInt32(bins.size)
     width = opaque(bins.size * len(tracer.groups), mi.UInt32)
+    none = mi.UInt32(0)
     depth = mi.UInt32(0)  # bounces so far
     early = carried is not None
     carried = mi.Float(1.0 if carried is None else carried)  # product of reflectances so far
@@ -74,8 +77,10 @@ def add_view_paths(
         visible &= ~tracer.scene.ray_test(shadow, coherent=False, active=visible)
         density_area = distance2 / (tracer.window_area * local.z)
         value = cos_start / (density_area + cos_start * dr.inv_pi)
-        slot = row * width + mi.UInt32(group) * K + bins.index(local)
-        dr.scatter_add(matrix, mi.Float64(beta * value), slot, visible)
+        patch = mi.UInt32(group) * K + bins.index(local)
+        if dr.hint(light is None, mode="scalar"):
+            dr.scatter_add(matrix, mi.Float64(beta * value), row * width + patch, visible)
+        drawn, drawn_value = mi.UInt32(patch), dr.select(visible, beta * value, 0.0)
 
         # ----- Next direction: cosine about the normal -----
         frame = mi.Frame3f(normal)
@@ -97,8 +102,13 @@ def add_view_paths(
         value = cos_start / (density_area + cos_start * dr.inv_pi)
         if dr.hint(shiny, mode="scalar"):
             value = dr.select(by_gloss, 1.0, value)
-        slot = row * width + mi.UInt32(group_hit) * K + bins.index(local)
-        dr.scatter_add(matrix, mi.Float64(beta * value), slot, glazed)
+        patch = mi.UInt32(group_hit) * K + bins.index(local)
+        if dr.hint(light is None, mode="scalar"):
+            dr.scatter_add(matrix, mi.Float64(beta * value), row * width + patch, glazed)
+        else:
+            first = dr.select(depth == 0, none, width)
+            met_value = dr.select(glazed, beta * value, 0.0)
+            light.add(matrix, row, first + drawn, drawn_value, first + patch, met_value)
 
         # ----- Bounce: E(x) gains rho E(hit); Russian roulette -----
         position, normal, rho = tracer.surface_at(hit, position, direction, active)
@@ -150,4 +160,5 @@ def add_mirrored(
         beta=dr.select(glossy, beta * weight, 0.0), sample=sample,
         stream=mi.sample_tea_32(stream, mi.UInt32(0x6A09E667))[0], generator=generator,
         max_depth=max_depth, active=glossy & (weight > 0), carried=None, mirrored=onwards,
+        light=None,
     )  # fmt: skip

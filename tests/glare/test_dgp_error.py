@@ -88,9 +88,12 @@ def test_the_error_of_a_year_is_half_of_what_its_half_pictures_differ() -> None:
 
 
 def test_the_error_of_a_shown_picture_is_that_of_its_halves() -> None:
-    filled = SimpleNamespace(systems=[[None]], traced=SimpleNamespace(scene=Rated))
+    traced = SimpleNamespace(scene=Rated, few=lambda pictures: False)
+    filled = SimpleNamespace(systems=[[None]], traced=traced)
     light = SimpleNamespace(
-        filled=filled, sky=SimpleNamespace(lit=np.zeros(1)), pictures=lambda hours, now: Rated()
+        filled=filled,
+        sky=SimpleNamespace(lit=np.zeros(1)),
+        pictures=lambda hours, now, few: Rated(),
     )
     ((shown, rated),) = rated_pictures(light, np.array([0]))
     assert shown[0, 0] == LUMINANCE[0] + DISC  # which a source's rating takes apart
