@@ -36,6 +36,10 @@ BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
 PLACES = 1024  # that stand for all that paths meet, at most and where nothing is said
 FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 MORTON_BITS = 12  # along each axis
+# shifts and masks that leave two empty bits behind each of up to 16
+SPREAD_BITS = (
+    (16, 0xFF0000FF), (8, 0xF00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249),
+)  # fmt: skip
 ROUGH = 4096  # rough faces whose lobes a row sees, at most
 LANES = 2**22  # shadow rays at once
 
@@ -237,14 +241,15 @@ def _runs(
 
     Runs follow Morton's curve over the places of one of 26 directions.
     """
-    side = np.unique(np.round(FACING * places.normal), axis=0, return_inverse=True)[1].ravel()
-    order = np.lexsort((_morton(places.point), side))
+    facing = np.round(FACING * places.normal).astype(np.int64) @ [9, 3, 1]
+    side = _numbered(facing - facing.min(initial=0))
+    order = np.argsort((side << 3 * MORTON_BITS) + _morton(places.point), kind="stable")
     side, weight = side[order], weight[order]
     climbed, total = np.cumsum(weight), np.bincount(side, weight)
     number = np.ceil(most * total / total.sum()).astype(np.int64)
     within = (climbed - 0.5 * weight - (np.cumsum(total) - total)[side]) / total[side]
     run = np.clip((within * number[side]).astype(np.int64), 0, number[side] - 1)
-    run = np.unique((np.cumsum(number) - number)[side] + run, return_inverse=True)[1]
+    run = _numbered((np.cumsum(number) - number)[side] + run)
     of_run = np.bincount(run, weight)
     marks = np.cumsum(of_run) - random.random(len(of_run)) * of_run
     drawn = np.clip(
@@ -257,15 +262,19 @@ def _runs(
     return found, order[drawn]
 
 
+def _numbered(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The place of small whole numbers [m] among those of them that there are."""
+    there = np.bincount(values) > 0
+    return (np.cumsum(there) - 1)[values]
+
+
 def _morton(point: NDArray[np.float32]) -> NDArray[np.int64]:
     """The place of points [m, 3] along Morton's curve through the box that holds them."""
     low, size = point.min(axis=0), max(float(np.ptp(point, axis=0).max()), 1e-6)
     cell = np.minimum((point - low) / size * 2**MORTON_BITS, 2**MORTON_BITS - 1).astype(np.int64)
-    found = np.zeros(len(point), dtype=np.int64)
-    for bit in range(MORTON_BITS):
-        for axis in range(3):
-            found |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return found
+    for shift, mask in SPREAD_BITS:
+        cell = (cell | cell << shift) & mask
+    return cell @ [1, 2, 4]
 
 
 def _blocks(places: int, hours: int) -> list[slice]:
