@@ -36,8 +36,8 @@ TRACING = (
 SOLVERS = tuple(
     f"mitsuba_cfs/methods/{name}.py"
     for name in (
-        "borrowed_pictures", "by_name", "colour_view", "exact_sun", "few_pictures", "glare", "group_light",
-        "optics", "path_light", "phase_error",
+        "borrowed_pictures", "by_name", "colour_view", "exact_sun", "few_pictures", "glare",
+        "group_light", "optics", "path_light", "phase_error",
         "phase_light", "phase_scene", "reflected_sun", "seasonal_light", "straight_views",
         "view_cache",
         "window_reflection",
