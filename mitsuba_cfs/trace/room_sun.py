@@ -89,19 +89,20 @@ class _Hits:
     """Places that reflect to the rows of a picture."""
 
     row: NDArray[np.int64]  # [q]
-    weight: NDArray[np.float64]  # [q] luminance of the row per unit irradiance of the place
+    weight: NDArray[np.floating]  # [q] luminance of the row per unit irradiance of the place
     places: Places  # [q]
-    halvings: NDArray[np.int64]  # [q] of the edge of the place's element
+    halvings: NDArray[np.int8]  # [q] of the edge of the place's element
 
     @staticmethod
     def joined(parts: Sequence[_Hits]) -> _Hits:
         """All of several."""
-        none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
+        none, small = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int8)
+        nothing = np.empty(0, dtype=np.float32)
         return _Hits(
             np.concatenate([none, *(p.row for p in parts)]),
             np.concatenate([nothing, *(p.weight for p in parts)]),
             Places.joined([p.places for p in parts]),
-            np.concatenate([none, *(p.halvings for p in parts)]),
+            np.concatenate([small, *(p.halvings for p in parts)]),
         )
 
 
@@ -165,7 +166,7 @@ class _Look:
         weight[: found.first] *= far
         rows = row[shown.ray[found.path]]
         some = np.flatnonzero(weight > 0)
-        none = np.zeros(len(some), dtype=np.int64)
+        none = np.zeros(len(some), dtype=np.int8)
         hits = _Hits(rows[some], weight[some], found.places.some(some), none)
         return hits, np.unique(rows[: found.first][far < 1])
 
@@ -200,7 +201,7 @@ class _Look:
         some = dr.compress(found & (value > 0))
         weight, pixel, halvings, *axes = tables(*(dr.gather(type(a), a, some) for a in met))
         places = Places(np.stack(axes[:3], axis=1), np.stack(axes[3:], axis=1))
-        return _Hits(part.row[pixel], weight, places, halvings.astype(np.int64))
+        return _Hits(part.row[pixel], weight, places, halvings.astype(np.int8))
 
     def _shown(self, part: _Pixels, samples: int) -> _Shown:
         tracer = self._tracer
@@ -271,7 +272,7 @@ def window_elements(
         kept = np.flatnonzero(met & (rho > 0))
         value, row, first = rho[kept] / (np.pi * samples), of[kept].astype(int), places.some(kept)
         later = reflecting_places(tracer, first, seed * 1_000_003 + paths.group)
-        none = np.zeros(len(kept) + len(later.path), dtype=np.int64)
+        none = np.zeros(len(kept) + len(later.path), dtype=np.int8)
         found.append(
             _Hits(
                 np.concatenate([row, row[later.path]]),
@@ -310,25 +311,41 @@ def _elements(
     Returns: [q]; the places in the elements' order [q]; and of each element the cube's numbers, the
     side and the halvings [e, 7], sorted.
     """
-    places, table = hits.places, np.empty((7, len(hits.row)), dtype=np.int64)
-    table[:3] = np.floor(places.point.T * (0.5**-hits.halvings / edge))
-    table[3:6] = np.round(places.normal.T * FACE_STEPS)
+    places, table = hits.places, np.empty((7, len(hits.row)), dtype=np.int32)
+    each = np.ldexp(1 / edge, hits.halvings)
+    for axis in range(3):
+        table[axis] = np.floor(np.ascontiguousarray(places.point[:, axis]) * each)
+        table[3 + axis] = np.round(places.normal[:, axis] * FACE_STEPS)
     table[6] = hits.halvings
-    keys = _keys(table, table)
-    found, element = np.unique(keys, return_inverse=True)
+    kind = _keys(table[3:], table[3:])  # sides and sizes: numbered one by one, they are few
+    kind = np.cumsum(np.bincount(kind) > 0)[kind]
+    both = np.vstack([table[:3], kind], dtype=np.int32, casting="unsafe")
+    keys = _keys(both, both)
+    order = _order(keys)
+    first = np.diff(keys[order], prepend=-1) > 0
+    element = np.empty(len(keys), dtype=np.int64)
+    element[order] = np.cumsum(first) - 1
+    return element, order, table[:, order[first]].T.astype(np.int64)
+
+
+def _order(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The order [n] of numbers of 0 or more, equal ones as they come."""
+    bits = len(keys).bit_length()
+    if keys.max(initial=0) >> (63 - bits):
+        return np.argsort(keys, kind="stable")
     # by numbers that hold both, which NumPy sorts several times as fast as it finds an order
-    order = np.sort((element << 32) + np.arange(len(keys))) & 0xFFFFFFFF
-    first = order[np.searchsorted(element[order], np.arange(len(found)))]
-    return element, order, table[:, first].T
+    return np.sort((keys << bits) + np.arange(len(keys))) & ((1 << bits) - 1)
 
 
 def _keys(some: NDArray[np.int64], table: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of columns [7, n] in their order, of one outside the table none of the table's."""
+    """Numbers of columns [d, n] in their order, of one outside the table none of the table's."""
     if not table.shape[1]:  # no element
         return np.empty(0, dtype=np.int64)
-    low, high = table.min(axis=1) - 1, table.max(axis=1) + 1
-    shifted = tuple(some - low[:, None])
-    return np.ravel_multi_index(shifted, tuple(high - low + 1), mode="clip")
+    keys = np.zeros(some.shape[1], dtype=np.int64)
+    for row, low, high in zip(some, table.min(axis=1) - 1, table.max(axis=1) + 1, strict=True):
+        keys *= int(high) - int(low) + 1
+        keys += np.clip(row, low, high) - low
+    return keys
 
 
 def _beside(cubes: NDArray[np.int64]) -> sparse.csr_array:

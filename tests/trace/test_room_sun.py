@@ -17,7 +17,16 @@ from mitsuba_cfs.trace.image import picture_matrix_blocks
 from mitsuba_cfs.trace.picture_rows import MOST_TIMES, PictureRows
 from mitsuba_cfs.trace.picture_sharing import tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
-from mitsuba_cfs.trace.room_sun import EdgePlaces, _beside, sun_elements, window_elements
+from mitsuba_cfs.trace.room_sun import (
+    FACE_STEPS,
+    EdgePlaces,
+    _beside,
+    _elements,
+    _Hits,
+    _order,
+    sun_elements,
+    window_elements,
+)
 from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.trace.sun_paths import Places
 from scenes.cost import room as box
@@ -148,3 +157,29 @@ def test_places_that_stand_for_an_element_are_its_own_and_evenly_drawn() -> None
     assert all(len(set(places)) == 4 for places in drawn[:, 2])
     often = np.bincount(drawn[:, 2].ravel(), minlength=48)[8:]
     assert np.abs(often - often.mean()).max() < 5 * np.sqrt(often.mean())
+
+
+def test_elements_are_numbered_in_the_order_of_their_cubes() -> None:
+    """Against NumPy's unique columns; places of one element in their own order."""
+    random = np.random.default_rng(11)
+    n, edge = 4000, 0.3
+    points = random.uniform(-1.0, 2.0, (n, 3)).astype(np.float32)
+    sides = np.eye(3, dtype=np.float32)[random.integers(0, 3, n)]
+    sides *= random.choice([-1, 1], (n, 1)).astype(np.float32)
+    halvings = random.integers(0, 3, n).astype(np.int8)
+    some = _Hits(np.zeros(n, dtype=np.int64), np.ones(n), Places(points, sides), halvings)
+    element, order, cubes = _elements(some, edge)
+    table = np.vstack(
+        [
+            np.floor(points.T * (0.5 ** -halvings.astype(float) / edge)),
+            np.round(sides.T * FACE_STEPS),
+            halvings,
+        ]
+    ).astype(np.int64)
+    expected, numbers = np.unique(table, axis=1, return_inverse=True)
+    assert len(cubes) > 1000
+    np.testing.assert_array_equal(cubes, expected.T)
+    np.testing.assert_array_equal(element, numbers.ravel())
+    np.testing.assert_array_equal(order, np.argsort(numbers.ravel(), kind="stable"))
+    wide = np.array([2**62, 3, 2**62, 0])  # no room for the places beside the numbers
+    np.testing.assert_array_equal(_order(wide), [3, 1, 0, 2])
