@@ -85,7 +85,8 @@ class ReflectedSun:
     @cached_property
     def cells(self) -> tuple[RoomCells, ReflectingCells]:
         """The room's surfaces, in cells of two widths."""
-        return room_cells(self.inside, self.traced.scene.interior)
+        samples = self._samples(ROOM_SHARE)
+        return room_cells(self.inside, self.traced.scene.interior, samples=samples)
 
     def seed(self, batch: int) -> int:
         """That of a batch."""

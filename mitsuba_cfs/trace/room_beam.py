@@ -41,7 +41,9 @@ from mitsuba_cfs.trace.sun_ways import SunWay, sun_ways
 CELLS = 4096  # into which the surfaces' area is divided, about, on either side
 WIDER = 2  # edge of the cells that light is reflected between, in edges of those
 AREA_POINTS = 2**18  # by which the cells' areas are counted
-CELL_RAYS = 128  # from each cell, in each batch
+CELL_RAYS = 128  # from each cell, in each batch, at most
+CELL_LEAST = 32  # and at the least: fewer take as long
+CELL_SHARE = 32  # rays of a sensor, for each from a cell
 LAST = 1e-4  # share of a sensor's light by the last reflection that is counted
 BOUNCES = 256  # at most; light falls to `LAST` before in all but white rooms
 POINTS = 1024  # on each group in each batch, that the sun is followed from
@@ -93,11 +95,22 @@ class ReflectingCells:
 
     cells: RoomCells  # [w]
     of: NDArray[np.int64]  # [c] which of them each narrower cell lies in
-    starts: Places  # [w * CELL_RAYS] evenly over each
+    starts: Places  # [w * rays] evenly over each
+
+    @property
+    def rays(self) -> int:
+        """From each cell."""
+        return self.starts.size // max(self.cells.size, 1)
 
 
-def room_cells(inside: TracedScene, interior: Surfaces) -> tuple[RoomCells, ReflectingCells]:
-    """The cells of a room's surfaces, and the wider ones that these lie in."""
+def room_cells(
+    inside: TracedScene, interior: Surfaces, *, samples: int = CELL_RAYS * CELL_SHARE
+) -> tuple[RoomCells, ReflectingCells]:
+    """The cells of a room's surfaces, and the wider ones that these lie in.
+
+    Args: samples: rays of each sensor; with few of them cells have fewer, their noise far below.
+    """
+    rays = min(max(samples // CELL_SHARE, CELL_LEAST), CELL_RAYS)
     area = float(interior.areas.sum())
     edge = float(np.sqrt(max(area, 1e-6) / CELLS))
     low = (interior.triangles.min(axis=(0, 1)) - inside.centre) - 0.37 * edge
@@ -117,7 +130,7 @@ def room_cells(inside: TracedScene, interior: Surfaces) -> tuple[RoomCells, Refl
     ends = np.cumsum(count[by_holder])
     shift = np.repeat(first[by_holder] - (ends - count[by_holder]), count[by_holder])
     number = np.bincount(holder, count).astype(np.int64)
-    share = (np.arange(CELL_RAYS) + 0.5) / CELL_RAYS
+    share = (np.arange(rays) + 0.5) / rays
     chosen = (np.cumsum(number) - number)[:, None] + (number[:, None] * share).astype(np.int64)
     chosen = chosen.ravel()
     starts = points.some(order[chosen + shift[chosen]])
@@ -176,7 +189,7 @@ def _between(
     while len(met):
         known[met] = True
         found = found + _reflected(
-            wide.cells, inside, wide.starts, met, size, samples=CELL_RAYS, seed=seed
+            wide.cells, inside, wide.starts, met, size, samples=wide.rays, seed=seed
         )
         others = np.zeros(size, dtype=bool)
         others[found.indices] = True

@@ -198,6 +198,21 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     assert lux.mean() == pytest.approx(0.6 / (1 - 0.6 * (1 - 1 / 54)) * flux / 54, rel=0.03)
 
 
+def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
+    from mitsuba_cfs.trace.room_beam import CELL_LEAST, CELL_RAYS, room_cells, room_shares
+    from mitsuba_cfs.trace.scene import TracedScene
+
+    room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
+    inside = TracedScene(room, [hole()])
+    sensors = np.array([[x, 1.5, 0.8] for x in (0.5, 1.5, 2.5)]), np.tile([0.0, 0.0, 1.0], (3, 1))
+    found = []
+    for samples, rays in ((128, CELL_LEAST), (32 * CELL_RAYS, CELL_RAYS)):
+        cells = room_cells(inside, room, samples=samples)
+        assert cells[1].rays == rays and cells[1].starts.size == rays * cells[1].cells.size
+        found.append(room_shares(cells, inside, sensors, samples=4096) @ cells[0].area)
+    np.testing.assert_allclose(*found, rtol=0.005)
+
+
 def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     """One wall reflects: the flux of points of the hole over their distances, by quadrature.
 
