@@ -34,16 +34,6 @@ def times_sky(matrix: ArrayLike, sky: Sky) -> NDArray[np.float64]:
     return np.ascontiguousarray((lit @ rows).T).reshape(*matrix.shape[:-1], hours)
 
 
-def window_radiance(daylight: ArrayLike, sky: ArrayLike) -> NDArray[np.float64]:
-    """Radiance of each window patch seen from the window, D s [G, K, H].
-
-    Args:
-        daylight: daylight matrices D [G, K, P].
-        sky: sky matrix s [P, H], luminance [cd/m2] or radiance [W/m2/sr].
-    """
-    return times_sky(daylight, sky)
-
-
 def room_side_radiance(
     transmission: Sequence[ArrayLike], daylight: ArrayLike, sky: Sky
 ) -> NDArray[np.float64]:
@@ -51,7 +41,8 @@ def room_side_radiance(
 
     Args:
         transmission: for each group its T [K, K], `KlemsBsdf.transmission_matrix()`.
-        daylight, sky: as for `window_radiance`.
+        daylight: daylight matrices D [G, K, P].
+        sky: sky matrix s [P, H], luminance [cd/m2] or radiance [W/m2/sr].
     """
     daylight = np.asarray(daylight)
     if len(transmission) != len(daylight):

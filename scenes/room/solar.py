@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from bim.outer_faces import OuterFaces
 from bim.to_thermal import ThermalRoom
-from mitsuba_cfs import phases
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.gloss import Gloss
 from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
@@ -86,18 +85,24 @@ class RoomSun:
             "cache": self.outdoors.cache,
         }
 
-    @cached_property
-    def incident(self) -> FloatArray:
-        """Irradiance of the window groups by direction [G, K, L] [W/m2]."""
-        omega = KLEMS_FULL.projected_solid_angles()
+    def before_windows(self, shares: FloatArray) -> FloatArray:
+        """Sums over the window groups' irradiance by direction [n, L] [W/m2], in lit hours.
+
+        The few sums of D are taken before the many hours, which are multiplied in the skies' single
+        precision.
+
+        Args: shares: [n, G, K] of the irradiance of each group from each patch.
+        """
         if not self.outdoors.scene.groups:
-            return np.zeros((0, len(omega), len(self.skies.lit)))
-        return self._by_season(
-            lambda scene, sky: (
-                phases.window_radiance(scene.parts.of_groups(scene.daylight.values), sky)
-                * omega[:, None]
-            )
-        )
+            return np.zeros((len(shares), len(self.skies.lit)))
+        weights = (shares * KLEMS_FULL.projected_solid_angles()).reshape(len(shares), -1)
+
+        def of_season(scene: PhaseScene, sky: FloatArray) -> FloatArray:
+            daylight = scene.parts.of_groups(scene.daylight.values)
+            rows = weights @ daylight.reshape(weights.shape[1], -1)
+            return (rows.astype(sky.dtype) @ sky).astype(float)
+
+        return self._by_season(of_season)
 
     def _by_season(self, of_season: Callable[[PhaseScene, FloatArray], FloatArray]) -> FloatArray:
         """Values [.., L] of all lit hours, from the scene and the sky [P, l] of each season."""
@@ -111,7 +116,9 @@ class RoomSun:
     @property
     def irradiance(self) -> FloatArray:
         """Irradiance of the window groups [H, G] [W/m2]."""
-        return self.skies.whole_year(self.incident.sum(axis=1)).T
+        groups = len(self.outdoors.scene.groups)
+        of_each = np.repeat(np.eye(groups)[..., None], KLEMS_FULL.size, axis=2)
+        return self.skies.whole_year(self.before_windows(of_each)).T
 
     @cached_property
     def facade(self) -> FloatArray:
@@ -170,25 +177,18 @@ class RoomSun:
         self, windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]], state: int
     ) -> tuple[Solar, Gains]:
         """Sun absorbed by window layers, room surfaces and facades in one state, and its sums."""
-        group, incident, F = windows.group, self.incident, self.facade.shape[1]
+        group, F = windows.group, self.facade.shape[1]
         if not len(group):
             dark = np.zeros((self.skies.hours, 0))
             return Solar(dark, dark, np.zeros_like(self.facade), self.facade), {}
         heats = [states[min(state, len(states) - 1)] for states in thermals]
-        omega = KLEMS_FULL.projected_solid_angles()
-        T = windows.of_state(state, lambda system: system.solar.transmission_matrix() / omega)
-        entering = np.stack([t @ i for t, i in zip(T, incident, strict=True)])
         area = np.array([g.area for g in windows.groups])
-        entering *= omega[:, None] * area[:, None, None]  # [G, K, L] flux into the room [W]
-        back = np.array([heat.back_reflectance for heat in heats])
-        taken = np.einsum("gkf,gkl->lf", self.absorbed(back), entering, optimize=True)  # [L, F + G]
-        outer, inner = (
-            np.einsum("gk,gkl->lg", np.stack(layer), incident, optimize=True)
-            for layer in (
-                [heat.absorptances.outer for heat in heats],
-                [heat.absorptances.inner for heat in heats],
-            )
+        T = np.stack(windows.of_state(state, lambda system: system.solar.transmission_matrix()))
+        shares = self._shares(heats, T, area)
+        found = np.split(
+            self.before_windows(np.concatenate(shares)), np.cumsum([len(s) for s in shares[:-1]])
         )
+        taken, outer, inner, whole = (rows.T for rows in found)
         kept = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
 
         def year(values: NDArray) -> NDArray:
@@ -201,11 +201,29 @@ class RoomSun:
             facade=self.facade,
             window_inside=year((kept * taken[:, F:] / area)[:, group]),
         )
-        sums = {
-            "incident_w": incident.sum(axis=1).T @ area,
-            "transmitted_w": entering.sum(axis=(0, 1)),
+        gains = {
+            "incident_w": whole[:, 0],
+            "transmitted_w": whole[:, 1],
             "absorbed_outer_w": outer @ area,
             "absorbed_inner_w": inner @ area,
             "absorbed_room_w": taken[:, :F].sum(axis=1),
         }
-        return solar, {name: self.skies.whole_year(values) for name, values in sums.items()}
+        return solar, {name: self.skies.whole_year(values) for name, values in gains.items()}
+
+    def _shares(
+        self, heats: Sequence[ThermalSystem], transmission: FloatArray, area: FloatArray
+    ) -> list[FloatArray]:
+        """Of the groups' irradiance by direction [n, G, K], what `before_windows` is asked for.
+
+        What the room's surfaces and windows take [W]; outer and inner layers of each group [W/m2];
+        what comes before all windows and what enters [W].
+        """
+        omega = KLEMS_FULL.projected_solid_angles()
+        entering = omega[:, None] * area[:, None, None] * (transmission / omega)  # [G, K, K] [W]
+        back = np.array([heat.back_reflectance for heat in heats])
+        absorbed = self.absorbed(back).transpose(2, 0, 1)[:, :, None]  # [F + G, G, 1, K]
+        each = np.eye(len(area))[..., None]
+        outer = each * np.stack([heat.absorptances.outer for heat in heats])
+        inner = each * np.stack([heat.absorptances.inner for heat in heats])
+        whole = np.stack([np.tile(area[:, None], len(omega)), entering.sum(axis=1)])
+        return [(absorbed @ entering)[:, :, 0], outer, inner, whole]
