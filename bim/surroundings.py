@@ -174,20 +174,36 @@ def _walk(
             limit, room = t, int(around.room[hit[0]])
             break
         at, t = at + (d[0] + 1e-4) * normal, t + 1e-4
-    crossings: list[tuple[float, int]] = []
-    t = 0.0
-    for _ in range(MOST_STEPS):
-        d, hit = around.elements.first_hits((start + t * normal)[None], normal[None], limit - t)
-        if hit[0] < 0:
-            break
-        t += d[0]
-        crossings.append((t, int(hit[0])))
-        t += 1e-5
-    spans = _spans(crossings, around, normal)
+    spans = _spans(_crossings(start, normal, limit, around), around, normal)
     stop = max((span.stop for span in spans), default=0.0)
     if room >= 0:
         stop = min(stop, limit)
     return spans, room, stop
+
+
+def _crossings(
+    start: NDArray[np.float64], normal: NDArray[np.float64], limit: float, around: Surroundings
+) -> list[tuple[float, int]]:
+    """Distances and triangles of the elements' faces that a ray passes, in turn.
+
+    Up to where the next room begins, and on until the ray is out of what it is in there: a wall
+    ends where that room begins, or a door's leaf within it.
+    """
+    found: list[tuple[float, int]] = []
+    inside: set[int] = set()
+    t = 0.0
+    for _ in range(MOST_STEPS):
+        reach = DEEPEST_WALL if inside else limit
+        d, hit = around.elements.first_hits((start + t * normal)[None], normal[None], reach - t)
+        if hit[0] < 0:
+            break
+        t += d[0]
+        element = int(around.element[hit[0]])
+        if t <= limit or element in inside:
+            found.append((t, int(hit[0])))
+            inside ^= {element}
+        t += 1e-5
+    return found
 
 
 def _spans(
