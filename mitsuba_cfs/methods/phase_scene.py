@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -381,20 +381,15 @@ class PhaseScene:
         scene, chosen = self.scene, self.sampling
         if scene.view is None:
             raise ValueError("the scene has no view to make pictures of")
-        of_hours = () if light is None else (light.lit, light.later)
-        return kept_view(
-            self.cache,
+        trace = partial(
+            view_matrices,
+            scene.interior,
+            self.parts.groups,
             scene.view,
-            (*self._view_inputs(depth), *of_hours),
-            lambda: view_matrices(
-                scene.interior,
-                self.parts.groups,
-                scene.view,
-                light=light,
-                samples=chosen.view_samples,
-                seed=chosen.seed,
-                memory=chosen.memory,
-                max_depth=depth,
-                progress=part(self.progress, 0.0, 1.0, "view matrices"),
-            ),
+            samples=chosen.view_samples,
+            seed=chosen.seed,
+            memory=chosen.memory,
+            max_depth=depth,
+            progress=part(self.progress, 0.0, 1.0, "view matrices"),
         )
+        return kept_view(self.cache, scene.view, self._view_inputs(depth), trace, light=light)

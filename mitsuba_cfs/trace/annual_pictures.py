@@ -33,7 +33,7 @@ from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.picture_rows import PictureRows
 from mitsuba_cfs.trace.picture_sharing import tile_size
 from mitsuba_cfs.trace.picture_sun import PictureSun
-from mitsuba_cfs.trace.room_sun import SunElements, sun_elements
+from mitsuba_cfs.trace.room_sun import SunlitRows, sun_elements
 from mitsuba_cfs.trace.scene import kept_scene
 
 MEMORY = 2 * 2**30  # [bytes] of a view's matrices; above it they lie on disk
@@ -50,7 +50,6 @@ class ViewNoise:
 
     indirect: NDArray[np.float32]  # [m, G * K]
     lit: NDArray[np.float32]  # [m, G * K]
-    elements: SunElements | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +65,7 @@ class ViewMatrices:
     lit: PictureMatrix  # light of the windows that falls on what the pixel shows, in V_d
     seen: sparse.csr_array  # [n, G * K] share of each window patch in each pixel, in V_d
     noise: ViewNoise
-    elements: SunElements | None = None  # of the rows of `indirect`, for the sun's beam
+    elements: SunlitRows | None = None  # of the rows of `indirect`, for the sun's beam
 
     def of_columns(self, part: slice) -> ViewMatrices:
         """The same of some columns alone: of some of the hours, where these are the columns."""
@@ -93,6 +92,7 @@ def view_matrices(
     folder: Path | None = None,
     window_reflectance: ArrayLike | None = None,
     light: PatchLight | None = None,
+    elements: SunlitRows | None = None,
     progress: Progress = silent,
     **options: Any,
 ) -> ViewMatrices:
@@ -106,6 +106,7 @@ def view_matrices(
             temporary folder by default.
         window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
         light: of hours, which the matrices' columns are then and not the patches.
+        elements: of the same view and options under any light, which are not traced again.
         options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
     tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
@@ -126,18 +127,17 @@ def view_matrices(
         reflecting = np.append(np.asarray(window_reflectance) > 0, False)  # OPAQUE is the last
         share = np.where(reflecting[shared.group], 1.0, share)
     share = share.astype(np.float32)
-    elements, close = None, None
-    if options.get("max_depth", 2) > 1:
+    found, close = None, None if elements is None else elements.close
+    if elements is None and options.get("max_depth", 2) > 1:
         area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
         paths = {"samples": options.get("samples", 32), "seed": seed}
-        elements, close = sun_elements(tracer, area, view, shared, times, **paths)
+        found, close = sun_elements(tracer, area, view, shared, times, **paths)
     mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
-    found = (None, None)
-    if elements is not None:
-        found = tuple(elements.of_rows(a, smooth) for a in (mean, noise))
+    if found is not None:
+        elements = SunlitRows(*(found.of_rows(a, smooth) for a in (mean, noise)), close)
     parts = (PictureMatrix(rows[:m], row, share) for rows in sums)
-    off = ViewNoise(*(rows[m:] for rows in sums), found[1])
-    return ViewMatrices(view, pixels, *parts, seen, off, found[0])
+    off = ViewNoise(*(rows[m:] for rows in sums))
+    return ViewMatrices(view, pixels, *parts, seen, off, elements)
 
 
 def _summed(
@@ -319,8 +319,8 @@ class FivePhasePictures:
         lit, later = self._columns(batch)
         rows = m.indirect.with_rows(noise.indirect).of_rows(later)
         rows += m.lit.with_rows(noise.lit).of_rows(lit)
-        if self._by_elements and noise.elements is not None:
-            rows += self._sun.on_elements(noise.elements, suns, strength).T
+        if self._by_elements:
+            rows += self._sun.on_elements(m.elements.noise, suns, strength).T
         if self._light is not None:
             rows += self._light.noise(self._sky[:, batch], self._faces[:, batch])
         values = np.zeros((len(batch), len(m.pixels)), dtype=np.float32)
@@ -351,7 +351,7 @@ class FivePhasePictures:
         if self._light is not None:
             rows += self._light.rows(self._sky[:, batch], self._faces[:, batch])
         if self._by_elements:
-            rows += self._sun.on_elements(m.elements, suns, strength).T
+            rows += self._sun.on_elements(m.elements.mean, suns, strength).T
         self._sun.add_to(values, suns, strength)
         return rows, values
 

@@ -85,6 +85,15 @@ class SunElements:
 
 
 @dataclass(frozen=True, slots=True)
+class SunlitRows:
+    """What the rows of a picture have of the elements, whatever light comes in by the windows."""
+
+    mean: SunElements  # of the rows [m]
+    noise: SunElements  # half the difference of the rows' halves; the same places
+    close: NDArray[np.bool_]  # [m] rows that show what another surface is near to
+
+
+@dataclass(frozen=True, slots=True)
 class _Hits:
     """Places that reflect to the rows of a picture."""
 

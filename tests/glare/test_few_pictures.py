@@ -122,6 +122,133 @@ def test_the_cache_gives_few_pictures_again_and_matrices_first(tmp_path, monkeyp
     assert len(calls) == 2
 
 
+def traced(**kept: Any) -> Any:
+    """The bare room, nothing outdoors: few paths, and elements near and far."""
+    import mitsuba_cfs as cfs
+
+    room, groups = rooms.test_room()
+    scene = cfs.DaylightScene(room, rooms.NOTHING, groups, view=VIEW)
+    return cfs.PhaseScene(scene, cfs.Sampling(view_samples=2), **kept)
+
+
+def luminance(number: int) -> Any:
+    """Of the one window's patches in two hours."""
+    from mitsuba_cfs.trace.patch_light import PatchLight
+
+    lit, later = np.random.default_rng(number).random((2, 145, 2)).astype(np.float32)
+    return PatchLight(lit, later)
+
+
+def arrays(value: Any) -> list[np.ndarray]:
+    """All arrays of matrices, in their order."""
+    if isinstance(value, np.ndarray):
+        return [value]
+    if sparse.issparse(value):
+        return [value.data, value.indices, value.indptr]
+    parts = vars(value) if hasattr(value, "__dict__") else getattr(value, "__slots__", ())
+    return [a for name in parts for a in arrays(getattr(value, name))]
+
+
+@pytest.fixture
+def elements_traced(monkeypatch) -> list[int]:
+    """Grows by one each time that sunlit elements are traced."""
+    from mitsuba_cfs.trace import annual_pictures
+
+    calls, trace = [], annual_pictures.sun_elements
+
+    def counted(*args, **options):
+        calls.append(len(calls))
+        return trace(*args, **options)
+
+    monkeypatch.setattr(annual_pictures, "sun_elements", counted)
+    return calls
+
+
+def test_sunlit_elements_are_found_again_under_any_light(tmp_path, elements_traced) -> None:
+    """By pictures and by the matrices of all patches, and all bit by bit as without a cache."""
+    from mitsuba_cfs.matrices.cache import MatrixCache
+
+    kept = MatrixCache(tmp_path)
+    found = [traced(cache=kept).view_of(luminance(number)) for number in (1, 2, 2)]
+    found.append(traced(cache=kept).view)
+    assert len(elements_traced) == 1
+    assert len(list(tmp_path.glob("view-elements-*"))) == 1
+    alone = [traced().view_of(luminance(number)) for number in (1, 2, 2)] + [traced().view]
+    for one, other in zip(found, alone, strict=True):
+        pairs = list(zip(arrays(one), arrays(other), strict=True))
+        assert len(pairs) > 30 and one.elements.mean.near.nnz > 0 and one.elements.close.any()
+        for a, b in pairs:
+            assert a.dtype == b.dtype
+            np.testing.assert_array_equal(a, b)
+
+
+def test_systems_share_the_elements_and_not_the_pictures(tmp_path, elements_traced) -> None:
+    from mitsuba_cfs.matrices.cache import MatrixCache
+    from mitsuba_cfs.methods.glare import rated_pictures
+
+    kept = MatrixCache(tmp_path)
+    rated_pictures(filled(cache=kept).light(sky(5)), HOURS, STATES)
+    found = rated_pictures(filled(cache=kept).light(sky(5)), HOURS, 1 - STATES)
+    assert len(elements_traced) == 1
+    alone = rated_pictures(filled().light(sky(5)), HOURS, 1 - STATES)
+    for (picture, rated), (expected, other) in zip(found, alone, strict=True):
+        np.testing.assert_array_equal(picture, expected)
+        assert rated.dgp == other.dgp
+        assert rated.dgp_standard_error == other.dgp_standard_error
+
+
+def _changed(name: str, scene: Any, sampling: Any) -> Any:
+    """A scene and sampling that differ in one thing."""
+    room, group = scene.interior, scene.groups[0]
+    pane = replace(group.windows[0], triangles=group.windows[0].triangles[:1])  # half of it
+    scenes = {
+        "geometry": {"interior": replace(room, triangles=room.triangles * [1.0, 1.0, 1.01])},
+        "reflectance": {"interior": replace(room, reflectance=room.reflectance * 0.9)},
+        "window": {"groups": [replace(group, windows=(pane,))]},
+        "size": {"view": fisheye((1.8, 2.5, 1.2), (0.5, -1.0, 0.0), 60)},
+        "eye": {"view": fisheye((1.8, 2.4, 1.2), (0.5, -1.0, 0.0), 64)},
+    }
+    samplings = {"seed": {"seed": sampling.seed + 1}, "paths": {"view_samples": 3}}
+    return replace(scene, **scenes.get(name, {})), replace(sampling, **samplings.get(name, {}))
+
+
+@pytest.mark.parametrize(
+    "name", ["geometry", "reflectance", "window", "size", "eye", "seed", "paths"]
+)
+def test_elements_of_another_view_are_not_taken(tmp_path, elements_traced, name) -> None:
+    from mitsuba_cfs.matrices.cache import MatrixCache
+
+    first = traced(cache=MatrixCache(tmp_path))
+    first.view_of(luminance(1))
+    scene, sampling = _changed(name, first.scene, first.sampling)
+    other = type(first)(scene, sampling, cache=MatrixCache(tmp_path))
+    other.view_of(luminance(2))
+    assert len(elements_traced) == 2
+    assert len(list(tmp_path.glob("view-elements-*"))) == 2
+
+
+def test_what_is_lost_or_too_large_is_traced_anew(tmp_path, elements_traced, monkeypatch) -> None:
+    """Pictures without their elements are none; what cannot be kept leaves no file behind."""
+    from mitsuba_cfs.matrices.cache import MatrixCache
+    from mitsuba_cfs.methods import view_cache
+
+    kept = MatrixCache(tmp_path)
+    traced(cache=kept).view_of(luminance(1))
+    (file,) = tmp_path.glob("view-elements-*")
+    whole = file.read_bytes()
+    for left in (None, whole[: len(whole) // 2]):
+        file.unlink() if left is None else file.write_bytes(left)
+        before = len(elements_traced)
+        assert traced(cache=kept).view_of(luminance(1)).elements is not None
+        assert len(elements_traced) == before + 1
+        assert file.stat().st_size == len(whole)
+    for other in tmp_path.glob("view-*"):
+        other.unlink()
+    monkeypatch.setattr(view_cache, "LARGEST", len(whole) // 2)
+    traced(cache=kept).view_of(luminance(1))
+    assert not list(tmp_path.glob("view-*"))
+
+
 def test_rooms_with_gloss_keep_the_patches() -> None:
     """What gloss shows of the windows is a matrix of patches for each pixel."""
     import mitsuba_cfs as cfs

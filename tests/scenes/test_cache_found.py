@@ -51,7 +51,8 @@ def study_arguments(folder: Path) -> list[str]:
 
 OF_A_RUN = {
     "absorption-matrix", "cell-daylight", "daylight-matrix", "direct-sun", "escape",
-    "sky-irradiance", "straight-view", "view-matrix", "view-pictures", "window-exchange",
+    "sky-irradiance", "straight-view", "view-elements", "view-matrix", "view-pictures",
+    "window-exchange",
 }  # fmt: skip
 COMMANDS = {
     "run": (run_arguments, OF_A_RUN),
