@@ -46,6 +46,17 @@ class SensorLight:
     sun: NDArray[np.float64] | None = None  # [S, L] C_ds s_sun [lx]
     sun_error: NDArray[np.float64] | float = 0.0  # [S] of the hours' sums of these two
 
+    def over_hours(self, sky: AnnualSky) -> NDArray[np.float64]:
+        """The sum of all hours of the sky that it is of [S] [lx], but for what windows reflect."""
+        whole, sun, _ = sky.totals(np.ones(len(sky.lit), dtype=bool))
+        found = self.whole @ whole
+        if self.by_sun is not None:
+            found -= self.by_sun @ sun
+        for part in (self.added, self.sun):
+            if part is not None:
+                found += part.sum(axis=1)
+        return found
+
 
 def window_light(traced: PhaseScene, q: int, optics: SystemOptics, sky: AnnualSky) -> WindowLight:
     """The luminance of a part of a window group towards the room under a sky."""

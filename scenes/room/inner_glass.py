@@ -150,14 +150,11 @@ def borrowed_share(
         return ""
     first = len(light.filled.traced.scene.outdoor_groups)
     lights = [own for own, _ in light.parts()] if isinstance(light, SeasonalLight) else [light]
-    sums = [
-        sum(
-            one.diffuse[:-1].sum() + (0 if one.sun is None else one.sun[:-1].sum())
-            for (one, *_) in of_group
-        )
-        for of_group in zip(*(own.sensors for own in lights), strict=True)
-    ]
-    share = float(sum(sums[first:]) / max(sum(sums), 1e-9))
+    sums = sum(
+        np.array([states[0].over_hours(own.sky)[:-1].sum() for states in own.sensors])
+        for own in lights
+    )
+    share = float(sums[first:].sum() / max(sums.sum(), 1e-9))
     return (
         f"Room {space.label} borrows {100 * share:.0f} % of its daylight through "
         f"{_through(inner)} from {', '.join(dict.fromkeys(inner.names))}; the sun comes through "

@@ -250,3 +250,22 @@ def test_product_with_the_sun_alone_is_that_with_any_sky(lit):
     dark = whole.part(np.arange(10))  # has its own, not that of all hours
     few = phases.times_sky(matrix, dark.lit_sun)
     np.testing.assert_allclose(few, found[..., :10], rtol=1e-5)
+
+
+@pytest.mark.parametrize("five", [False, True])
+def test_a_groups_light_over_the_hours_is_the_sum_of_each(five):
+    """Which the share of light by glass between rooms is of."""
+    from mitsuba_cfs.methods.group_light import SensorLight
+
+    random = np.random.default_rng(2)
+    sky = random.random((40, 9))
+    sun = sky * (random.random(sky.shape) < 0.1) if five else None
+    hours = AnnualSky(sky, np.zeros((9, 3)), np.zeros(9), np.arange(9), 9, sun=sun)
+    whole, by_sun = random.random((2, 3, 40))
+    added, straight = random.random((2, 3, 9))
+    expected = whole @ sky
+    light = SensorLight(whole)
+    if sun is not None:
+        expected += added + straight - by_sun @ sun
+        light = SensorLight(whole, by_sun, added, straight)
+    np.testing.assert_allclose(light.over_hours(hours), expected.sum(axis=1), rtol=1e-12)
