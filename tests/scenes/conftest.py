@@ -50,3 +50,11 @@ def small_disk(tmp_path) -> Iterator[Path]:
         pytest.skip("no disk can be mounted here")
     yield disk
     subprocess.run(["umount", "-l", str(disk)], check=False)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stubs of rooms' results have no pictures that a run could hold on disk."""
+    from scenes.run import run
+
+    monkeypatch.setattr(run.StoredPictures, "kept", lambda self, room: room)

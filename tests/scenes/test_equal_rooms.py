@@ -94,7 +94,7 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
 
 
 def test_equal_rooms_that_are_operated_otherwise_are_computed_each(
-    variant, tmp_path, weather, skies, glass, monkeypatch
+    variant, tmp_path, weather, skies, glass, monkeypatch, no_pictures
 ) -> None:
     from scenes.run import run
 

@@ -163,7 +163,7 @@ def test_one_picture_is_the_brightest_hours() -> None:
 
 
 @pytest.fixture
-def three_rooms(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+def three_rooms(monkeypatch: pytest.MonkeyPatch, no_pictures: None) -> SimpleNamespace:
     """Rooms of which the third equals the first, each computed by a stub."""
     rooms = [SimpleNamespace(guid=g, label=g.upper(), template="") for g in ("a", "b", "c")]
     a, b, c = rooms

@@ -64,7 +64,7 @@ def rooms_of(inputs: job.JobInputs):
     return job._rooms(inputs, skies, OPTIONS, silent)
 
 
-def test_a_room_too_low_for_its_sensors_is_left_out(variant, monkeypatch) -> None:
+def test_a_room_too_low_for_its_sensors_is_left_out(variant, monkeypatch, no_pictures) -> None:
     only_high_rooms_are_made_up(monkeypatch)
     found, problems, _ = rooms_of(inputs_of(box("low", 0.7), box("high", 2.8)))
     assert [room.name for room in found] == ["high"]
