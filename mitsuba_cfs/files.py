@@ -10,12 +10,13 @@ import os
 import re
 import secrets
 import shutil
+import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from mitsuba_cfs.errors import DataError
 
@@ -86,6 +87,28 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(part, ignore_errors=True)
         release()
+
+
+@contextmanager
+def unnamed_file(size: int, what: str, folder: Path | None = None) -> Iterator[IO[bytes]]:
+    """A file without a name of so many bytes, to be mapped: it is there for as long as its map.
+
+    Args:
+        what: the file is for, in words for the message.
+        folder: of it; the system's temporary folder by default.
+
+    Raises: `DataError` where there is no room for it.
+    """
+    with tempfile.TemporaryFile(dir=folder) as file:
+        try:
+            if hasattr(os, "posix_fallocate"):  # or a full disk ends the process: SIGBUS
+                os.posix_fallocate(file.fileno(), 0, size)
+            else:
+                file.truncate(size)
+        except OSError as error:
+            message = f"no room for {what}: {reason(error)}"
+            raise DataError(message, file=folder or tempfile.gettempdir()) from error
+        yield file
 
 
 def write_text(path: str | PathLike[str], text: str, *, encoding: str = "utf-8") -> None:

@@ -45,7 +45,7 @@ class PhaseSystems:
         self.straight = StraightViews(traced, systems)
         self.reflected_sun = ReflectedSun(traced, systems, self.straight)
         self.mirrored = WindowReflection(traced)
-        self.sensors = SensorCoefficients(traced, systems, self.straight, self.mirrored)
+        self.sensors = SensorCoefficients(traced, self.straight, self.mirrored)
 
     @property
     def states(self) -> int:
@@ -68,7 +68,7 @@ class PhaseSystems:
         """
         kind = [min(state, len(states) - 1) for states in self.systems]
         found = sum(self.sensors.of_group(g, j) for g, j in enumerate(kind))
-        shares, _ = self.sensors.reflected(kind)
+        shares, _ = self.sensors.reflected(self.optics(kind))
         if shares is not None:
             found = found + self.sensors.of_sky(shares)
         return found[: len(self.traced.scene.points)]
@@ -309,7 +309,8 @@ class PhaseLight:
         """
         filled, sky = self.filled.sensors, self._lit(hours)
         chosen = [self.sensors[g][j] for g, j in enumerate(kind)]
-        (shares, outwards), whole = filled.reflected(kind), sum(light.whole for light in chosen)
+        shares, outwards = filled.reflected(self.filled.optics(kind))
+        whole = sum(light.whole for light in chosen)
         if shares is not None:
             whole = whole + filled.of_sky(shares)
         # in the sky's single precision: the noise of the sums is ten thousand times its rounding

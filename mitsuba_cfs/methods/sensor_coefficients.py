@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.methods.optics import States, SystemOptics, in_state
+from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.methods.window_reflection import WindowReflection
@@ -24,13 +24,11 @@ class SensorCoefficients:
     def __init__(
         self,
         traced: PhaseScene,
-        systems: Sequence[States],
         straight: StraightViews,
         mirrored: WindowReflection,
     ) -> None:
-        """Of a scene with what fills its windows, by group and state [G][J]; nothing is traced."""
-        self._traced, self._systems = traced, systems
-        self._straight, self._mirrored = straight, mirrored
+        """Of a scene and the views through what fills its windows; nothing is traced."""
+        self._traced, self._straight, self._mirrored = traced, straight, mirrored
 
     def of_group(self, g: int, j: int) -> Array:
         """What a group in a state gives per unit luminance of each sky patch [S, P].
@@ -59,13 +57,13 @@ class SensorCoefficients:
             found += (direct @ lost + (view - direct) @ held) @ traced.direct_daylight[q]
         return found if seen is None else found + seen.values
 
-    def reflected(self, state: Sequence[int]) -> tuple[Array | None, Array | None]:
+    def reflected(self, optics: Sequence[SystemOptics]) -> tuple[Array | None, Array | None]:
         """Shares [S, Q * K] of the light before the parts that come by reflection in windows.
 
-        With each group in a state [G].  All of them, and those by way of the outdoors; None where
+        With the parts' systems [Q].  All of them, and those by way of the outdoors; None where
         there are none.
         """
-        optics, mirrored = self._optics(state), self._mirrored
+        mirrored = self._mirrored
         shares = outwards = None
         if mirrored.reflects(optics):
             shares = mirrored.through(optics, mirrored.sensors(optics)).astype(float)
@@ -79,7 +77,3 @@ class SensorCoefficients:
         daylight = self._traced.daylight.values
         found: Array = shares @ daylight.reshape(shares.shape[1], -1)
         return found
-
-    def _optics(self, state: Sequence[int]) -> list[SystemOptics]:
-        found = in_state(self._systems, state)
-        return [found[g] for g in self._traced.parts.group]

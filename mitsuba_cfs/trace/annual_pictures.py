@@ -7,8 +7,6 @@ Five-phase    L = V T D s - V_d T D_d s_d + direct sun, with the sun's true disc
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import unnamed_file
 from mitsuba_cfs.glare.annual import PictureMatrix, ThreePhasePictures, add_seen, flat
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
@@ -368,11 +365,6 @@ def _storage(shape: tuple[int, int], on_disk: bool, folder: Path | None) -> NDAr
     """A matrix of zeros, in memory or in a file without a name."""
     if not on_disk:
         return np.zeros(shape, dtype=np.float32)
-    with tempfile.TemporaryFile(dir=folder) as file:  # the map keeps the file open
-        try:
-            if hasattr(os, "posix_fallocate"):  # or a full disk ends the process: SIGBUS
-                os.posix_fallocate(file.fileno(), 0, 4 * math.prod(shape))
-        except OSError as error:
-            message = f"no room for matrices of {4e-9 * math.prod(shape):.1f} GB: {reason(error)}"
-            raise DataError(message, file=folder or tempfile.gettempdir()) from error
+    size = 4 * math.prod(shape)
+    with unnamed_file(size, f"matrices of {size / 1e9:.1f} GB", folder) as file:
         return np.memmap(file, dtype=np.float32, mode="w+", shape=shape)

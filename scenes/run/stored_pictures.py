@@ -6,16 +6,13 @@ Ten pictures of 600 x 600 and one in colour are 22 MB a room: with 73 rooms more
 from __future__ import annotations
 
 import mmap
-import os
-import tempfile
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import unnamed_file
 from scenes.results import RoomYear
 from scenes.room.heated import DaylitRoom
 
@@ -69,13 +66,5 @@ class StoredPictures:
 
 def _file(size: int) -> mmap.mmap:
     """A file without a name of so many bytes, there for as long as anything shows its pictures."""
-    with tempfile.TemporaryFile() as file:
-        try:
-            if hasattr(os, "posix_fallocate"):  # or a full disk ends the process: SIGBUS
-                os.posix_fallocate(file.fileno(), 0, size)
-            else:
-                file.truncate(size)
-        except OSError as error:
-            message = f"no room for pictures of {size / 1e9:.2f} GB: {reason(error)}"
-            raise DataError(message, file=tempfile.gettempdir()) from error
+    with unnamed_file(size, f"pictures of {size / 1e9:.2f} GB") as file:
         return mmap.mmap(file.fileno(), size)
