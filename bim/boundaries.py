@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.bodies import Span
 from bim.colours import GREY, Colour
 from bim.defaults import (
     EMISSIVITY,
@@ -21,11 +22,10 @@ from bim.model import Construction, Face, MaterialLayer, Window
 from bim.planes import area_vectors
 from bim.rooms import Piece
 from bim.shell import conforming_triangles
-from bim.surroundings import Beyond, Span
+from bim.surroundings import THICKEST_SPAN, Beyond
 from mitsuba_cfs.gloss import Gloss
 
 SHALLOWEST_GAP = 0.01  # air between two elements from this on is a layer [m]
-THICKEST_SPAN = 1.0  # a ray that runs longer in one element runs along it, not through [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,8 @@ class ElementRecord:
     axis: NDArray[np.float64] | None = None  # [3] world: from the first layer to the last
     is_roof: bool = False
     stated: bool = False  # whether the thermal properties come from the file
+    # of unit thickness, of the bodies that the element is made of, by their representation items
+    of_items: Mapping[int, MaterialLayer] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +158,7 @@ def construction_of(
 ) -> Construction | None:
     """Layers, outermost first, of the elements that a ray out of the room went through."""
     outwards: list[MaterialLayer] = []
-    reach, names, stated = 0.0, [], True
+    reach, names, stated = -np.inf, [], True
     for span in spans:
         if span.stop <= reach + 1e-3:  # inside an element that is already counted
             continue
@@ -165,7 +167,7 @@ def construction_of(
             gap = start - reach
             outwards.append(air_layer(gap))
         record = records[span.element]
-        outwards += _layers(record, span.stop - start, normal)
+        outwards += _layers(record, span, start, normal)
         names.append(record.name)
         stated &= record.stated
         reach = span.stop
@@ -176,9 +178,14 @@ def construction_of(
 
 
 def _layers(
-    record: ElementRecord, length: float, normal: NDArray[np.float64]
+    record: ElementRecord, span: Span, start: float, normal: NDArray[np.float64]
 ) -> list[MaterialLayer]:
-    """Layers of one element from the room outwards; without layers one as thick as the ray."""
+    """Layers of one element from the room outwards, from `start` on [m].
+
+    Those of its layer set; without one, the bodies that the ray goes through, each of its own
+    material or of the element's.
+    """
+    length = span.stop - start
     total = sum(layer.thickness for layer in record.layers)
     fits = 0.5 * total < length < 1.6 * total or length > THICKEST_SPAN
     across = record.axis is None or abs(record.axis @ normal) > 0.7
@@ -186,9 +193,17 @@ def _layers(
         along = record.axis is not None and record.axis @ normal > 0
         # without an axis the first layer is the outer one, as the authoring tools write it
         return list(record.layers if along else record.layers[::-1])
-    m = record.material
-    thickness = min(max(length, 1e-3), THICKEST_SPAN)
-    return [MaterialLayer(m.name, thickness, m.conductivity, m.density, m.heat_capacity)]
+    found: list[MaterialLayer] = []
+    for part in span.parts:
+        material = record.of_items.get(part.item, record.material)
+        if found and part.stop <= start + 1e-3:
+            continue  # inside one that is already counted
+        thickness = min(part.stop - max(part.start, start), THICKEST_SPAN)
+        start = max(start, part.stop)
+        if found and replace(found[-1], thickness=material.thickness) == material:
+            thickness += found.pop().thickness
+        found.append(replace(material, thickness=max(thickness, 1e-3)))
+    return found
 
 
 def _window(parts: Sequence[tuple[Piece, NDArray[np.float64]]]) -> Window:

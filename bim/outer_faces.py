@@ -19,7 +19,6 @@ TOUCHING = 0.05  # [m] wider gaps are outdoors: no cladding lies beyond them
 PARALLEL = 0.9  # least |cosine| to the wall's normal of both faces of what is a part of the wall
 OFF_THE_WALL = 0.02  # [m] sensors stand this far before the outer face
 PLACES = 64  # on each surface, a power of two
-MOST_STEPS = 24  # surfaces that a ray is followed through
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,14 +154,10 @@ class _NearElements:
         self, points: NDArray[np.float64], normal: NDArray[np.float64]
     ) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]]:
         """Distances [n] and triangles [n] (-1: none) that rays along the normal meet, in turn."""
-        found: list[tuple[NDArray[np.float64], NDArray[np.int64]]] = []
-        rays, t = np.broadcast_to(normal, points.shape), np.zeros(len(points))
-        for _ in range(MOST_STEPS):
-            step, triangle = self.mesh.first_hits(points + t[:, None] * normal, rays)
-            triangle = np.where(t + step <= DEEPEST_WALL, triangle, -1)
-            if np.all(triangle < 0):
-                break
-            t = np.where(triangle >= 0, t + step, DEEPEST_WALL)
-            found.append((t.copy(), triangle))
-            t = t + 1e-5
-        return found
+        hits = [self.mesh.all_hits(point, normal, DEEPEST_WALL) for point in points]
+        most = max((len(hit) for _, hit in hits), default=0)
+        distance = np.full((most, len(points)), DEEPEST_WALL)
+        triangle = np.full((most, len(points)), -1)
+        for ray, (far, hit) in enumerate(hits):
+            distance[: len(hit), ray], triangle[: len(hit), ray] = far, hit
+        return list(zip(distance, triangle, strict=True))

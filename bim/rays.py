@@ -1,4 +1,4 @@
-"""First hits of rays in triangle meshes, for asking what lies behind a wall.
+"""Hits of rays in triangle meshes, for asking what lies behind a wall.
 
 A bounding-volume tree over the triangles, walked by compiled code: no tracer, no variant, doubles.
 """
@@ -42,6 +42,24 @@ class RayMesh:
         return _first_hits(
             origins, directions, float(reach), self.triangles, self.leaves, self.boxes
         )
+
+    def all_hits(
+        self, origin: NDArray[np.float64], direction: NDArray[np.float64], reach: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Distances [H] [m] and triangles [H] that one ray hits up to `reach`, in turn.
+
+        What lies in one place is all there: where two bodies touch, faces of both; on an edge, the
+        triangles on both sides of it.
+        """
+        if not len(self.triangles):
+            return np.empty(0), np.empty(0, dtype=np.int64)
+        origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
+        distance, hit = _all_hits(
+            origin, direction, float(reach), self.triangles, self.leaves, self.boxes
+        )
+        hit, first = np.unique(hit, return_index=True)  # some triangles are in two leaves
+        order = np.argsort(distance[first], kind="stable")
+        return distance[first][order], hit[order]
 
 
 def ray_mesh(triangles: NDArray[np.float64]) -> RayMesh:
@@ -100,6 +118,35 @@ def _first_hits(origins, directions, reach, triangles, leaves, boxes):
                     distance[r] = t
                     hit[r] = k
     return distance, hit
+
+
+@compiled()
+def _all_hits(o, d, reach, triangles, leaves, boxes):
+    """Walk the tree for one ray; the hits in no order."""
+    distance, hit = np.empty(32), np.empty(32, dtype=np.int64)
+    stack = np.empty(DEEPEST, dtype=np.int64)
+    inner = len(boxes) - len(leaves)
+    found = top = 0
+    stack[0] = 0
+    while top >= 0:
+        node = stack[top]
+        top -= 1
+        if not _meets(o, d, boxes[node], reach):
+            continue
+        if node < inner:
+            stack[top + 1] = 2 * node + 2
+            stack[top + 2] = 2 * node + 1
+            top += 2
+            continue
+        for k in leaves[node - inner]:
+            t = _distance(o, d, triangles[k])
+            if t > reach or t == np.inf:
+                continue
+            if found == len(hit):
+                distance, hit = np.append(distance, distance), np.append(hit, hit)
+            distance[found], hit[found] = t, k
+            found += 1
+    return distance[:found], hit[:found]
 
 
 @compiled()

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from bim.bodies import Bodies, Span
 from bim.planes import Facet, area_vectors, polygons_of, triangulated
 from bim.rays import RayMesh, hemisphere
 from bim.rooms import Piece, RoomSolid, cut
 
+T = TypeVar("T", bound=Hashable)
+
 DEEPEST_WALL = 1.5  # beyond this nothing belongs to the wall any more [m]
+DEEPEST_IN_ROOM = 0.5  # nor what stands further into the room
+THICKEST_SPAN = 1.0  # a ray that is longer in one element runs along it, not through [m]
 WIDEST_GAP = 0.6  # air between the parts of one wall or ceiling [m]
 PARALLEL = 0.9  # least |cosine| to a wall's normal of what lies behind its first element: no eaves
 UPRIGHT = 0.5  # most |cosine| of a wall's normal to the vertical
@@ -22,35 +28,33 @@ INSIDE = 0.02  # rays start this far inside the room: faces drawn into the wall 
 OPPOSITE = -0.98  # cosine between faces of two rooms that share a wall: 11 degrees
 OPEN_SKY = 0.1  # share of rays that escape where a wall faces the open air
 FAR = 60.0  # a ray that meets nothing within this has escaped [m]
-MOST_STEPS = 24  # surfaces that a ray is followed through
+TOUCHING = 1e-3  # what reaches less into the wall does not belong to it [m]
 SAMPLES = 5  # points asked on each piece
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """One element that a ray went through."""
-
-    element: int  # index into Elements.guids
-    start: float  # [m] from the room's face
-    stop: float  # infinite where the ray runs along the element and does not come out
-    triangle: int  # first triangle met, index into the mesh
 
 
 @dataclass(frozen=True, slots=True)
 class Beyond:
     """What lies behind a piece."""
 
-    spans: tuple[Span, ...]  # from the room outwards
+    spans: tuple[Span, ...]  # from the room's face outwards
     adjacency: str
     neighbour: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """What a ray out of a room's face meets."""
+
+    spans: tuple[Span, ...]  # the parts of one wall
+    room: int  # that it ends in, -1: none
+    stop: float  # where it is out of all of them [m], infinite where it runs along one
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
     """Everything a room can border on."""
 
-    elements: RayMesh
-    element: NDArray[np.int64]  # [N] element of each triangle
+    bodies: Bodies
     rooms: RayMesh
     room: NDArray[np.int64]  # [M] room of each triangle
     guids: tuple[str, ...]  # of the rooms
@@ -111,35 +115,44 @@ def _opposite(
     return sorted(found, key=lambda item: item[0])
 
 
-def sample_points(facet: Facet) -> NDArray[np.float64]:
-    """Up to SAMPLES points [N, 3] well inside a facet, the middle of its biggest triangles."""
+def sample_points(facet: Facet) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Up to SAMPLES points [N, 3] well inside a facet, and the area [N] that each stands for [m2].
+
+    The middles of its biggest triangles, and before them one point that is inside in any case.
+    """
     flat = triangulated(facet.polygon)
     e1, e2 = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    areas = np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
-    middles = flat[np.argsort(-areas)[: SAMPLES - 1]].mean(axis=1)
+    areas = 0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
+    biggest = np.argsort(-areas)[: SAMPLES - 1]
     inner = shapely.get_coordinates(shapely.point_on_surface(facet.polygon))
-    return facet.plane.to_world(np.concatenate([inner, middles]))
+    points = facet.plane.to_world(np.concatenate([inner, flat[biggest].mean(axis=1)]))
+    return points, np.concatenate([areas[biggest].min(keepdims=True), areas[biggest]])
 
 
 def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
     """Elements behind a piece along the ray that most of its samples agree with, and what follows.
 
-    They agree on the element met first, then on all of them: one rafter of the eaves, met by one
-    sample, is no cladding.
+    Most of its area agrees on the element met first, a gap counts less than what two samples meet,
+    and most of those samples on all of them: one rafter of the eaves, met by one, is no cladding.
 
     Args: own: index of the piece's own room in `around.guids`.
     """
     normal = piece.facet.plane.normal
-    points = sample_points(piece.facet)
+    points, areas = sample_points(piece.facet)
     if piece.role == "reveal":  # the ray runs along the wall, not through it
         points = points[:1]
-    walks = [_walk(point, normal, around, own) for point in points]
-    firsts = [spans[0].element if spans else -1 for spans, _, _ in walks]
-    common = max(set(firsts), key=firsts.count)
-    chains = [tuple(span.element for span in spans) for spans, _, _ in walks]
-    agreeing = [chain for chain, first in zip(chains, firsts, strict=True) if first == common]
-    chosen = chains.index(max(agreeing, key=agreeing.count))
-    spans, room, stop = walks[chosen]
+    back = DEEPEST_IN_ROOM if piece.role == "room" else INSIDE
+    walks = _without_fittings([_walk(p, normal, around, own, back=back) for p in points])
+    chains = {i: tuple(span.element for span in walk.spans) for i, walk in enumerate(walks)}
+    firsts = {i: chain[:1] for i, chain in chains.items()}
+    twice = {i: what for i, what in firsts.items() if what and [*firsts.values()].count(what) > 1}
+    first = _most(twice or firsts, areas)
+    agreeing = {i: chain for i, chain in chains.items() if chain[:1] == first}
+    most = _most(agreeing, np.ones(len(points)))
+    # those that come out, if any do: the others meet the end of what stands against the wall
+    whole = [i for i, chain in chains.items() if chain == most]
+    whole = [i for i in whole if np.isfinite(walks[i].stop)] or whole
+    spans, room = walks[whole[0]].spans, walks[whole[0]].room
     if piece.role == "reveal":
         return Beyond(spans[:1], "adiabatic")
     if piece.neighbour is not None:
@@ -148,11 +161,29 @@ def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
         return Beyond(spans, "outside")
     if room >= 0:
         return Beyond(spans, "space", around.guids[room])
-    if not np.isfinite(stop) and normal[2] > -0.7:
-        return Beyond(spans, "adiabatic")  # the end of a wall: boundary type 2b
-    stop = min(stop, DEEPEST_WALL)
-    point = points[chosen] + normal * (stop + 0.02)
-    return Beyond(spans, _open_or_ground(point, normal, around))
+    met = {i: _adjacency(points[i], walks[i], normal, around) for i in whole}
+    return Beyond(spans, _most(met, areas))
+
+
+def _most(found: Mapping[int, T], areas: NDArray[np.float64]) -> T:
+    """What most of the area says, by number of its sample; where two are even, the first."""
+    shares: dict[T, float] = {}
+    for i, what in found.items():
+        shares[what] = shares.get(what, 0.0) + round(float(areas[i]), 9)
+    return max(shares, key=lambda what: shares[what])
+
+
+def _adjacency(
+    point: NDArray[np.float64], walk: Walk, normal: NDArray[np.float64], around: Surroundings
+) -> str:
+    """What follows the wall behind a point of it where no room does."""
+    stop = walk.stop
+    if not np.isfinite(stop):
+        if normal[2] > -0.7:
+            return "adiabatic"  # the end of a wall: boundary type 2b
+        ends = [span.stop for span in walk.spans if np.isfinite(span.stop)]
+        stop = max(ends, default=DEEPEST_WALL)
+    return _open_or_ground(point + normal * (stop + 0.02), normal, around)
 
 
 def _walk(
@@ -160,8 +191,10 @@ def _walk(
     normal: NDArray[np.float64],
     around: Surroundings,
     own: int,
-) -> tuple[tuple[Span, ...], int, float]:
-    """Elements along the ray out of a face, the room it ends in (-1: none), the last exit."""
+    *,
+    back: float,
+) -> Walk:
+    """What a ray out of a face meets, asked from so far back in the room [m]."""
     limit, room = DEEPEST_WALL, -1
     start = point - INSIDE * normal
     at, t = start + (INSIDE + 0.005) * normal, INSIDE + 0.005
@@ -174,103 +207,85 @@ def _walk(
             limit, room = t, int(around.room[hit[0]])
             break
         at, t = at + (d[0] + 1e-4) * normal, t + 1e-4
-    spans = _spans(_crossings(start, normal, limit, around), around, normal)
+    spans = _at_the_face(around.bodies, point, normal, limit - INSIDE, back)
+    spans = _of_one_wall(spans, around, normal)
     stop = max((span.stop for span in spans), default=0.0)
     if room >= 0:
         stop = min(stop, limit)
-    return spans, room, stop
+    # what the ray runs along behind the first is the end of a wall that stands against this one
+    through = [span for span in spans[1:] if np.isfinite(span.stop)]
+    return Walk((*spans[:1], *through), room, stop)
 
 
-def _crossings(
-    start: NDArray[np.float64], normal: NDArray[np.float64], limit: float, around: Surroundings
-) -> list[tuple[float, int]]:
-    """Distances and triangles of the elements' faces that a ray passes, in turn.
+def _at_the_face(
+    bodies: Bodies,
+    point: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    limit: float,
+    back: float,
+) -> list[Span]:
+    """What begins, ends or goes on where a ray leaves the room, and before the next one [m].
 
-    Up to where the next room begins, and on until the ray is out of what it is in there: a wall
-    ends where that room begins, or a door's leaf within it.
+    Rooms are drawn to the middles of walls, to the slab under the flooring or through their ceiling
+    up to its top: all of that belongs to the wall, also where the next room begins at the face
+    already.  What stands deeper in the room does not, but for its part beyond the face.
     """
-    found: list[tuple[float, int]] = []
-    inside: set[int] = set()
-    t = 0.0
-    for _ in range(MOST_STEPS):
-        reach = DEEPEST_WALL if inside else limit
-        d, hit = around.elements.first_hits((start + t * normal)[None], normal[None], reach - t)
-        if hit[0] < 0:
-            break
-        t += d[0]
-        element = int(around.element[hit[0]])
-        if t <= limit or element in inside:
-            found.append((t, int(hit[0])))
-            inside ^= {element}
-        t += 1e-5
-    return found
+    found: list[Span] = []
+    for span in bodies.along(point - back * normal, normal, back + 2 * DEEPEST_WALL):
+        span = span.moved(back)
+        if span.stop <= -TOUCHING or span.start >= max(limit - TOUCHING, TOUCHING):
+            continue
+        if span.start <= -back:
+            if span.stop <= TOUCHING:
+                continue
+            span = span.since(-INSIDE)
+        found.append(span if span.stop - span.start < DEEPEST_WALL else span.endless())
+    return sorted(found, key=lambda span: (span.start, span.stop))
 
 
-def _spans(
-    crossings: list[tuple[float, int]], around: Surroundings, normal: NDArray[np.float64]
-) -> tuple[Span, ...]:
-    """Entries and exits paired by element, until a gap too wide for one wall; t from the face.
+def _without_fittings(walks: Sequence[Walk]) -> list[Walk]:
+    """The walks without what ends at the face in some of them: a stair along a wall, a beam.
+
+    What is a part of the wall, its panels or its flooring, is in all of them.
+    """
+    ends = [{s.element for s in walk.spans if s.stop <= TOUCHING} for walk in walks]
+    loose = set().union(*ends) - set(ends[0]).intersection(*ends)
+    return [
+        replace(
+            walk, spans=tuple(s for s in walk.spans if s.stop > TOUCHING or s.element not in loose)
+        )
+        for walk in walks
+    ]
+
+
+def _of_one_wall(
+    spans: Sequence[Span], around: Surroundings, normal: NDArray[np.float64]
+) -> list[Span]:
+    """Those until a gap too wide for one wall.
 
     What a wall's ray meets aslant behind the first element is the roof over the wall or its
     rafters, not a cladding, but for an upright wall that runs aslant behind another one; over a
     ceiling it is the roof that closes the attic.
     """
-    open_at: dict[int, tuple[float, int]] = {}
-    spans: list[Span] = []
-    met = [int(around.element[triangle]) for _, triangle in crossings]
-    vectors = area_vectors(around.elements.triangles[[triangle for _, triangle in crossings]])
-    leaves = vectors @ normal > 0
-    layered = _layered(met, leaves)
-    for (t, triangle), element, leaving in zip(crossings, met, leaves, strict=True):
-        if element in layered:
-            first, last = layered[element]
-            if (t, triangle) == crossings[first]:
-                spans.append(Span(element, t - INSIDE, crossings[last][0] - INSIDE, triangle))
-            continue
-        starts_inside = met.count(element) % 2 == 1 and leaving
-        if starts_inside and element not in {span.element for span in spans} | set(open_at):
-            spans.append(Span(element, -INSIDE, t - INSIDE, triangle))
-        elif element in open_at:
-            start, first = open_at.pop(element)
-            if t - start > 5e-4:
-                spans.append(Span(element, start - INSIDE, t - INSIDE, first))
-        else:
-            open_at[element] = (t, triangle)
-    spans += [
-        Span(element, start - INSIDE, np.inf, first) for element, (start, first) in open_at.items()
-    ]
-    spans.sort(key=lambda span: span.start)
     kept: list[Span] = []
     reach = 0.0
     for span in spans:
-        if span.start - reach > WIDEST_GAP:
+        # over a room that is drawn lower than it is the first may lie as far as any
+        if span.start - reach > WIDEST_GAP and (kept or normal[2] < UPRIGHT):
             break
         if kept and abs(normal[2]) < UPRIGHT and not _may_clad(span, around, normal):
             continue
-        kept.append(span)
+        along = kept and span.stop - span.start > THICKEST_SPAN
+        kept.append(span.endless() if along else span)
         reach = max(reach, span.stop)
-    return tuple(kept)
+    return kept
 
 
 def _may_clad(span: Span, around: Surroundings, normal: NDArray[np.float64]) -> bool:
     """Whether the face that a ray meets first of an element is parallel to the wall, or upright."""
-    (vector,) = area_vectors(around.elements.triangles[[span.triangle]])
+    (vector,) = area_vectors(around.bodies.mesh.triangles[[span.triangle]])
     unit = vector / np.linalg.norm(vector)
     return bool(abs(unit @ normal) > PARALLEL or abs(unit[2]) < PLUMB)
-
-
-def _layered(met: list[int], leaves: NDArray[np.bool_]) -> dict[int, tuple[int, int]]:
-    """The first and last crossings of elements whose layers are bodies that touch.
-
-    Where one body ends and the next begins a ray meets one surface, not two: from entry to exit
-    their number is odd.
-    """
-    found = {}
-    for element in set(met):
-        own = [number for number, other in enumerate(met) if other == element]
-        if len(own) > 1 and len(own) % 2 == 1 and leaves[own[-1]] and not leaves[own[0]]:
-            found[element] = own[0], own[-1]
-    return found
 
 
 def _open_or_ground(
@@ -281,7 +296,7 @@ def _open_or_ground(
         normal[2] < -0.7 and point[2] < around.ground_level + DEEPEST_WALL
     ):
         return "ground"
-    return "outside" if is_open(point, normal, around.elements) else "unknown"
+    return "outside" if is_open(point, normal, around.bodies.mesh) else "unknown"
 
 
 def is_open(point: NDArray[np.float64], normal: NDArray[np.float64], building: RayMesh) -> bool:

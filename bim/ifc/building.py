@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from bim.bodies import Bodies
 from bim.boundaries import ElementRecord, Finishes, faces_and_windows, floor_area
 from bim.coarser import coarser
 from bim.defaults import CLEAR_GLAZING
@@ -166,9 +167,13 @@ def _surroundings(
 ) -> Surroundings:
     empty = [np.empty((0, 3, 3))]
     rooms = [triangles_of(record.solid.manifold)[0] for record in records]
+    counts = [len(shape.triangles) for shape in shapes]
     return Surroundings(
-        mesh,
-        np.repeat(np.arange(len(shapes)), [len(shape.triangles) for shape in shapes]),
+        Bodies(
+            mesh,
+            np.repeat(np.arange(len(shapes)), counts),
+            np.concatenate([np.empty(0, dtype=np.int64), *(shape.item for shape in shapes)]),
+        ),
         ray_mesh(np.concatenate(rooms or empty)),
         np.repeat(np.arange(len(rooms)), [len(room) for room in rooms]),
         tuple(record.solid.guid for record in records),

@@ -30,7 +30,7 @@ def bounding_elements(
     Args: shapes: in world axes; rotation: [3, 3] from model axes to the world.
     """
     reader = MaterialReader(model)
-    records = [_record(model.by_id(shape.step_id), reader, rotation) for shape in shapes]
+    records = [_record(model.by_id(shape.step_id), shape, reader, rotation) for shape in shapes]
     faults: dict[str, Problem] = {}
     values, gloss, hues = [], [], []
     for shape in shapes:
@@ -58,10 +58,13 @@ def bounding_elements(
 
 
 def _record(
-    element: ifcopenshell.entity_instance, reader: MaterialReader, rotation: NDArray[np.float64]
+    element: ifcopenshell.entity_instance,
+    shape: Shape,
+    reader: MaterialReader,
+    rotation: NDArray[np.float64],
 ) -> ElementRecord:
     layers = reader.layers_of(element)
-    material, stated = None, True
+    of_items, known = reader.of_items(element, np.unique(shape.item).tolist())
     if layers is None:
         material, stated = reader.layer(reader.single_material(element), 1.0)
     else:
@@ -75,7 +78,8 @@ def _record(
         () if layers is None else layers.layers,
         None if layers is None or layers.axis is None else rotation @ layers.axis,
         element.is_a("IfcRoof") or predefined == "ROOF",
-        stated,
+        stated and known,
+        of_items,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import ifcopenshell
@@ -48,6 +49,7 @@ class MaterialReader:
     model: ifcopenshell.file
     problems: dict[str, Problem] = field(default_factory=dict)
     scale: float = 1.0
+    _aspects: dict[int, str] = field(default_factory=dict)  # names of representation items' aspects
     _properties: dict[int, dict[str, float]] = field(default_factory=dict)
     _optical: dict[int, dict[str, float]] = field(default_factory=dict)
 
@@ -63,6 +65,12 @@ class MaterialReader:
             with contextlib.suppress(RuntimeError):  # not in this schema
                 for one in self.model.by_type(kind):
                     self._gather(one)
+
+        for aspect in self.model.by_type("IfcShapeAspect"):
+            with contextlib.suppress(Exception):  # damaged representations
+                for representation in aspect.ShapeRepresentations:
+                    for item in representation.Items:
+                        self._aspects.setdefault(item.id(), aspect.Name or "")
 
     def _gather(self, one: ifcopenshell.entity_instance) -> None:
         """Add the numbers of one property set of a material."""
@@ -130,6 +138,30 @@ class MaterialReader:
             for material in ifcopenshell.util.element.get_materials(element):
                 return material
         return None
+
+    def of_items(
+        self, element: ifcopenshell.entity_instance, items: Iterable[int]
+    ) -> tuple[dict[int, MaterialLayer], bool]:
+        """Materials of unit thickness of an element's bodies, and whether the file states them all.
+
+        IFC4 writes walls as a body for each layer, a set of constituents for their materials, and
+        shape aspects of the constituents' names that the bodies belong to (IfcShapeAspect).
+
+        Args: items: STEP ids of the bodies.
+        """
+        material = None
+        with contextlib.suppress(Exception):  # damaged associations
+            material = ifcopenshell.util.element.get_material(element)
+        if material is None or not material.is_a("IfcMaterialConstituentSet"):
+            return {}, True
+        named = {one.Name: one.Material for one in material.MaterialConstituents or ()}
+        found, stated = {}, True
+        for item in items:
+            name = self._aspects.get(item)
+            if name and name in named:
+                found[item], known = self.layer(named[name], 1.0)
+                stated &= known
+        return found, stated
 
     def layer(self, material, thickness: float) -> tuple[MaterialLayer, bool]:
         """A layer of that material; missing or impossible values from the table by its name."""

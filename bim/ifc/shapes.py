@@ -61,6 +61,7 @@ class Shape:
     triangles: NDArray[np.float64]  # [N, 3, 3]
     looks: tuple[Look, ...]
     look: NDArray[np.int64]  # [N] index into looks, -1 where the file has no style
+    item: NDArray[np.int64]  # [N] STEP id of the representation item of each triangle
     is_painted: bool = False  # whether its reflectances come from the user's corrections
     is_unglazed: bool = False  # whether the user's corrections say that it has no glass
 
@@ -152,7 +153,11 @@ def _shape(element, styles: _Styles) -> Shape | None:
     if len(look) != len(faces):
         look = np.full(len(faces), -1)
     look = np.where(look < len(looks), look, -1)
-    return Shape(element.guid, element.id, element.type, element.name, vertices[faces], looks, look)
+    item = np.array(geometry.item_ids, dtype=np.int64)
+    item = item if len(item) == len(faces) else np.zeros(len(faces), dtype=np.int64)
+    return Shape(
+        element.guid, element.id, element.type, element.name, vertices[faces], looks, look, item
+    )
 
 
 class _Styles:

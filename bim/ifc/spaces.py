@@ -161,7 +161,7 @@ def _open_share(
     if not facets or not len(building.triangles):
         return 0.0
     weights = np.array([facet.polygon.area for facet in facets])
-    points = [sample_points(facet) for facet in facets]
+    points = [sample_points(facet)[0] for facet in facets]
     index = np.repeat(np.arange(len(facets)), [len(p) for p in points])
     normals = np.array([facet.plane.normal for facet in facets])[index]
     directions = normals if direction is None else np.tile(direction, (len(index), 1))

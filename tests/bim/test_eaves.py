@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bim.bodies import Bodies
 from bim.planes import planar_facets
 from bim.rays import ray_mesh
 from bim.rooms import Piece
@@ -26,7 +27,8 @@ def met_behind(normal: np.ndarray, *bodies: np.ndarray) -> tuple[list[int], str]
     """Elements behind a room's face of that normal, and what follows them."""
     room = body(*ROOM)
     around = Surroundings(
-        ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(bodies)), 12),
+        Bodies(ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(bodies)), 12),
+               np.zeros(12 * len(bodies), dtype=int)),
         ray_mesh(room), np.zeros(12, dtype=int), ("room",), -0.5,
     )  # fmt: skip
     (facet,) = (f for f in planar_facets(room) if f.plane.normal @ normal > 0.99)
@@ -63,10 +65,11 @@ def test_over_a_ceiling_the_slanting_roof_closes_the_attic():
 
 
 def test_an_upright_wall_that_runs_aslant_behind_another_is_its_layer():
-    """At 45 degrees the corner of a facade closes the wedge of air behind a panel."""
+    """At 30 degrees the corner of a facade closes the wedge of air behind a panel."""
     panel = body((-1.0, -0.1, -0.2), (5.0, 0.0, 4.0))
     facade = body((-6.0, -0.15, -0.2), (10.0, 0.15, 4.0))
-    turn = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, np.sqrt(2)]]) / np.sqrt(2)
-    facade = facade @ turn.T + np.array([2.0, -0.45, 0.0])
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    facade = (facade - [2.0, 0.0, 0.0]) @ turn.T + [2.0, -0.7, 0.0]
     elements, beyond = met_behind(SOUTH, panel, facade)
     assert (elements, beyond) == ([0, 1], "outside")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bim.bodies import Bodies
 from bim.planes import planar_facets
 from bim.rays import ray_mesh
 from bim.rooms import Piece
@@ -16,7 +17,8 @@ def between(begins: float, *bodies: np.ndarray) -> Beyond:
     """What a room has behind its southern face, where the next room begins so far behind it [m]."""
     own, other = body(*ROOM), body((0.0, -4.0, 0.0), (4.0, -begins, 2.7))
     around = Surroundings(
-        ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(bodies)), 12),
+        Bodies(ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(bodies)), 12),
+               np.zeros(12 * len(bodies), dtype=int)),
         ray_mesh(np.concatenate([own, other])), np.repeat([0, 1], 12), ("own", "other"), -0.5,
     )  # fmt: skip
     (facet,) = (f for f in planar_facets(own) if f.plane.normal @ SOUTH > 0.99)

@@ -1,0 +1,173 @@
+"""Which bodies a ray goes through, from where to where, as they are drawn in real files.
+
+Bodies that touch have two faces in one place, layers of one element too; some are drawn inside out
+and some lack a side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.enclosure import touching_parts
+from bim.planes import area_vectors
+from bim.rays import RayMesh
+from bim.shell import enclosed_volume
+
+SAME_PLACE = 1e-5  # faces nearer than this along a ray are in one place [m]
+OPEN = 1e-4  # share of a closed part's area that its faces may fail to cancel by
+THINNEST = 5e-4  # what a ray is in for less is grazed [m]
+
+Face = tuple[float, int, bool]  # distance along the ray [m], triangle, whether it leads into a body
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One body of an element that a ray goes through."""
+
+    item: int  # number of the body's representation item in the file
+    start: float  # [m]
+    stop: float  # infinite where the ray does not come out within its reach
+    triangle: int  # first triangle met, index into the mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """One element that a ray goes through, its bodies that touch as one."""
+
+    element: int
+    start: float  # [m]
+    stop: float  # infinite where the ray does not come out within its reach
+    triangle: int  # first triangle met, index into the mesh
+    parts: tuple[Part, ...]  # by where the ray enters them
+
+    def endless(self) -> Span:
+        """The same as one that the ray does not come out of."""
+        return replace(
+            self, stop=np.inf, parts=(*self.parts[:-1], replace(self.parts[-1], stop=np.inf))
+        )
+
+    def since(self, start: float) -> Span:
+        """What of it lies from a place on [m]."""
+        parts = (replace(p, start=max(p.start, start)) for p in self.parts if p.stop > start)
+        return replace(self, start=start, parts=tuple(parts))
+
+    def moved(self, by: float) -> Span:
+        """The same, all distances less by that [m]."""
+        parts = tuple(replace(p, start=p.start - by, stop=p.stop - by) for p in self.parts)
+        return replace(self, start=self.start - by, stop=self.stop - by, parts=parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """The triangles of many elements, those of one element in a row."""
+
+    mesh: RayMesh
+    element: NDArray[np.int64]  # [N] element of each triangle, rising
+    item: NDArray[np.int64]  # [N] representation item of each triangle
+    turned: dict[int, NDArray[np.bool_]] = field(default_factory=dict)  # of elements asked so far
+
+    def along(
+        self, origin: NDArray[np.float64], direction: NDArray[np.float64], reach: float
+    ) -> list[Span]:
+        """The elements that a ray is in within its reach [m], by where it enters them.
+
+        Where a side of a body is not drawn, it begins or ends where its triangles do, if that is
+        within reach.
+        """
+        distance, hit = self.mesh.all_hits(origin, direction, reach)
+        into = area_vectors(self.mesh.triangles[hit]) @ direction < 0
+        spans: list[Span] = []
+        for number in np.unique(self.element[hit]).tolist():
+            parts: list[Part] = []
+            for item in np.unique(self.item[hit[self.element[hit] == number]]).tolist():
+                own = (self.element[hit] == number) & (self.item[hit] == item)
+                faces = _faces(distance[own], hit[own], into[own])
+                if _depths(faces)[0] > 0:  # the ray begins inside, or the body is inside out
+                    turned = into[own] ^ self._is_turned(number, hit[own])
+                    faces = _faces(distance[own], hit[own], turned)
+                parts += self._parts(number, item, faces, origin, direction, reach=reach)
+            spans += _joined(number, parts)
+        return sorted(spans, key=lambda span: (span.start, span.stop))
+
+    def _parts(
+        self,
+        number: int,
+        item: int,
+        faces: Sequence[Face],
+        origin: NDArray[np.float64],
+        direction: NDArray[np.float64],
+        *,
+        reach: float,
+    ) -> Iterator[Part]:
+        """Where a ray is in one body, or in bodies that are one item of the file."""
+        depths = _depths(faces)
+        first, start, far = faces[0][1], 0.0, np.inf
+        if depths[0] > 0 or depths[-1] > 0:
+            first_row, last_row = self._rows(number)
+            own = self.item[first_row:last_row] == item
+            corners = self.mesh.triangles[first_row:last_row][own].reshape(-1, 3)
+            along = (corners - origin) @ direction
+            start, far = max(start, float(along.min())), float(along.max())
+        for before, after, (distance, triangle, _) in zip(depths, depths[1:], faces, strict=False):
+            if before == 0:
+                first, start = triangle, distance
+            elif after == 0 and distance - start > THINNEST:
+                yield Part(item, start, distance, first)
+        if depths[-1] > 0:
+            yield Part(item, start, far if far <= reach else np.inf, first)
+
+    def _rows(self, number: int) -> tuple[int, int]:
+        """The first of an element's triangles, and the first of the next's."""
+        first, last = np.searchsorted(self.element, [number, number + 1]).tolist()
+        return first, last
+
+    def _is_turned(self, number: int, triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether triangles of an element belong to a closed body that is drawn inside out."""
+        first, last = self._rows(number)
+        if number not in self.turned:
+            self.turned[number] = _inside_out(self.mesh.triangles[first:last])
+        return self.turned[number][triangles - first]
+
+
+def _joined(number: int, parts: list[Part]) -> list[Span]:
+    """An element's bodies along a ray as one where they touch."""
+    spans: list[Span] = []
+    for part in sorted(parts, key=lambda part: (part.start, part.stop)):
+        if spans and part.start - spans[-1].stop <= SAME_PLACE:
+            before = spans.pop()
+            stop, with_it = max(before.stop, part.stop), (*before.parts, part)
+            spans.append(replace(before, stop=stop, parts=with_it))
+        else:
+            spans.append(Span(number, part.start, part.stop, part.triangle, (part,)))
+    return spans
+
+
+def _faces(
+    distance: NDArray[np.float64], hit: NDArray[np.int64], into: NDArray[np.bool_]
+) -> list[Face]:
+    """Faces of one element along a ray, those in one place once each way, the way in first."""
+    place = np.cumsum(np.diff(distance, prepend=distance[0]) > SAME_PLACE)
+    _, once = np.unique(2 * place + ~into, return_index=True)
+    return [(float(distance[i]), int(hit[i]), bool(into[i])) for i in once]
+
+
+def _depths(faces: Sequence[Face]) -> list[int]:
+    """In how many bodies of an element a ray is, before the first face and after each."""
+    steps = np.cumsum([0, *(1 if into else -1 for _, _, into in faces)])
+    return (steps - min(steps.min(), 0)).tolist()
+
+
+def _inside_out(triangles: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether each triangle [N, 3, 3] is of a closed part whose normals point into it [N]."""
+    turned = np.zeros(len(triangles), dtype=bool)
+    part = touching_parts(triangles)
+    for number in range(part.max(initial=-1) + 1):
+        own = triangles[part == number]
+        gap = np.linalg.norm(area_vectors(own).sum(axis=0))
+        is_closed = gap < OPEN * np.linalg.norm(area_vectors(own), axis=1).sum()
+        turned[part == number] = is_closed and enclosed_volume(own) < 0
+    return turned
