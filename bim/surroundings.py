@@ -149,10 +149,9 @@ def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
     first = _most(twice or firsts, areas)
     agreeing = {i: chain for i, chain in chains.items() if chain[:1] == first}
     most = _most(agreeing, np.ones(len(points)))
-    # those that come out, if any do: the others meet the end of what stands against the wall
     whole = [i for i, chain in chains.items() if chain == most]
-    whole = [i for i in whole if np.isfinite(walks[i].stop)] or whole
-    spans, room = walks[whole[0]].spans, walks[whole[0]].room
+    spans = walks[whole[0]].spans
+    room = _most({i: walks[i].room for i in whole}, areas)
     if piece.role == "reveal":
         return Beyond(spans[:1], "adiabatic")
     if piece.neighbour is not None:
@@ -227,13 +226,13 @@ def _at_the_face(
     """What begins, ends or goes on where a ray leaves the room, and before the next one [m].
 
     Rooms are drawn to the middles of walls, to the slab under the flooring or through their ceiling
-    up to its top: all of that belongs to the wall, also where the next room begins at the face
-    already.  What stands deeper in the room does not, but for its part beyond the face.
+    up to its top: all of that belongs to the wall.  What stands deeper in the room does not, but
+    for its part beyond the face.
     """
     found: list[Span] = []
     for span in bodies.along(point - back * normal, normal, back + 2 * DEEPEST_WALL):
         span = span.moved(back)
-        if span.stop <= -TOUCHING or span.start >= max(limit - TOUCHING, TOUCHING):
+        if span.stop <= -TOUCHING or span.start >= limit - TOUCHING:
             continue
         if span.start <= -back:
             if span.stop <= TOUCHING:

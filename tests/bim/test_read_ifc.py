@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import ifcopenshell.guid
 import numpy as np
 import pytest
 
@@ -69,6 +70,37 @@ def test_a_wall_whose_layers_are_bodies_that_touch_ends_outdoors(tmp_path, ends)
     (space,) = read(tmp_path, small.model).spaces
     north = next(face for face in space.faces if face.normal[1] > 0.9 and face.kind == "wall")
     assert north.adjacency == "outside" and north.element == walls["north"].GlobalId
+
+
+@pytest.mark.parametrize("schema", ["IFC4", "IFC4X3"])
+def test_a_wall_of_a_body_for_each_layer_has_the_material_of_each(tmp_path, schema):
+    """A set of constituents; shape aspects of their names say which body is of which."""
+    small, walls = box_model(schema)
+    (x, y, z), (width, depth, height) = WALLS["north"]
+    ends = {"brick": 0.1, "mineral wool": 0.22, "gypsum board": depth}
+    at = [0.0, *ends.values()]
+    layers = [((x, y + depth - b, z), (width, b - a, height), None) for a, b in pairwise(at)]
+    small.show(walls["north"], layers)
+    create = small.model.create_entity
+    (body,) = walls["north"].Representation.Representations
+    constituents = []
+    for name, item in zip(ends, body.Items, strict=True):
+        shown = create("IfcShapeRepresentation", small.body, "Body", "SweptSolid", [item])
+        create("IfcShapeAspect", [shown], name, None, None, walls["north"].Representation)
+        constituents.append(create("IfcMaterialConstituent", name, None,
+                                   create("IfcMaterial", f"Default {name}")))  # fmt: skip
+    made = create("IfcMaterialConstituentSet", "north", None, constituents)
+    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(), None, None, None,
+           [walls["north"]], made)  # fmt: skip
+    (space,) = read(tmp_path, small.model).spaces
+    north = next(face for face in space.faces if face.normal[1] > 0.9 and face.kind == "wall")
+    named = [(layer.name, layer.thickness) for layer in north.construction.layers]
+    assert named == [("Default brick", pytest.approx(0.1)),
+                     ("Default mineral wool", pytest.approx(0.12)),
+                     ("Default gypsum board", pytest.approx(depth - 0.22))]  # fmt: skip
+    assert (
+        north.construction.layers[1].conductivity < 0.05 < north.construction.layers[0].conductivity
+    )
 
 
 def test_faces_know_what_lies_beyond_and_how_they_reflect(tmp_path):

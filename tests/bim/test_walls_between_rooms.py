@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 
 from bim.bodies import Bodies
-from bim.planes import planar_facets
+from bim.planes import Facet, planar_facets, plane_through
 from bim.rays import ray_mesh
 from bim.rooms import Piece
 from bim.surroundings import Beyond, Surroundings, what_lies_beyond
@@ -16,9 +17,10 @@ from tests.bim.test_eaves import ROOM, SOUTH, body
 def between(begins: float, *bodies: np.ndarray) -> Beyond:
     """What a room has behind its southern face, where the next room begins so far behind it [m]."""
     own, other = body(*ROOM), body((0.0, -4.0, 0.0), (4.0, -begins, 2.7))
+    counts = [len(one) for one in bodies]
     around = Surroundings(
-        Bodies(ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(bodies)), 12),
-               np.zeros(12 * len(bodies), dtype=int)),
+        Bodies(ray_mesh(np.concatenate(bodies)), np.repeat(np.arange(len(counts)), counts),
+               np.zeros(sum(counts), dtype=int)),
         ray_mesh(np.concatenate([own, other])), np.repeat([0, 1], 12), ("own", "other"), -0.5,
     )  # fmt: skip
     (facet,) = (f for f in planar_facets(own) if f.plane.normal @ SOUTH > 0.99)
@@ -49,3 +51,85 @@ def test_what_stands_in_the_next_room_is_none_of_the_wall():
 def test_a_wall_that_the_ray_runs_along_has_no_end():
     found = between(0.3, body((-1.0, -9.0, -0.2), (5.0, 0.0, 4.0)))
     assert [span.stop for span in found.spans] == [np.inf]
+
+
+def test_a_wall_in_one_of_two_rooms_that_touch_is_between_them():
+    """Both faces lie at the same side of it: one room is drawn through the wall."""
+    beyond = between(0.0, body((-1.0, -0.2, -0.2), (5.0, 0.0, 4.0)))
+    within = between(0.0, body((-1.0, 0.0, -0.2), (5.0, 0.2, 4.0)))
+    assert [(s.start, s.stop) for s in beyond.spans] == [pytest.approx((0.0, 0.2), abs=1e-9)]
+    assert [(s.start, s.stop) for s in within.spans] == [pytest.approx((-0.2, 0.0), abs=1e-9)]
+
+
+def test_a_room_that_is_drawn_to_the_middle_of_its_wall_has_all_of_it():
+    (span,) = between(0.0, body((-1.0, -0.15, -0.2), (5.0, 0.15, 4.0))).spans
+    assert (span.start, span.stop) == pytest.approx((-0.15, 0.15), abs=1e-9)
+
+
+def test_a_stair_along_a_wall_is_none_of_it():
+    wall, stair = body((-1.0, -0.3, -0.2), (5.0, 0.0, 4.0)), body((1.0, 0.0, 0.0), (2.1, 0.1, 2.7))
+    assert [span.element for span in between(0.5, wall, stair).spans] == [0]
+
+
+def test_what_covers_the_whole_wall_in_the_room_is_its_first_layer():
+    wall, panel = body((-1.0, -0.3, -0.2), (5.0, 0.0, 4.0)), body((0.0, 0.0, 0.0), (4.0, 0.02, 2.7))
+    assert [span.element for span in between(0.5, wall, panel).spans] == [1, 0]
+
+
+def test_a_wall_that_stands_against_another_is_no_layer_of_it():
+    """Where it meets the wall the ray runs along it; elsewhere the open air follows."""
+    wall = body((-1.0, -0.3, -0.2), (5.0, 0.0, 4.0))
+    against = body((1.9, -9.0, -0.2), (2.1, -0.3, 4.0))
+    found = between(60.0, wall, against)
+    assert ([span.element for span in found.spans], found.adjacency) == ([0], "outside")
+    behind_all = between(60.0, wall, body((-1.0, -9.0, -0.2), (5.0, -0.3, 4.0)))
+    assert ([s.element for s in behind_all.spans], behind_all.adjacency) == ([0], "adiabatic")
+
+
+def test_layers_of_two_elements_that_touch_are_both_met():
+    first, second = (
+        body((-1.0, -0.1, -0.2), (5.0, 0.0, 4.0)),
+        body((-1.0, -0.3, -0.2), (5.0, -0.1, 4.0)),
+    )
+    for bodies in ((first, second), (second, first)):
+        spans = between(0.3, *bodies).spans
+        assert [(s.start, s.stop) for s in spans] == [
+            pytest.approx((0.0, 0.1)),
+            pytest.approx((0.1, 0.3)),
+        ]
+
+
+def behind(outline: shapely.Polygon, wall: np.ndarray) -> Beyond:
+    """What lies behind a face of that outline to the south, of a room without bodies."""
+    none = np.zeros(0, dtype=int)
+    around = Surroundings(
+        Bodies(ray_mesh(wall), np.zeros(12, dtype=int), np.zeros(12, dtype=int)),
+        ray_mesh(np.empty((0, 3, 3))), none, (), -0.5,
+    )  # fmt: skip
+    facet = Facet(plane_through(np.zeros(3), SOUTH), outline)
+    return what_lies_beyond(Piece(facet, "room"), around, own=0)
+
+
+def test_two_samples_on_a_wall_outweigh_a_bigger_hole_and_one_does_not():
+    outline = shapely.Polygon([(0, 0), (4, 0), (4, 1), (0.5, 1), (0.5, 3), (0, 3)])
+    assert behind(outline, body((-9.0, -0.3, 1.1), (9.0, 0.0, 4.0))).spans
+    assert not behind(outline, body((-9.0, -0.3, 2.1), (9.0, 0.0, 4.0))).spans
+
+
+def test_a_ceiling_far_above_a_room_is_its_ceiling_and_a_wall_far_off_is_not():
+    room = body(*ROOM)
+    up, south = np.array([0.0, 0.0, 1.0]), SOUTH
+    for normal, far in (
+        (up, body((-1.0, -1.0, 3.9), (5.0, 6.0, 4.1))),
+        (south, body((-1.0, -1.4, -1.0), (5.0, -1.2, 5.0))),
+    ):
+        around = Surroundings(
+            Bodies(ray_mesh(far), np.zeros(12, dtype=int), np.zeros(12, dtype=int)),
+            ray_mesh(room),
+            np.zeros(12, dtype=int),
+            ("own",),
+            -0.5,
+        )
+        (facet,) = (f for f in planar_facets(room) if f.plane.normal @ normal > 0.99)
+        found = what_lies_beyond(Piece(facet, "room"), around, own=0)
+        assert len(found.spans) == (normal is up)
