@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bim.boundaries import ElementRecord, Finishes
 from bim.colours import GREY
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE, SITE_REFLECTANCE
-from bim.ifc.materials import MaterialReader
+from bim.ifc.materials import MaterialReader, materials_of
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
 from bim.model import Element, Problem
@@ -148,9 +148,4 @@ def cad_layers_of(entity: ifcopenshell.entity_instance) -> list[str]:
 
 def material_name(entity: ifcopenshell.entity_instance) -> str:
     """Name of an element's first material."""
-    with contextlib.suppress(Exception):  # damaged associations
-        import ifcopenshell.util.element as util
-
-        for material in util.get_materials(entity):
-            return material.Name or ""
-    return ""
+    return next((material.Name or "" for material in materials_of(entity)), "")

@@ -50,6 +50,7 @@ class MaterialReader:
     problems: dict[str, Problem] = field(default_factory=dict)
     scale: float = 1.0
     _aspects: dict[int, str] = field(default_factory=dict)  # names of representation items' aspects
+    _contradicting: int = 0  # bodies whose aspect and style name two materials
     _properties: dict[int, dict[str, float]] = field(default_factory=dict)
     _optical: dict[int, dict[str, float]] = field(default_factory=dict)
 
@@ -100,17 +101,16 @@ class MaterialReader:
 
         Pset_MaterialOptical (IFC4), IfcOpticalMaterialProperties (IFC2X3); the front value.
         """
-        with contextlib.suppress(Exception):  # damaged associations
-            for material in ifcopenshell.util.element.get_materials(element):
-                given = self._optical.get(material.id(), {})
-                if "visible" in given or "solar" in given:
-                    visible = given.get("visible", given.get("solar"))
-                    return visible, given.get("solar", visible)
+        for material in materials_of(element):
+            given = self._optical.get(material.id(), {})
+            if "visible" in given or "solar" in given:
+                visible = given.get("visible", given.get("solar"))
+                return visible, given.get("solar", visible)
         return None
 
     def layers_of(self, element: ifcopenshell.entity_instance) -> ElementLayers | None:
         """The element's layers, or None where it has no layer set or only one plain material."""
-        material = None
+        material, element = None, _with_material(element)
         with contextlib.suppress(Exception):  # damaged associations
             material = ifcopenshell.util.element.get_material(element, should_skip_usage=False)
         if material is None:
@@ -134,34 +134,60 @@ class MaterialReader:
 
     def single_material(self, element: ifcopenshell.entity_instance):
         """The material of an element without layers: the first one it names, or None."""
-        with contextlib.suppress(Exception):  # damaged associations
-            for material in ifcopenshell.util.element.get_materials(element):
-                return material
-        return None
+        return next(iter(materials_of(element)), None)
 
     def of_items(
         self, element: ifcopenshell.entity_instance, items: Iterable[int]
     ) -> tuple[dict[int, MaterialLayer], bool]:
         """Materials of unit thickness of an element's bodies, and whether the file states them all.
 
-        IFC4 writes walls as a body for each layer, a set of constituents for their materials, and
-        shape aspects of the constituents' names that the bodies belong to (IfcShapeAspect).
+        Files without layer sets draw a wall as a body for each layer, and name their materials as
+        a list or as constituents.  A body is of the material that its surface style has the name
+        of, else of the constituent that its shape aspect has the name of (IfcShapeAspect).  Where
+        the two differ the thickness has borne out the style: Revit 2020 gives aspects of turned
+        walls in the order of the type's layers.
 
         Args: items: STEP ids of the bodies.
         """
+        constituents = self._constituents(element)
+        named = {one.Name: one for one in constituents.values()}
+        found, stated = {}, True
+        for item in items if len(named) > 1 else ():
+            styles = self._style_names(item) & set(named)
+            of_aspect = constituents.get(self._aspects.get(item, ""))
+            material = named[styles.pop()] if len(styles) == 1 else of_aspect
+            if material is None:
+                continue
+            self._contradicting += of_aspect is not None and of_aspect.Name != material.Name
+            found[item], known = self.layer(material, 1.0)
+            stated &= known
+        if self._contradicting:
+            what = f"{self._contradicting} body(ies): shape aspect and style name two materials"
+            self.problems["shape aspects"] = Problem("", what, "that of the style is taken")
+        return found, stated
+
+    def _constituents(self, element: ifcopenshell.entity_instance) -> dict:
+        """Materials of an element without layers, by the names of constituents or their own."""
         material = None
         with contextlib.suppress(Exception):  # damaged associations
-            material = ifcopenshell.util.element.get_material(element)
-        if material is None or not material.is_a("IfcMaterialConstituentSet"):
-            return {}, True
-        named = {one.Name: one.Material for one in material.MaterialConstituents or ()}
-        found, stated = {}, True
-        for item in items:
-            name = self._aspects.get(item)
-            if name and name in named:
-                found[item], known = self.layer(named[name], 1.0)
-                stated &= known
-        return found, stated
+            material = ifcopenshell.util.element.get_material(_with_material(element))
+        if material is not None and material.is_a("IfcMaterialConstituentSet"):
+            parts = material.MaterialConstituents or ()
+            return {one.Name: one.Material for one in parts if one.Material is not None}
+        if material is not None and material.is_a("IfcMaterialList"):
+            return {one.Name: one for one in material.Materials or ()}
+        return {}
+
+    def _style_names(self, item: int) -> set[str]:
+        """Names of the surface styles of a representation item."""
+        names: set[str] = set()
+        with contextlib.suppress(Exception):  # not in the file, damaged styles
+            for styled in self.model.by_id(item).StyledByItem:
+                for style in styled.Styles:
+                    is_many = style.is_a("IfcPresentationStyleAssignment")
+                    kept = style.Styles if is_many else [style]
+                    names |= {one.Name for one in kept if one.Name}
+        return names
 
     def layer(self, material, thickness: float) -> tuple[MaterialLayer, bool]:
         """A layer of that material; missing or impossible values from the table by its name."""
@@ -185,6 +211,27 @@ class MaterialReader:
             )
             values = {k: values.get(k, getattr(default, k)) for k in NAMES}
         return MaterialLayer(name, thickness, **values), not missing
+
+
+def materials_of(element: ifcopenshell.entity_instance) -> list[ifcopenshell.entity_instance]:
+    """The materials of an element, its own or those of the whole that it is a part of."""
+    with contextlib.suppress(Exception):  # damaged associations
+        return list(ifcopenshell.util.element.get_materials(_with_material(element)))
+    return []
+
+
+def _with_material(element: ifcopenshell.entity_instance) -> ifcopenshell.entity_instance:
+    """The element, or where it has no material the whole that it is a part of and that has one.
+
+    A roof's material is the roof's, its body that of its slabs (IfcRelAggregates).
+    """
+    whole = element
+    with contextlib.suppress(Exception):  # damaged associations and aggregates
+        while whole is not None and whole.is_a("IfcElement"):
+            if ifcopenshell.util.element.get_material(whole) is not None:
+                return whole
+            whole = ifcopenshell.util.element.get_aggregate(whole)
+    return element
 
 
 def _is_physical(name: str, value: float) -> bool:

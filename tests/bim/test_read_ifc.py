@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import ifcopenshell.api.aggregate
+import ifcopenshell.api.root
 import ifcopenshell.guid
 import numpy as np
 import pytest
@@ -18,8 +20,10 @@ from tests.bim.small_ifc import (
     GLASS_Y,
     HEIGHT,
     OPENING,
+    WALL,
     WALLS,
     WIDTH,
+    add_material,
     box_model,
     box_room,
 )
@@ -72,35 +76,61 @@ def test_a_wall_whose_layers_are_bodies_that_touch_ends_outdoors(tmp_path, ends)
     assert north.adjacency == "outside" and north.element == walls["north"].GlobalId
 
 
-@pytest.mark.parametrize("schema", ["IFC4", "IFC4X3"])
-def test_a_wall_of_a_body_for_each_layer_has_the_material_of_each(tmp_path, schema):
-    """A set of constituents; shape aspects of their names say which body is of which."""
+@pytest.mark.parametrize(
+    ("schema", "named_by"),
+    [("IFC4", "aspects"), ("IFC4X3", "aspects"), ("IFC4", "styles"),
+     ("IFC4", "contradicting aspects"), ("IFC4", "list"), ("IFC2X3", "list")],
+)  # fmt: skip
+def test_a_wall_of_a_body_for_each_layer_has_the_material_of_each(tmp_path, schema, named_by):
+    """Constituents or a list of materials; aspects or styles say which body is of which."""
     small, walls = box_model(schema)
     (x, y, z), (width, depth, height) = WALLS["north"]
-    ends = {"brick": 0.1, "mineral wool": 0.22, "gypsum board": depth}
-    at = [0.0, *ends.values()]
-    layers = [((x, y + depth - b, z), (width, b - a, height), None) for a, b in pairwise(at)]
+    ends = {"Default brick": 0.1, "Default mineral wool": 0.22, "Default gypsum board": depth}
+    named = dict.fromkeys(ends)
+    if named_by != "aspects":
+        named = {name: small.style(name, 0.5) for name in ends}
+    at = pairwise([0.0, *ends.values()])
+    layers = [((x, y + depth - b, z), (width, b - a, height), named[name])
+              for name, (a, b) in zip(ends, at, strict=True)]  # fmt: skip
     small.show(walls["north"], layers)
     create = small.model.create_entity
     (body,) = walls["north"].Representation.Representations
-    constituents = []
-    for name, item in zip(ends, body.Items, strict=True):
-        shown = create("IfcShapeRepresentation", small.body, "Body", "SweptSolid", [item])
-        create("IfcShapeAspect", [shown], name, None, None, walls["north"].Representation)
-        constituents.append(create("IfcMaterialConstituent", name, None,
-                                   create("IfcMaterial", f"Default {name}")))  # fmt: skip
-    made = create("IfcMaterialConstituentSet", "north", None, constituents)
-    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(), None, None, None,
-           [walls["north"]], made)  # fmt: skip
-    (space,) = read(tmp_path, small.model).spaces
+    materials = [create("IfcMaterial", name) for name in ends]
+    if named_by == "list":
+        made = create("IfcMaterialList", materials)
+    else:
+        parts = [create("IfcMaterialConstituent", m.Name, None, m) for m in materials]
+        made = create("IfcMaterialConstituentSet", "north", None, parts)
+    if "aspects" in named_by:
+        order = [*ends] if named_by == "aspects" else [*ends][::-1]
+        for name, item in zip(order, body.Items, strict=True):
+            shown = create("IfcShapeRepresentation", small.body, "Body", "SweptSolid", [item])
+            create("IfcShapeAspect", [shown], name, None, None, walls["north"].Representation)
+    create("IfcRelAssociatesMaterial", ifcopenshell.guid.new(),
+           walls["north"].OwnerHistory, RelatedObjects=[walls["north"]],
+           RelatingMaterial=made)  # fmt: skip
+    building = read(tmp_path, small.model)
+    (space,) = building.spaces
     north = next(face for face in space.faces if face.normal[1] > 0.9 and face.kind == "wall")
-    named = [(layer.name, layer.thickness) for layer in north.construction.layers]
-    assert named == [("Default brick", pytest.approx(0.1)),
-                     ("Default mineral wool", pytest.approx(0.12)),
-                     ("Default gypsum board", pytest.approx(depth - 0.22))]  # fmt: skip
-    assert (
-        north.construction.layers[1].conductivity < 0.05 < north.construction.layers[0].conductivity
-    )
+    layers = north.construction.layers
+    assert [layer.name for layer in layers] == [*ends]
+    assert [layer.thickness for layer in layers] == pytest.approx([0.1, 0.12, depth - 0.22])
+    assert layers[1].conductivity < 0.05 < layers[0].conductivity
+    contradiction = "shape aspect and style name two materials" in texts(building)
+    assert contradiction == (named_by == "contradicting aspects")
+
+
+@pytest.mark.parametrize("schema", ["IFC2X3", "IFC4"])
+def test_a_roof_whose_body_is_a_slabs_has_the_roofs_layers(tmp_path, schema):
+    """Revit gives the layers to the roof, and its body to a slab that the roof is made of."""
+    small, _ = box_model(schema, roof=False)
+    slab = small.box("IfcSlab", "top", (-WALL, -WALL, HEIGHT), (WIDTH + 2 * WALL, 6.6, 0.2))
+    roof = ifcopenshell.api.root.create_entity(small.model, ifc_class="IfcRoof", name="roof")
+    ifcopenshell.api.aggregate.assign_object(small.model, products=[slab], relating_object=roof)
+    add_material(small.model, roof, "Default mineral wool")
+    (space,) = read(tmp_path, small.model).spaces
+    (top,) = (face for face in space.faces if face.kind == "roof")
+    assert [layer.name for layer in top.construction.layers] == ["Default mineral wool"]
 
 
 def test_faces_know_what_lies_beyond_and_how_they_reflect(tmp_path):
