@@ -160,7 +160,9 @@ def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
         return Beyond(spans, "outside")
     if room >= 0:
         return Beyond(spans, "space", around.guids[room])
-    met = {i: _adjacency(points[i], walks[i], normal, around) for i in whole}
+    # where another wall or a stair stands against this one the ray says nothing of the rest
+    free = [i for i in whole if np.isfinite(walks[i].stop)] or whole
+    met = {i: _adjacency(points[i], walks[i], normal, around) for i in free}
     return Beyond(spans, _most(met, areas))
 
 

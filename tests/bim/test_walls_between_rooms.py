@@ -86,6 +86,12 @@ def test_a_wall_that_stands_against_another_is_no_layer_of_it():
     assert ([s.element for s in behind_all.spans], behind_all.adjacency) == ([0], "adiabatic")
 
 
+def test_where_a_stair_stands_against_most_of_a_wall_the_rest_says_what_follows():
+    wall = body((-1.0, -0.3, -0.2), (5.0, 0.0, 4.0))
+    stair = body((1.0, -9.0, -0.2), (2.2, -0.3, 4.0))
+    assert between(60.0, wall, stair).adjacency == "outside"
+
+
 def test_layers_of_two_elements_that_touch_are_both_met():
     first, second = (
         body((-1.0, -0.1, -0.2), (5.0, 0.0, 4.0)),

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bim.building_file import read_building_file
 from bim.model import Building
@@ -25,7 +26,10 @@ APART = ("reveal", "window frame")
 
 def too_thick(building: Building) -> tuple[float, Counter[str]]:
     """Area of the rooms' faces whose element is drawn [m2], and of those too thick, by kind."""
-    corners = {element.guid: element.triangles.reshape(-1, 3) for element in building.elements}
+    parts: dict[str, list[NDArray[np.float64]]] = {}
+    for element in building.elements:  # one for each of its styles
+        parts.setdefault(element.guid, []).append(element.triangles.reshape(-1, 3))
+    corners = {guid: np.concatenate(own) for guid, own in parts.items()}
     total, found = 0.0, Counter[str]()
     for face in (face for space in building.spaces for face in space.faces):
         made = face.construction
