@@ -162,7 +162,7 @@ class MaterialReader:
             found[item], known = self.layer(material, 1.0)
             stated &= known
         if self._contradicting:
-            what = f"{self._contradicting} body(ies): shape aspect and style name two materials"
+            what = f"{self._contradicting} bodies: shape aspect and style name two materials"
             self.problems["shape aspects"] = Problem("", what, "that of the style is taken")
         return found, stated
 
