@@ -125,12 +125,16 @@ class Bodies:
         first, last = np.searchsorted(self.element, [number, number + 1]).tolist()
         return first, last
 
-    def _is_turned(self, number: int, triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _is_turned(self, number: int, hit: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether triangles of an element belong to a closed body that is drawn inside out."""
         first, last = self._rows(number)
         if number not in self.turned:
-            self.turned[number] = _inside_out(self.mesh.triangles[first:last])
-        return self.turned[number][triangles - first]
+            triangles, items = self.mesh.triangles[first:last], self.item[first:last]
+            turned = np.zeros(last - first, dtype=bool)
+            for item in np.unique(items):  # bodies that touch share corners
+                turned[items == item] = _inside_out(triangles[items == item])
+            self.turned[number] = turned
+        return self.turned[number][hit - first]
 
 
 def _joined(number: int, parts: list[Part]) -> list[Span]:

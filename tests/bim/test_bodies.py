@@ -66,6 +66,29 @@ def test_bodies_within_each_other_are_one(parts):
     assert met(both) == met([np.concatenate(both)]) == [(0, 0.0, 0.3)]
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_any_boxes_are_the_union_of_their_intervals(seed):
+    """Of three elements, items and bodies without order, some inside out, some of equal faces."""
+    rng = np.random.default_rng(seed)
+    elements, expected = [], []
+    for number in range(3):
+        ends = np.sort(rng.integers(0, 30, (rng.integers(1, 6), 2)) / 10, axis=1)
+        ends[:, 1] += 0.1
+        parts = [plate(*end) for end in ends]
+        elements.append([part[:, ::-1] if rng.random() < 0.3 else part for part in parts])
+        joined: list[list[float]] = []
+        for begin, end in sorted(ends.tolist()):
+            if joined and begin <= joined[-1][1] + 1e-9:
+                joined[-1][1] = max(joined[-1][1], end)
+            else:
+                joined.append([begin, end])
+        expected += [(number, begin, end) for begin, end in joined]
+    found = met(*elements, reach=9.0)
+    assert [e for e, _, _ in sorted(found)] == [e for e, _, _ in expected]
+    assert np.array([f[1:] for f in sorted(found)]) == pytest.approx(
+        np.array([e[1:] for e in expected]))  # fmt: skip
+
+
 def test_a_body_drawn_inside_out_is_where_it_is():
     turned = plate(0.0, 0.3)[:, ::-1]
     assert met([turned]) == [(0, 0.0, 0.3)]
