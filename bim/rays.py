@@ -90,43 +90,35 @@ def ray_mesh(triangles: NDArray[np.float64]) -> RayMesh:
 
 @compiled()
 def _first_hits(origins, directions, reach, triangles, leaves, boxes):
-    """Walk the tree for each ray."""
+    """The first hit of each ray."""
     count = len(origins)
     distance = np.full(count, np.inf)
     hit = np.full(count, -1, dtype=np.int64)
     stack = np.empty(DEEPEST, dtype=np.int64)
-    inner = len(boxes) - len(leaves)
     for r in range(count):
-        o, d = origins[r], directions[r]
-        best = reach
-        top = 0
-        stack[0] = 0
-        while top >= 0:
-            node = stack[top]
-            top -= 1
-            if not _meets(o, d, boxes[node], best):
-                continue
-            if node < inner:
-                stack[top + 1] = 2 * node + 2
-                stack[top + 2] = 2 * node + 1
-                top += 2
-                continue
-            for k in leaves[node - inner]:
-                t = _distance(o, d, triangles[k])
-                if t < best:
-                    best = t
-                    distance[r] = t
-                    hit[r] = k
+        _hits(
+            origins[r], directions[r], reach, True, distance[r : r + 1], hit[r : r + 1], stack,
+            triangles, leaves, boxes,
+        )  # fmt: skip
     return distance, hit
 
 
 @compiled()
 def _all_hits(o, d, reach, triangles, leaves, boxes):
-    """Walk the tree for one ray; the hits in no order."""
-    distance, hit = np.empty(32), np.empty(32, dtype=np.int64)
-    stack = np.empty(DEEPEST, dtype=np.int64)
-    inner = len(boxes) - len(leaves)
+    """All hits of one ray, in no order."""
+    stack, room, found = np.empty(DEEPEST, dtype=np.int64), 16, 17
+    while found > room:
+        room *= 2
+        distance, hit = np.empty(room), np.empty(room, dtype=np.int64)
+        found = _hits(o, d, reach, False, distance, hit, stack, triangles, leaves, boxes)
+    return distance[:found], hit[:found]
+
+
+@compiled()
+def _hits(o, d, reach, first, distance, hit, stack, triangles, leaves, boxes):
+    """Walk the tree for one ray; how many hits there are, as many of them stored as find room."""
     found = top = 0
+    inner = len(boxes) - len(leaves)
     stack[0] = 0
     while top >= 0:
         node = stack[top]
@@ -140,13 +132,14 @@ def _all_hits(o, d, reach, triangles, leaves, boxes):
             continue
         for k in leaves[node - inner]:
             t = _distance(o, d, triangles[k])
-            if t > reach or t == np.inf:
+            if t == np.inf or (t >= reach if first else t > reach):
                 continue
-            if found == len(hit):
-                distance, hit = np.append(distance, distance), np.append(hit, hit)
-            distance[found], hit[found] = t, k
+            if first:
+                reach, found = t, 0
+            if found < len(hit):
+                distance[found], hit[found] = t, k
             found += 1
-    return distance[:found], hit[:found]
+    return found
 
 
 @compiled()
