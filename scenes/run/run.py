@@ -204,6 +204,7 @@ def _coupled(
     tables = OperationTables() if inputs.operation is None else inputs.operation.tables
     step_s = options.room.heat_step_s
     years, said = coupled_years(rooms, inputs.weather, step_s, tables, progress, store=store)
+    variants.return_memory()
     return years, (said,) if len(years) > 1 else ()
 
 
