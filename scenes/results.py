@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -186,7 +187,7 @@ class RunResult:
     building: Building
     times: pd.DatetimeIndex  # [H] middle of each interval, local standard time
     sun: NDArray[np.float64]  # [H, 3] direction to the sun
-    spaces: tuple[RoomYear, ...]
+    spaces: Sequence[RoomYear]
     problems: tuple[Problem, ...]
     manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know

@@ -19,7 +19,7 @@ RANKS = {
         {"directions", "errors", "gloss", "llvm", "phases", "processes", "progress",
          "source_code"},
         {"compiled", "files", "surfaces", "variants"},
-        {"bsdf", "images", "sky", "window_parts"},
+        {"bsdf", "images", "sky", "stored_arrays", "window_parts"},
         {"glare", "matrices", "metrics"},
         {"picture_year", "trace"},
         {"methods"},

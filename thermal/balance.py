@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal import kernel, records
 from thermal.climate import Climate, Solar, to_steps
 from thermal.conduction import CELL
-from thermal.drive import drive_of
+from thermal.drive import drive_of, stretches
 from thermal.errors import require
 from thermal.network import Network, network
 from thermal.ventilation import AirTransfer
@@ -19,6 +20,7 @@ from thermal.zone import Zone
 
 HOUR = 3600.0  # [s]
 AIR_GAS_CONSTANT = 287.055  # [J/(kg K)]
+STRETCH = 744  # rows, a month of hours: of all zones no more lie in memory at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +72,45 @@ class ZoneResult:
     warm_up_days: int
 
 
+Kept = Callable[[ZoneResult], ZoneResult]
+
+
+class ZoneYears(Sequence[ZoneResult]):
+    """The results of zones, each put together from those of its stretches when it is looked at."""
+
+    def __init__(self, stretches: Sequence[Sequence[ZoneResult]]) -> None:
+        """From the results of all zones in each stretch of the year."""
+        self._stretches = stretches
+
+    def __len__(self) -> int:
+        return len(self._stretches[0])
+
+    @overload
+    def __getitem__(self, z: int) -> ZoneResult: ...
+    @overload
+    def __getitem__(self, z: slice) -> list[ZoneResult]: ...
+    def __getitem__(self, z: int | slice) -> ZoneResult | list[ZoneResult]:
+        if isinstance(z, slice):
+            return [self[one] for one in range(*z.indices(len(self)))]
+        return _joined([zones[z] for zones in self._stretches])
+
+
+def _joined(parts: Sequence[ZoneResult]) -> ZoneResult:
+    """The result of hours that follow each other."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    found = {}
+    for field in fields(ZoneResult):
+        value = getattr(first, field.name)
+        if isinstance(value, np.ndarray):
+            value = np.concatenate([getattr(part, field.name) for part in parts])
+        elif isinstance(value, dict):
+            value = {key: np.concatenate([p.heat_flow[key] for p in parts]) for key in value}
+        found[field.name] = value
+    return ZoneResult(**found)
+
+
 def simulate(
     zone: Zone,
     climate: Climate,
@@ -95,7 +136,8 @@ def simulate_zones(
     air_links: ArrayLike | None = None,
     transfers: Sequence[AirTransfer] = (),
     progress: Callable[[float], None] | None = None,
-) -> tuple[ZoneResult, ...]:
+    kept: Kept | None = None,
+) -> Sequence[ZoneResult]:
     """The years of zones that exchange heat through their partitions and openings.
 
     Args:
@@ -104,7 +146,9 @@ def simulate_zones(
         row_s: length [s] of the climate's rows, which everywhere else are said to be hours.
         air_links: [Z, Z] air exchanged between zones through openings [m3/s], symmetric.
         transfers: air that flows one way from zone to zone.
-        progress: called with 0 and 1.
+        progress: called with shares of the year, from 0 to 1.
+        kept: what is held of a zone's result in each stretch, on disk for example; the year of a
+            zone is put together each time it is looked at then, and before it returns without.
 
     Returns: one result per zone.
 
@@ -112,19 +156,43 @@ def simulate_zones(
     """
     options = BalanceOptions() if options is None else options
     require(len(zones) == len(solar) > 0, "solar", f"expected one entry for each of {len(zones)}")
-    steps = _steps_per_row(step_s, row_s)
-    if progress:
-        progress(0.0)
+    steps, told = _steps_per_row(step_s, row_s), progress or (lambda share: None)
+    told(0.0)
     link = _links(air_links, len(zones))
     net = network(
         zones, step_s=step_s, terrain=options.terrain, cell=options.cell,
         link=link, transfers=transfers,
     )  # fmt: skip
-    drive, every = drive_of(zones, climate, solar, steps, transfers)
-    method = records.Method(
+    method = _method(options, steps, step_s)
+    outdoors, state = _weather(climate, steps), _start(net, len(zones), options.start_c)
+    work, years, days = _work(net, state), [], 0
+    first_day = min(round(24 * HOUR / row_s), climate.hours)
+    for stretch in stretches(climate.hours, steps, max(STRETCH, first_day)):
+        drive, every = drive_of(zones, climate, solar, stretch, transfers)
+        method = method._replace(solar_every=every)
+        weather = records.OutdoorConditions(*map(stretch.of, outdoors))
+        if not stretch.first:
+            days = kernel.warm_up(net, state, work, weather, drive, method, rows=first_day)
+        means = kernel.hourly_means(stretch.size, state)
+        kernel.advance(net, state, work, weather, drive, method, stretch.size, means)
+        np.divide(means.terms, steps, out=means.terms)
+        found = (
+            _result(zone, net, z, means, days=days, state=drive.state)
+            for z, zone in enumerate(zones)
+        )
+        years.append([*map(kept or (lambda result: result), found)])
+        told(stretch.last / climate.hours)
+    if kept is not None:
+        return ZoneYears(years)
+    whole = [_joined([zones.pop() for zones in years]) for _ in zones]  # each goes as it is joined
+    return tuple(reversed(whole))
+
+
+def _method(options: BalanceOptions, steps: int, step_s: float) -> records.Method:
+    return records.Method(
         steps=steps,
         step_s=float(step_s),
-        solar_every=every,
+        solar_every=steps,
         inside=_INSIDE.index(options.inside_convection),
         outside=_OUTSIDE.index(options.outside_convection),
         outside_film=float(options.outside_film),
@@ -132,21 +200,6 @@ def simulate_zones(
         tolerance=options.tolerance,
         warm_tolerance=options.warm_tolerance,
         warm_days=options.warm_days,
-    )
-    weather = _weather(climate, steps)
-    state = _start(net, len(zones), options.start_c)
-    work = _work(net, state)
-    rows = min(round(24 * HOUR / row_s), climate.hours)
-    days = kernel.warm_up(net, state, work, weather, drive, method, rows=rows)
-    means = kernel.hourly_means(climate.hours, state)
-    kernel.advance(net, state, work, weather, drive, method, climate.hours, means)
-    terms, state_of_hour = np.divide(means.terms, steps, out=means.terms), drive.state
-    del drive  # the sun of all faces: as much as the results that are made now
-    if progress:
-        progress(1.0)
-    return tuple(
-        _result(zone, net, z, means, terms[:, z], days=days, state=state_of_hour)
-        for z, zone in enumerate(zones)
     )
 
 
@@ -232,12 +285,11 @@ def _result(
     net: Network,
     z: int,
     means: records.Means,
-    terms: NDArray[np.float64],
     *,
     days: int,
     state: NDArray[np.int64],
 ) -> ZoneResult:
-    air = means.air[:, z]
+    air, terms = means.air[:, z], means.terms[:, z]
     mine = np.flatnonzero(net.faces.zone == z)
     inner, outer, windows = means.inner[:, mine], means.outer[:, mine], net.faces.window[mine]
     glass, solid = np.flatnonzero(windows >= 0), np.flatnonzero(windows < 0)

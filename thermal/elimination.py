@@ -7,6 +7,7 @@ its pattern does not change, so order and fill are found once.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
@@ -50,14 +51,18 @@ def elimination(unknowns: int, pairs: Iterable[tuple[int, int]]) -> Elimination:
     for i, j in pairs:
         near[i].add(j)
         near[j].add(i)
-    left, order, below = set(range(unknowns)), [], {}
-    for _ in range(unknowns):
-        first = min(left, key=lambda u: (len(near[u]), u))
+    waiting = [(len(beside), u) for u, beside in enumerate(near)]
+    heapify(waiting)
+    below: dict[int, set[int]] = {}  # in the order of elimination
+    while waiting:
+        count, first = heappop(waiting)
+        if first in below or count != len(near[first]):
+            continue  # it has gone, or waits with its new number too
         below[first] = near[first]
         for other in near[first]:
             near[other] = (near[other] | near[first]) - {first, other}
-        left.remove(first)
-        order.append(first)
+            heappush(waiting, (len(near[other]), other))
+    order = list(below)
     place = np.empty(unknowns, dtype=np.int64)
     place[order] = np.arange(unknowns)
     columns = [np.sort(place[list(below[u])]) for u in order]

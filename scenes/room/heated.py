@@ -13,6 +13,7 @@ from bim.model import Problem, Space
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.stored_arrays import StoredArrays
 from scenes.results import (
     DaylightResult,
     ExploredRoom,
@@ -72,29 +73,32 @@ def heat_of(
     terrain: str = "suburbs",
     air_links: NDArray[np.float64] | None = None,
     progress: Progress = silent,
+    store: StoredArrays | None = None,
 ) -> list[Heat]:
     """Temperatures, comfort and loads of rooms that are balanced together.
 
     Args:
         step_s: of the balance [s].
         air_links: air between them [Z, Z] [m3/s]; None: none.
+        store: where the balances and what is found lie; None: in memory.
     """
     zones = [room.zone for room in rooms]
     found = balances(
-        zones, weather, step_s, air_links=air_links, terrain=terrain, progress=progress
-    )
-    moist = room_humidity(zones, found, weather, air_links=air_links)
+        zones, weather, step_s, air_links=air_links, terrain=terrain, progress=progress,
+        store=store,
+    )  # fmt: skip
+    passed = iter if store is None else store.each
+    moist = room_humidity(zones, passed(found), weather, air_links=air_links)
     heats: list[Heat] = []
-    found.reverse()  # a balance holds both faces of every surface: let go once its room is done
-    for room, humidity in zip(rooms, moist, strict=True):
-        balance, tables = found.pop(), room.tables or OperationTables()
+    for room, balance, humidity in zip(rooms, passed(found), moist, strict=True):
+        tables = room.tables or OperationTables()
         felt = felt_by(tables.comfort, balance, humidity)
         heat = thermal_result(room.zone, balance, weather, felt, iter(room.fenestration))
         ran = None
         if room.tables is not None:
             rule = tables.control.rule
             ran = operated_year(room.zone, balance, weather, room.states, rule)
-        heats.append((heat, ran))
+        heats.append((heat, ran) if store is None else store.kept((heat, ran)))
     return heats
 
 
@@ -114,17 +118,22 @@ def coupled_years(
     step_s: float,
     tables: OperationTables,
     progress: Progress = silent,
+    *,
+    store: StoredArrays | None = None,
 ) -> tuple[list[RoomYear], str]:
     """The years of rooms that exchange heat through what lies between them, and that in words.
 
-    Args: tables: of all rooms; they say the site's terrain and the air through open doors.
+    Args:
+        tables: of all rooms; they say the site's terrain and the air through open doors.
+        store: where the rooms' heat lies; None: in memory.
     """
     progress("heat balance", 0.0)
     zones, links, _ = coupled([room.inputs.zone for room in rooms], tables.air.door_m3_s)
     inputs = [replace(r.inputs, zone=zone) for r, zone in zip(rooms, zones, strict=True)]
     found = heat_of(
-        inputs, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress
-    )
+        inputs, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress,
+        store=store,
+    )  # fmt: skip
     progress("heat balance", 1.0)
     years = [room.with_heat(heat) for room, heat in zip(rooms, found, strict=True)]
     return years, _said(zones)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ def outdoor_humidity(weather: Weather) -> FloatArray:
 
 def room_humidity(
     rooms: Sequence[RoomZone],
-    results: Sequence[ZoneResult],
+    results: Iterable[ZoneResult],
     weather: Weather,
     *,
     air_links: FloatArray | None = None,

@@ -20,6 +20,7 @@ from mitsuba_cfs.compiled import must_compile
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.stored_arrays import StoredArrays
 from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
@@ -88,17 +89,22 @@ def balances(
     transfers: Sequence[AirTransfer] = (),
     terrain: str = "suburbs",
     progress: Progress = silent,
-) -> list[ZoneResult]:
-    """The years of rooms that exchange heat through their partitions and doors."""
+    store: StoredArrays | None = None,
+) -> Sequence[ZoneResult]:
+    """The years of rooms that exchange heat through their partitions and doors.
+
+    Args: store: where they lie, and what they come from; None: in memory.
+    """
     if must_compile(advance):
         progress(COMPILING, 0.0)
-    zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in rooms]
+    passed = iter if store is None else store.each
+    zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in passed(rooms)]
     row_s = 3600.0 * weather.step_h
-    found = simulate_zones(
+    return simulate_zones(
         zones, climate(weather), suns, step_s=min(step_s, row_s), row_s=row_s,
         air_links=air_links, transfers=transfers, options=BalanceOptions(terrain=terrain),
+        kept=None if store is None else store.kept,
     )  # fmt: skip
-    return list(found)
 
 
 def coupled(

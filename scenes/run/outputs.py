@@ -101,7 +101,8 @@ def _write_rooms(
     )  # fmt: skip
     # a process takes as long to begin as it does to write some rooms
     processes = min(processes, len(rooms) // ROOMS_A_PROCESS)
-    for number, error in enumerate(tasks.results(processes=processes), 1):
+    written = zip(result.spaces, tasks.results(processes=processes), strict=True)
+    for number, (_, error) in enumerate(written, 1):  # a room passed goes out of memory
         if error is not None:
             raise error
         progress("results", number / (len(rooms) + 1))

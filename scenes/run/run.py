@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import metadata
@@ -21,6 +21,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
+from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
 from scenes.fenestration.resolver import source_notes
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import thermal_system
@@ -47,7 +48,6 @@ from scenes.run.notes import model_notes, site_notes
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import RoomWork, Workers
-from scenes.run.stored_pictures import StoredPictures
 
 R = TypeVar("R")
 
@@ -141,7 +141,7 @@ def run_inputs(
         building,
         weather.midpoints,
         sun,
-        tuple(results),
+        results,
         (*building.problems, *problems, *holes),
         manifest,
         tuple(dict.fromkeys(notes)),
@@ -158,38 +158,53 @@ def _rooms(
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
     workers: Workers | None = None,
-) -> tuple[list[RoomYear], list[Problem], list[str]]:
+) -> tuple[Sequence[RoomYear], list[Problem], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
+    spaces = run_spaces(inputs, options)
+    store = StoredArrays() if len(spaces) > 1 else None
     if not balanced_together(inputs, options):
-        alone = RoomWork(compute_room, inputs, run_spaces(inputs, options), skies, options)
-        series = _series(alone, workers, alone, moved_result)
-        return replace(series, on_room=on_room or (lambda room: None)).results(progress)
+        alone = RoomWork(compute_room, inputs, spaces, skies, options)
+        series = _series(alone, workers, alone, moved_result, store)
+        series = replace(series, on_room=on_room or (lambda room: None))
+        found, problems, notes = series.results(progress)
+        return _passed(found, store), problems, notes
 
     def compute_light(space: Space, steps: Progress) -> DaylitRoom:
         found = light(space, steps)
         steps("heat", 1.0)
         return found
 
-    light = RoomWork(lit_room, inputs, run_spaces(inputs, options), skies, options)
-    together = _series(light, workers, compute_light, moved_light, same_surfaces)
+    light = RoomWork(lit_room, inputs, spaces, skies, options)
+    together = _series(light, workers, compute_light, moved_light, store, same_surfaces)
     heard = on_light or (lambda room: None)
     together = replace(together, on_room=heard, given="daylight, glare and sun are")
-    found, problems, notes = together.results(progress)
-    years, said = _coupled(found, inputs, options, progress)
-    for room in years if on_room is not None else ():
+    lit, problems, notes = together.results(progress)
+    years, said = _coupled(lit, inputs, options, progress, store)
+    found = _passed(years, store)
+    for room in found if on_room is not None else ():
         on_room(room)
-    return years, problems, [*notes, *said]
+    return found, problems, [*notes, *said]
+
+
+def _passed(rooms: list[RoomYear], store: StoredArrays | None) -> Sequence[RoomYear]:
+    """The rooms, out of memory once they are passed where they are held on disk."""
+    return tuple(rooms) if store is None else PassedArrays(store, rooms)
 
 
 def _coupled(
-    rooms: list[DaylitRoom], inputs: JobInputs, options: JobOptions, progress: Progress
+    rooms: list[DaylitRoom],
+    inputs: JobInputs,
+    options: JobOptions,
+    progress: Progress,
+    store: StoredArrays | None = None,
 ) -> tuple[list[RoomYear], tuple[str, ...]]:
     """The years of rooms balanced together, and what that means in words."""
     if not rooms:
         return [], ()
     tables = OperationTables() if inputs.operation is None else inputs.operation.tables
     step_s = options.room.heat_step_s
-    years, said = coupled_years(rooms, inputs.weather, step_s, tables, progress)
+    years, said = coupled_years(rooms, inputs.weather, step_s, tables, progress, store=store)
+    variants.return_memory()
     return years, (said,) if len(years) > 1 else ()
 
 
@@ -198,9 +213,13 @@ def _series(
     workers: Workers | None,
     compute: Callable[[Space, Progress], R],
     move: Callable[[R, Space], R],
+    store: StoredArrays | None,
     alike: Callable[[Space, Space], bool] = lambda one, other: True,
 ) -> RoomSeries[R]:
-    """The rooms of a run; alike: whether one of two equal rooms may stand for the other."""
+    """The rooms of a run.
+
+    Args: store: of their arrays; alike: whether one of two equal rooms may stand for the other.
+    """
     inputs, options = work.inputs, work.options
 
     def borrows(*spaces: Space) -> bool:
@@ -226,7 +245,7 @@ def _series(
             and alike(one, other)
         ),
         beside=None if workers is None else partial(work.beside, workers=workers),
-        kept=StoredPictures().kept if len(work.spaces) > 1 else lambda result: result,
+        kept=(lambda result: result) if store is None else store.kept,
     )
 
 
@@ -242,7 +261,7 @@ def _manifest(
     variant: str,
     inputs: JobInputs,
     used: list[FenestrationSystem],
-    results: list[RoomYear],
+    results: Sequence[RoomYear],
 ) -> dict:
     """What a reader needs to make the same numbers again."""
     packages = ("mitsuba-cfs", "mitsuba", "drjit", "numpy", "ifcopenshell", "pvlib")

@@ -54,7 +54,7 @@ def small_disk(tmp_path) -> Iterator[Path]:
 
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stubs of rooms' results have no pictures that a run could hold on disk."""
+    """Stubs of rooms' results have no arrays that a run could hold on disk."""
     from scenes.run import run
 
-    monkeypatch.setattr(run.StoredPictures, "kept", lambda self, room: room)
+    monkeypatch.setattr(run.StoredArrays, "kept", lambda self, room: room)

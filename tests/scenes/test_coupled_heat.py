@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bim.ifc.building import read_ifc
@@ -12,6 +13,7 @@ from bim.model import Building, Space
 from bim.shoebox import shoebox
 from bim.to_thermal import same_surfaces
 from mitsuba_cfs.progress import silent
+from mitsuba_cfs.stored_arrays import StoredArrays
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
@@ -86,6 +88,21 @@ def _shared(room: DaylitRoom) -> int:
     """The number of the surface that another room lies behind, from 1."""
     (found,) = [i for i, guid in enumerate(room.inputs.zone.room.neighbours) if guid]
     return found + 1
+
+
+def test_rooms_held_on_disk_have_the_same_year(variant, weather, skies) -> None:
+    rooms = [lit(s, {"loads": WARM} if s.name == "w" else {}, weather, skies) for s in two_boxes()]
+    store = StoredArrays()
+    held = [store.kept(room) for room in rooms]
+    found, _ = coupled_years(rooms, weather, 3600.0, OperationTables())
+    again, _ = coupled_years(held, weather, 3600.0, OperationTables(), store=store)
+    for one, other in zip(found, again, strict=True):
+        for name in ("temperatures", "gains", "comfort"):
+            table, held_table = getattr(one.heat, name), getattr(other.heat, name)
+            pd.testing.assert_frame_equal(table, held_table, check_freq=False)
+        pd.testing.assert_frame_equal(one.operation.hours, other.operation.hours)
+        assert one.heat.comfort_summary == other.heat.comfort_summary
+        assert not other.heat.temperatures["air_c"].to_numpy().flags.owndata
 
 
 def test_a_room_moved_to_its_equal_has_that_ones_neighbours(variant, weather, skies) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from bim.ifc.building import read_ifc
 from bim.model import Construction, MaterialLayer
 from bim.to_thermal import coupled_rooms, door_links, shared_constructions, thermal_room
 from tests.thermal.rooms import PLASTER, box, climate, sun
+from thermal import balance
 from thermal.balance import BalanceOptions, simulate_zones
 from thermal.blackbox import Fenestration
 from thermal.climate import no_sun
@@ -118,6 +119,52 @@ def test_energy_of_coupled_rooms_closes_with_control_loads_gains_and_doors():
     # over the year what leaves one room through the wall enters the other
     first, second = (r.heat_flow["partitions"] for r in results)
     assert abs(first.mean() + second.mean()) < 1e-3 * np.abs(first).mean()
+
+
+@pytest.mark.parametrize("sun_by_step", [False, True])
+def test_stretches_of_a_year_are_the_year_in_one(sun_by_step, monkeypatch):
+    """Values of hours and of steps, states, known outer faces; the last stretch is short."""
+    hours, steps, rng = 24 * 8, 6, np.random.default_rng(4)
+    states = (Fenestration("open", 2.5), Fenestration("closed", 0.9))
+    rooms, light = [], []
+    for name, other, side in (("a", "b", "east"), ("b", "a", "west")):
+        room = box(window=states[0], gains=Gains(100.0 * rng.random(hours), 50.0))
+        walls = tuple(
+            replace(s, name="party", outside=other, partner="party") if s.name == side else s
+            for s in room.surfaces
+        )
+        beyond = OpaqueSurface(
+            "known", 4.0, WALL, UP, "known", beyond_c=10.0 + 5.0 * rng.random(hours),
+        )  # fmt: skip
+        rooms.append(
+            replace(
+                room,
+                name=name,
+                surfaces=(*walls, beyond),
+                windows=(replace(room.windows[0], states=states),),
+                loads=IdealLoads(19.0 + rng.random(hours), 24.0 + rng.random(hours * steps)),
+                infiltration_ach=rng.random(hours),
+            )
+        )
+        shone = sun(hours * steps if sun_by_step else hours, rooms[-1], strength=0.3)
+        light.append(replace(shone, state=rng.integers(0, 2, (hours, 1))))
+    weather = climate(hours, outdoor=10 + 8 * rng.random(hours))
+
+    def years(**kept):
+        return simulate_zones(rooms, weather, light, air_links=[[0, 0.05], [0.05, 0]], **kept)
+
+    whole, seen = years(), []
+    monkeypatch.setattr(balance, "STRETCH", 50)
+    for found in (years(), years(kept=lambda result: seen.append(result) or result)):
+        for one, other in zip(whole, found, strict=True):
+            assert len(other.air_c) == hours and one.warm_up_days == other.warm_up_days
+            for field in fields(one):
+                value, again = getattr(one, field.name), getattr(other, field.name)
+                if isinstance(value, np.ndarray):
+                    np.testing.assert_allclose(again, value, rtol=1e-13, atol=1e-9)
+            for key, flow in one.heat_flow.items():
+                np.testing.assert_allclose(other.heat_flow[key], flow, rtol=1e-13, atol=1e-9)
+    assert [len(result.air_c) for result in seen] == [50, 50, 50, 50, 50, 50, 42, 42]
 
 
 def test_rooms_of_an_ifc_share_their_wall_and_door():

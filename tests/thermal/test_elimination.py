@@ -33,3 +33,20 @@ def test_a_chain_of_rooms_fills_in_next_to_nothing():
     ]
     pairs += [(12 * room + 11, 12 * room + 12) for room in range(49)]
     assert len(elimination(600, pairs).rows) == len(pairs)
+
+
+@pytest.mark.parametrize("density", [0.02, 0.1, 0.4])
+def test_the_unknown_with_the_fewest_neighbours_left_goes_first(density):
+    """And the lowest of equals."""
+    rng, near = np.random.default_rng(7), np.zeros((50, 50), dtype=bool)
+    near |= np.tril(rng.random(near.shape) < density, -1)
+    pairs = np.argwhere(near)
+    near |= near.T
+    left, order = list(range(50)), []
+    while left:
+        first = min(left, key=lambda u: (near[u][left].sum(), u))
+        near |= np.outer(near[first], near[first])
+        np.fill_diagonal(near, False)
+        left.remove(first)
+        order.append(first)
+    assert np.argsort(elimination(50, pairs.tolist()).place).tolist() == order

@@ -1,58 +1,15 @@
-"""Pictures of a building's rooms on disk, and rooms' files written beside each other."""
+"""Rooms' files written beside each other."""
 
 from __future__ import annotations
 
-import errno
-import gc
-import os
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from mitsuba_cfs.errors import DataError
 from scenes.result_folder import ResultFolder
-from scenes.run import outputs, stored_pictures
-from scenes.run.stored_pictures import StoredPictures
+from scenes.run import outputs
 from tests.report.synthetic import run_result
-
-
-def test_pictures_are_as_they_were_whatever_file_they_are_in(monkeypatch):
-    monkeypatch.setattr(stored_pictures, "BLOCK", 30_000)  # two pictures of 60 x 60
-    rooms, store = run_result(picture_size=60).spaces, StoredPictures()
-    kept = [store.kept(room) for room in rooms]
-    del store
-    gc.collect()
-    assert all(room.glare.pictures for room in rooms)
-    assert any(room.glare.colour is not None for room in rooms)
-    for room, held in zip(rooms, kept, strict=True):
-        for picture, shown in zip(room.glare.pictures, held.glare.pictures, strict=True):
-            np.testing.assert_array_equal(shown.luminance, picture.luminance)
-            assert shown.luminance.dtype == picture.luminance.dtype
-            assert not shown.luminance.flags.owndata
-            np.testing.assert_array_equal(shown.source_mask, picture.source_mask)
-        if room.glare.colour is not None:
-            np.testing.assert_array_equal(held.glare.colour.radiance, room.glare.colour.radiance)
-
-
-def test_pictures_of_which_none_are_shown_take_no_file(monkeypatch):
-    """Each file is there for as long as one of its pictures."""
-    monkeypatch.setattr(stored_pictures, "BLOCK", 1)  # a file for each
-    (room, *_), store = run_result(picture_size=60).spaces, StoredPictures()
-    before = len(os.listdir("/proc/self/fd"))
-    for _ in range(20):
-        store.kept(room)
-    assert len(os.listdir("/proc/self/fd")) <= before + 2
-
-
-def test_a_full_disk_is_said_before_anything_is_written(monkeypatch):
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(os, "posix_fallocate", full)
-    with pytest.raises(DataError, match=r"no room for pictures of 0\.07 GB: the disk is full"):
-        StoredPictures().kept(run_result(picture_size=60).spaces[0])
 
 
 @pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.slow)])

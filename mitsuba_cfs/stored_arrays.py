@@ -1,0 +1,101 @@
+"""Big arrays held on disk until they are looked at: what a building's rooms yield is gigabytes."""
+
+from __future__ import annotations
+
+import mmap
+import pickle
+import weakref
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TypeVar, overload
+
+from mitsuba_cfs.files import unnamed_file
+
+T = TypeVar("T")
+BLOCK = 2**26  # [bytes] of a file, at least: each holds a file handle for as long as its arrays
+LEAST = 2**12  # [bytes] of an array that goes to disk
+ALIGNED = 64  # [bytes] between which arrays begin
+PASSED = 8  # things that are looked at until their arrays are out of memory again
+
+
+class StoredArrays:
+    """Files without names that hold arrays; these are read when they are looked at.
+
+    What has been looked at is out of memory again when the next file is begun, and by `each`.
+
+    Raises: `DataError` where there is no room for them on disk.
+    """
+
+    def __init__(self) -> None:
+        """No file is made before there is an array."""
+        self._maps: list[weakref.ref[mmap.mmap]] = []
+        self._last: mmap.mmap | None = None
+        self._next = 0  # where the next array begins in the last file
+
+    def kept(self, thing: T) -> T:
+        """A copy of a thing whose big arrays are read only and on disk; pickle must know it."""
+        buffers: list[pickle.PickleBuffer] = []
+
+        def within(buffer: pickle.PickleBuffer) -> bool:
+            """Whether an array stays in memory, with all else; the big ones are put aside."""
+            small = buffer.raw().nbytes < LEAST
+            if not small:
+                buffers.append(buffer)
+            return small
+
+        rest = pickle.dumps(thing, 5, buffer_callback=within)
+        return pickle.loads(rest, buffers=[self._stored(buffer.raw()) for buffer in buffers])
+
+    def each(self, things: Iterable[T]) -> Iterator[T]:
+        """The things, whose arrays do not stay in memory once they are passed."""
+        for number, thing in enumerate(things, 1):
+            yield thing
+            if number % PASSED == 0:
+                self.forget()
+        self.forget()
+
+    def forget(self) -> None:
+        """Let what has been looked at be out of memory until it is looked at again."""
+        found = [(one, map_) for one in self._maps if (map_ := one()) is not None]
+        self._maps = [one for one, _ in found]
+        for _, map_ in found:
+            if hasattr(map_, "madvise"):
+                map_.madvise(mmap.MADV_DONTNEED)
+
+    def _stored(self, data: memoryview) -> memoryview:
+        """The bytes in a file, read only."""
+        size = -(-data.nbytes // ALIGNED) * ALIGNED
+        if self._last is None or self._next + size > len(self._last):
+            self.forget()
+            self._last, self._next = _file(max(BLOCK, size)), 0
+            self._maps.append(weakref.ref(self._last))
+        start, self._next = self._next, self._next + size
+        found = memoryview(self._last)[start : start + data.nbytes]
+        found[:] = data
+        return found.toreadonly()
+
+
+class PassedArrays(Sequence[T]):
+    """Things whose arrays are in a store, out of memory again once they are passed."""
+
+    def __init__(self, store: StoredArrays, things: Sequence[T]) -> None:
+        """From things that `kept` has given, or that have its arrays."""
+        self._store, self._things = store, things
+
+    def __len__(self) -> int:
+        return len(self._things)
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[T]: ...
+    def __getitem__(self, index: int | slice) -> T | Sequence[T]:
+        return self._things[index]
+
+    def __iter__(self) -> Iterator[T]:
+        return self._store.each(self._things)
+
+
+def _file(size: int) -> mmap.mmap:
+    """A file without a name of so many bytes, there for as long as anything shows its arrays."""
+    with unnamed_file(size, f"results of {size / 1e9:.2f} GB") as file:
+        return mmap.mmap(file.fileno(), size)
