@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from typing import Any, ClassVar, Generic, TypeVar
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.processes import process_pool
+from mitsuba_cfs.processes import process_pool, shared_blas
 from mitsuba_cfs.variants import share_cores
 from scenes.user_errors import one_line
 
@@ -51,7 +51,8 @@ class Tasks(Generic[T, R]):
         if scheduler is not None:
             yield from self._on_cluster(scheduler)
         elif processes > 1:
-            yield from self._beside_each_other(processes)
+            with shared_blas(processes):
+                yield from self._beside_each_other(processes)
         else:
             for item in self.items:
                 yield _attempted(self.compute, self.failed, item)

@@ -169,21 +169,24 @@ def smoothed_colour(
     Source: Dammertz, Sewtz, Hanika, Lensch 2010, High Performance Graphics, 67-75 (edge-avoiding
     a-trous wavelets).
     """
-    spline = np.array([1, 4, 6, 4, 1]) / 16.0
-    guide = np.log(np.maximum(luminance, 1e-6))
-    found, (ny, nx) = np.asarray(rgb, dtype=float), guide.shape
+    spline = np.array([1, 4, 6, 4, 1], dtype=np.float32) / 16
+    guide = np.log(np.maximum(luminance, 1e-6)).astype(np.float32) / np.float32(ALIKE)
+    found, (ny, nx) = np.ones((4, *guide.shape), dtype=np.float32), guide.shape
+    found[:3] = np.moveaxis(rgb, -1, 0)  # and ones, which add up to the weights
     for step in SMOOTHING_STEPS:
-        total, weights = np.zeros_like(found), np.zeros_like(guide)
+        edge, total = 2 * step, np.zeros_like(found)
+        border = ((edge, edge), (edge, edge))
+        others = np.pad(guide, border, mode="edge")
+        lit = np.pad(found * (luminance > 0), ((0, 0), *border), mode="edge")
         for dy, dx in np.ndindex(5, 5):
-            y, x = (
-                np.clip(np.arange(n) + (d - 2) * step, 0, n - 1) for n, d in ((ny, dy), (nx, dx))
-            )
-            unlike = (guide[np.ix_(y, x)] - guide) / ALIKE
-            weight = spline[dy] * spline[dx] * np.exp(-(unlike**2)) * (luminance[np.ix_(y, x)] > 0)
-            total += weight[..., None] * found[np.ix_(y, x)]
-            weights += weight
-        found = total / np.maximum(weights, 1e-12)[..., None]
-    return found
+            place = (slice(dy * step, dy * step + ny), slice(dx * step, dx * step + nx))
+            weight = others[place] - guide
+            np.multiply(weight, -weight, out=weight)
+            np.exp(weight, out=weight)
+            weight *= spline[dy] * spline[dx]
+            total += weight * lit[:, *place]
+        found[:3] = total[:3] / np.maximum(total[3], 1e-12)
+    return np.moveaxis(found[:3], 0, -1).astype(float)
 
 
 def with_luminance(

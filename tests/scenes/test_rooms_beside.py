@@ -175,3 +175,23 @@ def test_processes_beside_each_other_share_the_cores():
     tasks = Tasks([0], threads, fault, key=str, scene=str)
     expected = max((os.cpu_count() or 1) // 3, 1)
     assert list(tasks.results(processes=3)) == [expected]
+
+
+def blas_threads(_: int) -> tuple[int, str | None]:
+    """A process, and what it was told of OpenBLAS' threads."""
+    return os.getpid(), os.environ.get("OPENBLAS_NUM_THREADS")
+
+
+@pytest.mark.parametrize(
+    ("cores", "given", "expected"), [(6, None, "3"), (1, None, "1"), (6, "5", "5")]
+)
+def test_processes_multiply_with_their_share_of_the_cores(monkeypatch, cores, given, expected):
+    """They are told before they load NumPy, and this one is told nothing."""
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if given:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", given)
+    tasks = Tasks([1], blas_threads, fault, key=str, scene=str)
+    [(process, told)] = list(tasks.results(processes=2))
+    assert (told, process != os.getpid()) == (expected, True)
+    assert os.environ.get("OPENBLAS_NUM_THREADS") == given
