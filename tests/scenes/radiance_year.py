@@ -27,7 +27,7 @@ STORED = REPOSITORY / "tests" / "reference" / "radiance_year"
 RAYS = "-n 2 -ab 8 -ad 60000 -lw 1e-6"
 SPACING = 1.0  # [m] 24 sensors and less keep Radiance's part short
 STORED_ROOM = "A"
-STORED_RUNS = 4  # one run's sensors scatter by 0.5 to 1 %
+RUNS = 4  # one run's sensors scatter by 0.5 to 1 %
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,16 +86,20 @@ def radiance_year(name: str, folder: Path) -> Year:
     return Year.of(np.transpose(total))
 
 
+def mean_year(name: str) -> Year:
+    """The mean of several years of that room, which Radiance draws anew each time."""
+    years = []
+    for _ in range(RUNS):
+        with tempfile.TemporaryDirectory() as folder:
+            years.append(radiance_year(name, Path(folder)))
+    return Year(*(np.mean([getattr(y, n) for y in years], axis=0) for n in ("hours", "sensors")))
+
+
 def main() -> None:
     """Write the stored year."""
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else STORED
     out.mkdir(parents=True, exist_ok=True)
-    years = []
-    for _ in range(STORED_RUNS):
-        with tempfile.TemporaryDirectory() as folder:
-            years.append(radiance_year(STORED_ROOM, Path(folder)))
-    mean = Year(*(np.mean([getattr(y, n) for y in years], axis=0) for n in ("hours", "sensors")))
-    mean.write(out / f"{STORED_ROOM}.npz")
+    mean_year(STORED_ROOM).write(out / f"{STORED_ROOM}.npz")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from tests.scenes.radiance_year import SPACING, STORED_ROOM, Year, radiance_year
+from tests.scenes.radiance_year import SPACING, STORED_ROOM, Year, mean_year
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -57,9 +57,9 @@ def test_year_of_illuminance() -> None:
 @pytest.mark.peer
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["A", "B"])
-def test_year_of_illuminance_with_radiance_anew(name, tmp_path) -> None:
+def test_year_of_illuminance_with_radiance_anew(name) -> None:
     pytest.importorskip("pyradiance")
-    theirs = radiance_year(name, tmp_path)
+    theirs = mean_year(name)
     agree(our_year(name), theirs, name)
     if name == STORED_ROOM:
         stored = Year.read(name)
