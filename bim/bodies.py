@@ -80,11 +80,12 @@ class Bodies:
         """
         distance, hit = self.mesh.all_hits(origin, direction, reach)
         into = area_vectors(self.mesh.triangles[hit]) @ direction < 0
+        element, items = self.element[hit], self.item[hit]
         spans: list[Span] = []
-        for number in np.unique(self.element[hit]).tolist():
+        for number in np.unique(element).tolist():
             parts: list[Part] = []
-            for item in np.unique(self.item[hit[self.element[hit] == number]]).tolist():
-                own = (self.element[hit] == number) & (self.item[hit] == item)
+            for item in np.unique(items[element == number]).tolist():
+                own = (element == number) & (items == item)
                 faces = _faces(distance[own], hit[own], into[own])
                 if _depths(faces)[0] > 0:  # the ray begins inside, or the body is inside out
                     turned = into[own] ^ self._is_turned(number, hit[own])

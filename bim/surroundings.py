@@ -197,8 +197,7 @@ def _walk(
 ) -> Walk:
     """What a ray out of a face meets, asked from so far back in the room [m]."""
     limit, room = DEEPEST_WALL, -1
-    start = point - INSIDE * normal
-    at, t = start + (INSIDE + 0.005) * normal, INSIDE + 0.005
+    at, t = point + 0.005 * normal, INSIDE + 0.005
     for _ in range(4):  # the first surface met may be the room's own, drawn twice
         d, hit = around.rooms.first_hits(at[None], normal[None], limit)
         if hit[0] < 0:

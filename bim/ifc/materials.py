@@ -110,9 +110,8 @@ class MaterialReader:
 
     def layers_of(self, element: ifcopenshell.entity_instance) -> ElementLayers | None:
         """The element's layers, or None where it has no layer set or only one plain material."""
-        material, element = None, _with_material(element)
-        with contextlib.suppress(Exception):  # damaged associations
-            material = ifcopenshell.util.element.get_material(element, should_skip_usage=False)
+        element = _with_material(element)
+        material = _material_of(element)
         if material is None:
             return None
         usage = material if material.is_a("IfcMaterialLayerSetUsage") else None
@@ -168,9 +167,7 @@ class MaterialReader:
 
     def _constituents(self, element: ifcopenshell.entity_instance) -> dict:
         """Materials of an element without layers, by the names of constituents or their own."""
-        material = None
-        with contextlib.suppress(Exception):  # damaged associations
-            material = ifcopenshell.util.element.get_material(_with_material(element))
+        material = _material_of(_with_material(element))
         if material is not None and material.is_a("IfcMaterialConstituentSet"):
             parts = material.MaterialConstituents or ()
             return {one.Name: one.Material for one in parts if one.Material is not None}
@@ -220,15 +217,22 @@ def materials_of(element: ifcopenshell.entity_instance) -> list[ifcopenshell.ent
     return []
 
 
+def _material_of(element: ifcopenshell.entity_instance) -> ifcopenshell.entity_instance | None:
+    """What is associated with an element or its type, usages of layer sets too."""
+    with contextlib.suppress(Exception):  # damaged associations
+        return ifcopenshell.util.element.get_material(element, should_skip_usage=False)
+    return None
+
+
 def _with_material(element: ifcopenshell.entity_instance) -> ifcopenshell.entity_instance:
     """The element, or where it has no material the whole that it is a part of and that has one.
 
     A roof's material is the roof's, its body that of its slabs (IfcRelAggregates).
     """
     whole = element
-    with contextlib.suppress(Exception):  # damaged associations and aggregates
+    with contextlib.suppress(Exception):  # damaged aggregates
         while whole is not None and whole.is_a("IfcElement"):
-            if ifcopenshell.util.element.get_material(whole) is not None:
+            if _material_of(whole) is not None:
                 return whole
             whole = ifcopenshell.util.element.get_aggregate(whole)
     return element

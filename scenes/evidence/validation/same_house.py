@@ -16,9 +16,9 @@ from pathlib import Path
 
 from bim.building_file import read_building_file
 from bim.model import Building
+from scenes.evidence.validation.wall_thickness import APART
 
 FILMS = 0.17  # surface resistances of a wall: EN ISO 6946:2017, table 7 [m2 K/W]
-APART = ("reveal", "window frame")
 LEAST = 1.0  # sums below this are not printed [m2]
 
 
