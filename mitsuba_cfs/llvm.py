@@ -1,9 +1,10 @@
 """Find the LLVM library that Dr.Jit loads at its first use, and keep it off the ones that abort.
 
-Dr.Jit takes the first libLLVM that it finds. On processors with AVX-512, Dr.Jit 1.5 ends the whole
-process with LLVM 14, 15 or 16 ("Cannot select: fminimum"), which is what Debian 12 often has. So
-the libraries are listed here by their file names, never by loading them, and the best one is named
-in DRJIT_LIBLLVM_PATH before Dr.Jit starts. A setting of the user's own always wins.
+Dr.Jit takes the first libLLVM that it finds. On x86 processors Dr.Jit 1.5 ends the whole process
+with LLVM 15 or 16 ("Cannot select: fminimum", at the first minimum of an array), which is what
+Debian 12 often has, and it refuses LLVM 14. So the libraries are listed here by their file names,
+never by loading them, and the best one is named in DRJIT_LIBLLVM_PATH before Dr.Jit starts. A
+setting of the user's own always wins.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
-OLDEST_SOUND = 17  # with Dr.Jit 1.5.0 on AVX-512: 14 to 16 were seen to abort, 17 to 19 to work
-OLDEST = 14
+# with Dr.Jit 1.5.0: 15 was seen to abort on x86 with AVX2 alone and with AVX-512, 16 with AVX-512
+OLDEST_SOUND = 17
+OLDEST = 15  # Dr.Jit 1.5.0 refuses older ones
 INSTALL_HINT = (
     "install LLVM 17 or newer (Debian, Ubuntu: apt-get install libllvm19; macOS: brew install "
     f"llvm; Windows: the LLVM installer) or set {VARIABLE} to its shared library"
@@ -50,27 +52,27 @@ class LlvmLibrary:
 
 
 def candidates(
-    folders: Iterable[Path] | None = None, *, avx512: bool | None = None
+    folders: Iterable[Path] | None = None, *, x86: bool | None = None
 ) -> list[LlvmLibrary]:
     """Every LLVM library found, best first; one entry per file however many links lead to it.
 
     Args:
         folders: where to look; by default the system's library folders and `ldconfig -p`.
-        avx512: whether the processor has AVX-512; by default asked of the machine.
+        x86: whether the processor is of this kind; by default asked of the machine.
     """
-    avx512 = has_avx512() if avx512 is None else avx512
+    x86 = is_x86() if x86 is None else x86
     files = (
         _files_in(library_folders()) + _cached_files() if folders is None else _files_in(folders)
     )
     by_target: dict[Path, Path] = {}
     for file in files:
         by_target.setdefault(file.resolve(), file)
-    found = [_judge(file, avx512) for file in by_target.values()]
+    found = [_judge(file, x86) for file in by_target.values()]
     return sorted(found, key=lambda library: (not library.usable, _negated(library.version)))
 
 
 def select_library(
-    folders: Iterable[Path] | None = None, *, avx512: bool | None = None
+    folders: Iterable[Path] | None = None, *, x86: bool | None = None
 ) -> Path | None:
     """The library that Dr.Jit will load, named in DRJIT_LIBLLVM_PATH; None if there is none.
 
@@ -79,7 +81,7 @@ def select_library(
     own = os.environ.get(VARIABLE)
     if own:
         return Path(own)
-    best = next((found for found in candidates(folders, avx512=avx512) if found.usable), None)
+    best = next((found for found in candidates(folders, x86=x86) if found.usable), None)
     if best is None:
         return None
     os.environ[VARIABLE] = str(best.path)
@@ -87,17 +89,9 @@ def select_library(
     return best.path
 
 
-def has_avx512() -> bool:
-    """Whether this processor has AVX-512; True where the system does not tell (x86 only)."""
-    if platform.machine().lower() not in {"x86_64", "amd64", "i686", "x86"}:
-        return False
-    try:
-        return "avx512" in Path("/proc/cpuinfo").read_text()
-    except OSError:
-        pass
-    if sys.platform == "darwin":
-        return _output(["sysctl", "-n", "hw.optional.avx512f"]).strip() != "0"
-    return True
+def is_x86() -> bool:
+    """Whether this processor is an x86 one, of 32 or 64 bits."""
+    return platform.machine().lower() in {"x86_64", "amd64", "i686", "i386", "x86"}
 
 
 def library_folders() -> list[Path]:
@@ -144,7 +138,7 @@ def _cached_files() -> list[Path]:
     return [path for path in paths if _FILE.fullmatch(path.name) and path.is_file()]
 
 
-def _judge(file: Path, avx512: bool) -> LlvmLibrary:
+def _judge(file: Path, x86: bool) -> LlvmLibrary:
     version = version_of(file)
     if not _same_processor(file):
         return LlvmLibrary(file, version, False, "built for another processor than this Python")
@@ -152,11 +146,9 @@ def _judge(file: Path, avx512: bool) -> LlvmLibrary:
         return LlvmLibrary(file, version, False, "its version cannot be told from its name")
     if version[0] < OLDEST:
         return LlvmLibrary(file, version, False, f"older than LLVM {OLDEST}")
-    if version[0] < OLDEST_SOUND and avx512:
-        reason = "aborts Dr.Jit on processors with AVX-512 (Cannot select: fminimum)"
+    if version[0] < OLDEST_SOUND and x86:
+        reason = "aborts Dr.Jit on x86 processors (Cannot select: fminimum)"
         return LlvmLibrary(file, version, False, reason)
-    if version[0] < OLDEST_SOUND:
-        return LlvmLibrary(file, version, True, "usable because this processor has no AVX-512")
     return LlvmLibrary(file, version, True, "usable")
 
 

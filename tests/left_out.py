@@ -21,7 +21,7 @@ BRINGS_IN = [  # what a reason looks like, and what would bring its tests in
     (r"distributed", PEERS),
     (r"Chromium", "a Chromium on the path (Debian: apt-get install chromium)"),
     (r"no disk can be mounted", "running as root where a small file system can be mounted"),
-    (r"no LLVM 14 to 16", "an LLVM 14 to 16 beside the good one, and AVX-512"),
+    (r"no LLVM 15 or 16", "an LLVM 15 or 16 beside the good one, and x86"),
     (r"Linux|linux|SIGKILL", "Linux"),
 ]  # fmt: skip
 UNKNOWN = "not known: say it in tests/left_out.py"

@@ -46,7 +46,7 @@ def traced_view_factor(variant: str, *, seed: int = 1) -> tuple[float, int]:
         return hits / RAYS_SCALAR, RAYS_SCALAR
     sampler.seed(seed, RAYS)
     hit = _hits(mi, scene, sampler.next_2d())
-    # dr.minimum is one of the operations at which LLVM 14 to 16 abort on AVX-512 processors
+    # dr.minimum is one of the operations at which LLVM 15 and 16 abort on x86 processors
     return float(dr.mean(dr.minimum(mi.Float(dr.select(hit, 1.0, 0.0)), 1.0))[0]), RAYS
 
 
