@@ -13,15 +13,17 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import connection, get_context, parent_process
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, ClassVar
 
 Told = Callable[[str], None]
 TOLD, DONE = "told ", "done"  # how lines of a process apart begin
 BLAS_THREADS = "OPENBLAS_NUM_THREADS"  # read when a process loads NumPy
+ENDS_WITHIN = 10.0  # s: processes that were told to end
 MOST_ENDED = 5  # items that end their process, one after the other, before the rest is given up
 
 
@@ -193,9 +195,21 @@ def _each(function: Callable, items: Sequence, tell: Told) -> list[Any]:
     return results
 
 
+def how_it_ended(processes: Iterable[BaseProcess]) -> str:
+    """How the first of a broken pool's processes ended; the pool itself ended the others."""
+    codes = []
+    for process in processes:
+        process.join(ENDS_WITHIN)
+        codes.append(process.exitcode or 0)
+    own = [code for code in codes if code not in (0, -signal.SIGTERM)]
+    return _reason(own[0], False, 0.0) if own else "its process ended by itself"
+
+
 def _reason(code: int, stopped: bool, limit_s: float) -> str:
     if stopped:
         return f"not finished after {limit_s:.0f} s"
+    if code == -getattr(signal, "SIGKILL", signal.SIGTERM):
+        return "its process was killed, as the system does where there is too little memory"
     if code < 0:
         return f"a library ended its process by signal {signal.Signals(-code).name}"
     return f"its process ended with code {code}"

@@ -1,28 +1,35 @@
 """Who computes which task when: this process, processes beside each other, or a Dask cluster.
 
 The first task of a scene goes before its others, which then find the scene's matrices in the cache.
+A process that ends by itself (a library's fault, too little memory) takes nothing with it: the
+tasks that were at work are done again, each alone, and one that ends its process then has failed.
 """
 
 from __future__ import annotations
 
 import logging
-from collections import defaultdict
+import pickle
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, ClassVar, Generic, TypeVar
 
-from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.processes import process_pool, shared_blas
+from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.processes import MOST_ENDED, how_it_ended, process_pool, shared_blas
 from mitsuba_cfs.variants import share_cores
 from scenes.user_errors import one_line
 
 T = TypeVar("T")
 R = TypeVar("R")
 CONNECT_SECONDS = 10
+AHEAD = 2  # tasks for each process: one at work, one for when its result is being looked at
 
 log = logging.getLogger(__name__)
 
@@ -71,26 +78,34 @@ class Tasks(Generic[T, R]):
 
     def _beside_each_other(self, processes: int) -> Iterator[R]:
         leaders, followers = self._waves()
-        begin = partial(_Work.keep, self.compute, self.failed, processes)
-        pool = process_pool(processes, begin)
+        left, again, ended = deque(leaders), deque[T](), 0
+        crew = _Crew[T](processes, (self.compute, self.failed))
         try:
-            waiting: dict[Future, T] = {}
-
-            def begin(some: Sequence[T]) -> None:
-                waiting.update({pool.submit(_Work.attempted, item): item for item in some})
-
-            begin(leaders)
-            while waiting:
-                done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-                for future in done:
-                    item = waiting.pop(future)
-                    yield self._collected(future.result, item)
-                    try:
-                        begin(followers.pop(self.key(item), []))
-                    except BrokenProcessPool as error:
-                        raise DataError("a process beside this one ended by itself") from error
+            while left or again or crew.at_work:
+                if again:
+                    crew.begin(again, 1)
+                else:
+                    crew.begin(left, AHEAD * processes)
+                alone = len(crew.at_work) == 1
+                done, lost = crew.wait()
+                for item, result in done:
+                    ended = 0
+                    yield self._collected(result, item)
+                    left.extend(followers.pop(self.key(item), []))
+                if not lost:
+                    continue
+                reason = crew.renew()
+                if not alone:
+                    log.warning("of a task, %s; %d are done again one by one", reason, len(lost))
+                    again.extend(lost)
+                    continue
+                ended += 1
+                if ended > MOST_ENDED:
+                    raise DataError(f"{ended} tasks one after the other: {reason}")
+                yield self.failed(lost[0], RoomError(reason))
+                left.extend(followers.pop(self.key(lost[0]), []))
         finally:
-            _end(pool)
+            crew.end()
 
     def _collected(self, result: Callable[[], R], item: T) -> R:
         """A future's result; that of a worker lost for good is a failure of the task."""
@@ -153,10 +168,10 @@ class _Work:
     _kept: ClassVar[tuple[Callable, Callable]]
 
     @classmethod
-    def keep(cls, compute: Callable, failed: Callable, processes: int) -> None:
-        """Begin one of so many processes with this."""
+    def keep(cls, file: Path, processes: int) -> None:
+        """Begin one of so many processes with what a file holds."""
         share_cores(processes)
-        cls._kept = compute, failed
+        cls._kept = pickle.loads(file.read_bytes())
 
     @classmethod
     def attempted(cls, item: T) -> Any:
@@ -172,8 +187,62 @@ def _attempted(compute: Callable[[T], R], failed: Callable[[T, BaseException], R
         return failed(item, error)
 
 
+class _Crew(Generic[T]):
+    """So many processes, and the tasks that one of them takes with it when it ends.
+
+    They get their work by a file: one that is killed while it starts does not read to its end what
+    this process writes to it, which then waits for ever.
+    """
+
+    def __init__(self, processes: int, work: tuple[Callable, Callable]) -> None:
+        self._folder = TemporaryDirectory()
+        file = Path(self._folder.name) / "work"
+        file.write_bytes(pickle.dumps(work))
+        self._processes, self._first = processes, partial(_Work.keep, file, processes)
+        self._pool = process_pool(processes, self._first)
+        self._started: dict[int | None, BaseProcess] = {}
+        self.at_work: dict[Future, T] = {}
+
+    def begin(self, tasks: deque[T], most: int) -> None:
+        """Begin the first of these until so many have begun."""
+        while tasks and len(self.at_work) < most:
+            try:
+                future = self._pool.submit(_Work.attempted, tasks[0])
+            except BrokenProcessPool as error:  # ended with nothing to do, or just now
+                future = Future()
+                future.set_exception(error)
+            self.at_work[future] = tasks.popleft()
+            self._started |= self._pool._processes or {}
+
+    def wait(self) -> tuple[list[tuple[T, Callable[[], Any]]], list[T]]:
+        """Tasks that are ready, with what gives their results; those that went with a process."""
+        ready, _ = wait(self.at_work, return_when=FIRST_COMPLETED)
+        if any(map(_lost, ready)):  # then no task of this pool will end any more
+            ready, _ = wait(self.at_work)
+        items = {
+            future: self.at_work.pop(future) for future in list(self.at_work) if future in ready
+        }
+        done = [(item, future.result) for future, item in items.items() if not _lost(future)]
+        return done, [item for future, item in items.items() if _lost(future)]
+
+    def renew(self) -> str:
+        """Fresh processes in place of those of which one ended; how it did."""
+        _end(self._pool)
+        reason = how_it_ended(self._started.values())
+        self._pool, self._started = process_pool(self._processes, self._first), {}
+        return reason
+
+    def end(self) -> None:
+        """End the processes now, without waiting for the tasks under way."""
+        _end(self._pool)
+        self._folder.cleanup()
+
+
+def _lost(future: Future) -> bool:
+    return not future.cancelled() and isinstance(future.exception(), BrokenProcessPool)
+
+
 def _end(pool: ProcessPoolExecutor) -> None:
-    """End the pool now, without waiting for the tasks under way."""
     running = list((pool._processes or {}).values())
     pool.shutdown(wait=False, cancel_futures=True)
     for process in running:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-from dataclasses import replace
+import signal
+import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -195,3 +198,79 @@ def test_processes_multiply_with_their_share_of_the_cores(monkeypatch, cores, gi
     [(process, told)] = list(tasks.results(processes=2))
     assert (told, process != os.getpid()) == (expected, True)
     assert os.environ.get("OPENBLAS_NUM_THREADS") == given
+
+
+def ends_its_process(item: str) -> str:
+    """By a signal: always, or until a file tells that it did so before."""
+    kind, _, told = item.partition(":")
+    if kind == "always" or (kind == "once" and not Path(told).exists()):
+        if kind == "once":
+            Path(told).touch()
+        os.kill(os.getpid(), signal.SIGABRT if kind == "always" else signal.SIGKILL)
+    if kind == "slow":
+        time.sleep(0.3)
+    return item
+
+
+def said_of(item: str, error: BaseException) -> str:
+    return f"{item.partition(':')[0]} failed: {error}"
+
+
+def test_a_process_that_ends_takes_no_other_task_with_it(tmp_path):
+    """One killed for memory is done again; one that aborts alone too has failed; others go on."""
+    items = [
+        "slow:1",
+        f"once:{tmp_path / 'told'}",
+        "slow:2",
+        "always:",
+        *(f"n:{i}" for i in range(9)),
+    ]
+    tasks = Tasks(items, ends_its_process, said_of, key=str, scene=str)
+    results = list(tasks.results(processes=2))
+    failed = [one for one in results if "failed" in one]
+    assert len(failed) == 1
+    assert failed[0].startswith("always failed: ") and "signal SIGABRT" in failed[0]
+    assert sorted(set(results) - set(failed)) == sorted(set(items) - {"always:"})
+    assert len(results) == len(items)
+
+
+class Trap:
+    """Kills the process that unpickles it, until a file tells that it did so before."""
+
+    def __init__(self, told: Path) -> None:
+        self.told = told
+
+    def __setstate__(self, state: dict) -> None:
+        told = state["told"]
+        if multiprocessing.current_process().name != "MainProcess" and not told.exists():
+            told.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+@dataclass(frozen=True)
+class Large:
+    """Work that holds more than a pipe does, behind a trap."""
+
+    trap: Trap
+    building: bytes = bytes(1_000_000)
+
+    def __call__(self, item: int) -> int:
+        return item
+
+
+def test_a_process_that_is_killed_while_it_starts_is_started_again(tmp_path):
+    tasks = Tasks([1, 2, 3], Large(Trap(tmp_path / "told")), fault, key=str, scene=str)
+    assert sorted(tasks.results(processes=2)) == [1, 2, 3]
+
+
+def test_processes_that_all_end_are_given_up_with_one_line():
+    tasks = Tasks([f"always:{i}" for i in range(40)], ends_its_process, said_of, key=str, scene=str)
+    with pytest.raises(DataError, match="signal SIGABRT"):
+        list(tasks.results(processes=2))
+
+
+def test_followers_of_a_task_that_ends_its_process_are_done():
+    items = ["always:", "n:1", "n:2"]
+    tasks = Tasks(items, ends_its_process, said_of, key=str, scene=lambda _: "one")
+    results = list(tasks.results(processes=2))
+    assert [one.partition(" ")[0] for one in results] == ["always", "n:1", "n:2"]
