@@ -34,7 +34,7 @@ def window_bsdf():
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_cfs.bsdf.traced_klems import gather, table
+    from mitsuba_cfs.bsdf.traced_klems import cell, gather, table
 
     flags = mi.BSDFFlags
     TRANSMISSION, REFLECTION = int(flags.GlossyTransmission), int(flags.GlossyReflection)
@@ -105,7 +105,7 @@ def window_bsdf():
             if self.angular is None:
                 return self.through(ctx, known, active)
             place = dr.clip(dr.abs(known.z), 0, 1) * (self.angles - 1)
-            low = mi.UInt32(dr.minimum(place, self.angles - 2))
+            low = cell(place, self.angles - 2)
             a, b = (gather(self.angular, low + k, active) for k in (0, 1))
             return dr.lerp(a, b, place - mi.Float(low))
 

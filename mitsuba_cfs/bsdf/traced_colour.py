@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.colour import WAVELENGTHS_NM, primary_spectra
-from mitsuba_cfs.bsdf.traced_klems import gather, table
+from mitsuba_cfs.bsdf.traced_klems import cell, gather, table
 
 
 def sees_colour() -> bool:
@@ -35,7 +35,7 @@ class TracedColour:
         seen = []
         for nm in si.wavelengths:
             place = dr.clip((nm - WAVELENGTHS_NM[0]) / step, 0.0, last + 0.999)
-            below = mi.UInt32(place)
+            below = cell(place, last)
             above = place - mi.Float(below)
             parts = [
                 gather(spectrum, below, active) * (1 - above)

@@ -23,6 +23,15 @@ def gather(values, index, active=True):
     return dr.gather(mi.Float, values, index, active)
 
 
+def cell(place, last: int):
+    """The whole number at or below a place in a table, 0 to `last`.
+
+    Also where the place is no number, as of a ray that met nothing: clipped before it is a whole
+    number it stays none, and what is then gathered lies outside the table, on AVX2 a signal.
+    """
+    return mi.UInt32(dr.clip(mi.Int32(place), 0, last))
+
+
 class TracedBasis:
     """A Klems basis whose methods take and give Mitsuba's types."""
 
@@ -42,7 +51,7 @@ class TracedBasis:
         count = gather(self.counts, ring)
         turns = dr.atan2(y, x) * dr.inv_two_pi
         within = dr.floor((turns - dr.floor(turns)) * count + 0.5)
-        within = dr.select(within >= count, 0.0, within)
+        within = dr.select(within < count, within, 0.0)  # 0 where it is no number too
         return mi.UInt32(gather(self.starts, ring) + within)
 
     def direction(self, patch, u, v):

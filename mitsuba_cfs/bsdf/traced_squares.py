@@ -5,6 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from mitsuba_cfs.bsdf.traced_klems import cell
 from mitsuba_cfs.bsdf.traced_tree import disk_to_square, square_to_disk
 
 
@@ -16,8 +17,8 @@ class TracedSquares:
 
     def patch(self, x, y, z):
         """Cell of the direction with cosines (x, y); z does not matter."""
-        u, v = (dr.minimum(p * self.width, self.width - 1) for p in disk_to_square(x, y))
-        return mi.UInt32(u) * self.width + mi.UInt32(v)
+        u, v = (cell(p * self.width, self.width - 1) for p in disk_to_square(x, y))
+        return u * self.width + v
 
     def direction(self, patch, u, v):
         """(x, y, |z|) of the point (u, v) of a cell."""

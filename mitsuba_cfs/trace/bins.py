@@ -8,7 +8,14 @@ import numpy as np
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KlemsBasis
+from mitsuba_cfs.bsdf.traced_klems import cell
 from mitsuba_cfs.sky.patches import ReinhartSky
+
+
+def _around(place: mi.Int32, count: mi.Int32) -> mi.Int32:
+    """A place of a ring of `count` that is at most one turn off; 0 for none (as `cell`)."""
+    place = dr.select(place < 0, place + count, place)
+    return dr.maximum(dr.select(place >= count, place - count, place), 0)
 
 
 class DirectionBins:
@@ -48,10 +55,7 @@ class DirectionBins:
             ring += dr.select(local.z <= float(cosine), mi.UInt32(1), mi.UInt32(0))
         count = dr.gather(mi.Float, self._count, ring)
         turn = dr.atan2(-local.y, local.x) * dr.inv_two_pi
-        place = mi.Int32(dr.floor(dr.fma(turn, count, 0.5)))
-        whole = mi.Int32(count)
-        place = dr.select(place < 0, place + whole, place)
-        place = dr.select(place >= whole, place - whole, place)
+        place = _around(mi.Int32(dr.floor(dr.fma(turn, count, 0.5))), mi.Int32(count))
         return dr.gather(mi.UInt32, self._first, ring) + mi.UInt32(place)
 
     def between(self, values: mi.Float, local: mi.Vector3f, *, ends: bool = True) -> mi.Float:
@@ -81,8 +85,8 @@ class DirectionBins:
         )
         place = turn * count
         low = dr.floor(place)
-        whole, left = mi.Int32(count), mi.Int32(low)
-        left = dr.select(left < 0, left + whole, left)
+        whole = mi.Int32(count)
+        left = _around(mi.Int32(low), whole)
         right = dr.select(left + 1 >= whole, 0, left + 1)
         a, b = (dr.gather(mi.Float, values, first + mi.UInt32(k)) for k in (left, right))
         return dr.lerp(a, b, place - low)
@@ -119,12 +123,9 @@ class SkyBins:
     def index(self, direction: mi.Vector3f) -> mi.UInt32:
         """Patch of unit world direction(s)."""
         altitude = dr.asin(dr.clip(direction.z, -1, 1))
-        row = mi.UInt32(dr.clip(altitude / self._row_height, 0, self._last_row))
+        row = cell(altitude / self._row_height, self._last_row)
         count = dr.gather(mi.Float, self._count, row)
         turn = dr.atan2(direction.x, direction.y) * dr.inv_two_pi
-        place = mi.Int32(dr.floor(dr.fma(turn, count, 0.5)))
-        whole = mi.Int32(count)
-        place = dr.select(place < 0, place + whole, place)
-        place = dr.select(place >= whole, place - whole, place)
+        place = _around(mi.Int32(dr.floor(dr.fma(turn, count, 0.5))), mi.Int32(count))
         patch = dr.gather(mi.UInt32, self._first, row) + mi.UInt32(place)
         return dr.select(direction.z < 0, mi.UInt32(0), patch)

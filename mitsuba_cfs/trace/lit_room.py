@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KlemsBasis
 from mitsuba_cfs.bsdf.klems_peak import ring_falls, specular_fall
+from mitsuba_cfs.bsdf.traced_klems import cell
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
@@ -33,7 +34,7 @@ class AngularBeam:
     def at(self, local: mi.Vector3f) -> mi.Float:
         """Share at local directions, linear between the angles."""
         place = dr.clip(dr.abs(local.z), 0, 1) * self._last
-        low = mi.UInt32(dr.minimum(place, self._last - 1))
+        low = cell(place, self._last - 1)
         a, b = (dr.gather(mi.Float, self._values, low + k) for k in (0, 1))
         return dr.lerp(a, b, place - mi.Float(low))
 

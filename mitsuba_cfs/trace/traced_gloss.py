@@ -7,6 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.bsdf.traced_klems import cell
 from mitsuba_cfs.gloss import STEPS, Gloss
 from mitsuba_cfs.surfaces import Surfaces, triangle_areas
 from mitsuba_cfs.trace.sampling import vectors
@@ -53,7 +54,7 @@ class TracedGloss:
         """Reflectance of a triangle's gloss, 0 where it has none."""
         kind = dr.gather(mi.UInt32, self._kind, triangle, active)
         place = dr.clip(cosine, 0, 1) * (STEPS - 1)
-        low = mi.UInt32(dr.minimum(place, STEPS - 2))
+        low = cell(place, STEPS - 2)
         a, b = (dr.gather(mi.Float, self._table, kind * STEPS + low + k, active) for k in (0, 1))
         return dr.lerp(a, b, place - mi.Float(low))
 
