@@ -16,7 +16,7 @@ from tests.modules import EVIDENCE, MODULES, dotted, file_name, imports
 # what it imports.  What shares a rank knows nothing of the others there.
 RANKS = {
     "mitsuba_cfs": (
-        {"directions", "errors", "gloss", "llvm", "phases", "processes", "progress",
+        {"directions", "errors", "gloss", "interpreter", "llvm", "phases", "processes", "progress",
          "source_code"},
         {"compiled", "files", "surfaces", "variants"},
         {"bsdf", "images", "sky", "stored_arrays", "window_parts"},
