@@ -80,7 +80,7 @@ def check_rooms(
     glazed = [space for space in spaces if space.windows]
     dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
     if not glazed:
-        raise no_window(building, options.building)
+        raise no_window(building, check.file)
     views, view_problems = check.views(glazed)
     check.asked = {s.guid: asked_of(files.rules, s, uses[s.guid]) for s in glazed}
     lights, problems, notes = check.lights(glazed)
