@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from thermal.closure import Closure
 
 
@@ -59,7 +60,7 @@ def read_g_table(path: str | Path) -> AngularGValue:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.DictReader(line for line in stream if line.strip()))
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"cannot be read: {error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     if not rows or not {"polar_deg", "g"} <= set(rows[0]):
         raise DataError("expected the columns polar_deg, g (and azimuth_deg)", file=path)
     table: dict[tuple[float, float], float] = {}

@@ -36,6 +36,9 @@ COLOURS = ("red", "green", "blue")  # bands of colour pictures
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
 
 
+CUT_OFF = "cut off"  # kind of the problem of a file that has lost its end
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """One fault of the input: where it is, what it is, what it means and what was done."""

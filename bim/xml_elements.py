@@ -11,6 +11,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 DEEPEST = 100  # elements within each other
 CHUNK = 1 << 20  # bytes parsed at once
@@ -37,7 +38,7 @@ def xml_elements(
         reader.parser.Parse(b"", True)
         yield from reader.taken()
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     except (expat.ExpatError, LookupError, ValueError) as error:
         if isinstance(error, DataError):
             raise

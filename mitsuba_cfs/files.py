@@ -37,9 +37,12 @@ REASONS = {
 }
 
 
-def reason(error: OSError) -> str:
-    """Why something could not be written, in words."""
-    return REASONS.get(error.errno or 0) or error.strerror or " ".join(str(error).split())
+def reason(error: Exception) -> str:
+    """Why something could not be read or written, without the number and file that Python adds."""
+    words = " ".join(str(error).split())
+    if not isinstance(error, OSError):
+        return words
+    return REASONS.get(error.errno or 0) or error.strerror or words
 
 
 @contextmanager

@@ -39,6 +39,8 @@ SIGNALLED = 128  # and the signal's number
 # OpenBLAS reads it when NumPy is loaded: its threads wait for work in 2^4 turns of a loop, not in
 # the 2^28 that they are busy for between two small products of a room, beside Dr.Jit's own
 BLAS_WAIT = {"OPENBLAS_THREAD_TIMEOUT": "4"}
+# Workers are Pythons that would look for modules in the user's current folder first
+SAFE_PATH = {"PYTHONSAFEPATH": "1"}
 
 
 class Terminated(BaseException):
@@ -109,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     143 and 129: ended by SIGTERM or SIGHUP.  A problem gives one line on stderr; with CFS_DEBUG=1
     also its traceback.
     """
-    os.environ.update(BLAS_WAIT | os.environ)
+    os.environ.update(BLAS_WAIT | os.environ | SAFE_PATH)
     open_streams()
     for name in ("SIGTERM", "SIGHUP"):  # Windows has no SIGHUP
         number = getattr(signal, name, None)

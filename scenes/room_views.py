@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bim.model import Building, Space
 from bim.sensors import held_views, horizontal_section, sensor_grid, view_point
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from mitsuba_cfs.images.view import View, fisheye, fitted, parse_view
 
 MARGIN = 0.5  # of the grid of eyes from the walls [m]
@@ -39,7 +40,7 @@ def given_views(text: str, size: int = 800) -> list[NamedView]:
         try:
             lines = file.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
-            raise DataError(f"cannot be read: {error}", file=file, field="--view") from None
+            raise DataError(f"cannot be read: {reason(error)}", file=file, field="--view") from None
         stem = file.stem
     found = []
     for number, line in enumerate(line for line in lines if "-v" in line):

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mitsuba_cfs.errors import DataError, no_such_key
+from mitsuba_cfs.files import reason
 
 T = TypeVar("T", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0)]
@@ -53,7 +54,7 @@ def read_table(path: Path) -> dict[str, Any]:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataError(f"is not TOML: {error}", file=path) from error
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from error
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
 
 
 def validated(model: type[T], table: dict[str, Any], path: Path) -> T:

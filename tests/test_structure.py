@@ -16,7 +16,7 @@ from tests.modules import EVIDENCE, MODULES, dotted, file_name, imports
 # what it imports.  What shares a rank knows nothing of the others there.
 RANKS = {
     "mitsuba_cfs": (
-        {"directions", "errors", "gloss", "llvm", "phases", "processes", "progress",
+        {"directions", "errors", "gloss", "interpreter", "llvm", "phases", "processes", "progress",
          "source_code"},
         {"compiled", "files", "surfaces", "variants"},
         {"bsdf", "images", "sky", "stored_arrays", "window_parts"},
@@ -115,6 +115,26 @@ def _long_signatures(name: str, source: str) -> Iterator[str]:
         count = len(given) - (given[:1] in (["self"], ["cls"]))
         if count > MOST_POSITIONAL:
             yield f"{name}:{node.lineno}: {node.name} has {count} positional parameters"
+
+
+def _system_words(name: str, source: str) -> Iterator[str]:
+    """Messages that hold what Python says of an error of the system: its number, the file again."""
+    for handler in ast.walk(_tree(source)):
+        if not (isinstance(handler, ast.ExceptHandler) and handler.type and handler.name):
+            continue
+        if "OSError" not in ast.unparse(handler.type):
+            continue
+        for shown in ast.walk(handler):
+            if isinstance(shown, ast.FormattedValue):
+                value = ast.unparse(shown.value)
+                if value == handler.name or value.startswith(f"{handler.name}.strerror"):
+                    yield f"{name}:{shown.lineno}: `mitsuba_cfs.files.reason` says why"
+
+
+def test_errors_of_the_system_are_said_in_words() -> None:
+    apart = ("bim/bonsai/",)  # has nothing of this program
+    sources = {n: s for n, s in SOURCES.items() if not n.startswith((*apart, EVIDENCE))}
+    assert not [fault for module in sources.items() for fault in _system_words(*module)]
 
 
 def test_modules_import_only_from_below() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 MOST_BYTES = 512 << 20
 BODY, TERRAIN = "IfcBuildingElementProxy", "IfcGeographicElement"
@@ -48,7 +49,7 @@ def read_bytes(path: Path) -> bytes:
             raise DataError(f"is too big: at most {MOST_BYTES >> 20} MiB are read", file=path)
         return path.read_bytes()
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
 
 
 def read_object(path: Path) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 MOST_BYTES = 256 << 20  # of a file: memory is ten times as much
 METRES = {"Meters": 1.0, "Millimeters": 1e-3, "Centimeters": 0.01, "Feet": 0.3048, "Inches": 0.0254}
@@ -159,7 +160,7 @@ def read_json(path: Path) -> dict[str, Any]:
             raise DataError(f"is too big: at most {MOST_BYTES >> 20} MiB are read", file=path)
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     except RecursionError:
         raise DataError("is no JSON: nested too deeply", file=path) from None
     except ValueError as error:  # of JSON, of its text, of a number with too many digits

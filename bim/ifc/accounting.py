@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from bim.account import Account, StoreyAccount
 from bim.ifc.defects import DRAWN_TWICE
 from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms
-from bim.ifc.project import CUT_OFF, storey_of
+from bim.ifc.project import storey_of
 from bim.ifc.source import Source
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
 from bim.ifc.transparent import PHANTOM
-from bim.model import Problem, Space
+from bim.model import CUT_OFF, Problem, Space
 from bim.names import label_of
 from bim.shell import open_edges
 

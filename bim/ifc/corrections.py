@@ -32,6 +32,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mitsuba_cfs.errors import DataError, no_such_key
+from mitsuba_cfs.files import reason
 from mitsuba_cfs.gloss import ROUGHEST, Gloss, lacquer
 
 if TYPE_CHECKING:
@@ -146,8 +147,10 @@ def read_corrections(path: str | PathLike[str]) -> Corrections:
     path = Path(path)
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise DataError(f"is not TOML: {error}", file=path) from None
+    except OSError as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     _check_keys(table, KEYS, path)
     entries = table.get("reflectance", [])
     if not isinstance(entries, list):

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
-from bim.model import Problem
+from bim.model import CUT_OFF, Problem
 from mitsuba_cfs.errors import DataError
 
-CUT_OFF = "cut off"  # kind of the problem of a file that has lost its end
 END = 4096  # bytes in which the end of a STEP file is looked for
 
 

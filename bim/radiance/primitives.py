@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 VOID = "void"
 WORD = re.compile(r'"([^"]*)"|\'([^\']*)\'|(\S+)')
@@ -162,7 +163,7 @@ def _text(path: Path) -> str:
             raise DataError(f"is bigger than {LARGEST_FILE / 2**20:.0f} MB", file=path)
         data = path.read_bytes()
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     if data.startswith(b"#?RADIANCE") and b"\0" in data:
         raise DataError("is an octree; give the scene files that it was made of", file=path)
     if b"\0" in data:

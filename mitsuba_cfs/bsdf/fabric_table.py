@@ -17,6 +17,7 @@ from pathlib import Path
 
 from mitsuba_cfs.bsdf.fabric import FabricBand
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 TEXTS = {
     "name": "name product productname fabric fabricname collection reference",
@@ -132,7 +133,7 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
     except UnicodeDecodeError:
         raise DataError("is not UTF-8", file=path) from None
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     head = next((line for line in text.splitlines() if line.strip()), "")
     mark = ";" if ";" in head else "\t" if "\t" in head else ","
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark, strict=True)

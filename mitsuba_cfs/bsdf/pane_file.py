@@ -17,6 +17,7 @@ from mitsuba_cfs.bsdf.en410 import visible_value
 from mitsuba_cfs.bsdf.glazing import Pane
 from mitsuba_cfs.bsdf.optical_data import is_optical_data, optical_data_of
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 FloatArray = NDArray[np.float64]
 VISIBLE_NM = (400.0, 760.0)  # that a spectrum is to cover for visible values
@@ -112,7 +113,7 @@ def _text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
 
 
 def _json(text: str, path: Path) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 
 def read_radiance_layer(path: str | PathLike[str], period: tuple[float, float]) -> PeriodicLayer:
@@ -56,7 +57,7 @@ def _primitives(path: str | PathLike[str]) -> list[tuple[str, str, str, list[flo
     try:
         text = Path(path).read_text(encoding="ascii")
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     except UnicodeDecodeError:
         raise DataError("is not a Radiance scene", file=path) from None
     lines = [line.split("#")[0] for line in text.splitlines()]

@@ -20,6 +20,7 @@ from mitsuba_cfs.bsdf.klems import STANDARD_BASES, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml_write import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 __all__ = ["BsdfFile", "read_bsdf_xml", "write_bsdf_xml"]
 
@@ -69,7 +70,7 @@ def _content(path: str | PathLike[str]) -> bytes:
         with open(path, "rb") as file:
             content = file.read(MOST_BYTES + 1)
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror or error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     if len(content) > MOST_BYTES:
         most = f"at most {MOST_BYTES >> 20} MiB are read (a tensor tree can be reduced)"
         raise DataError(f"is too big: {most}", file=path)

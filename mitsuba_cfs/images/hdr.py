@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import write_bytes
+from mitsuba_cfs.files import reason, write_bytes
 from mitsuba_cfs.images import rgbe as codec
 from mitsuba_cfs.images.view import View, format_view, view_changes
 
@@ -70,7 +70,7 @@ def read_hdr(path: str | PathLike[str]) -> Picture:
     try:
         data = Path(path).read_bytes()
     except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror})", file=path) from None
+        raise DataError(f"cannot be read ({reason(error)})", file=path) from None
     header, resolution, start = _header(data, path)
     signs, shape, transposed = _orientation(resolution, path)
     rgbe = np.empty((*shape, 4), dtype=np.uint8)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import replacing
+from mitsuba_cfs.files import reason, replacing
 
 T = TypeVar("T", int, float)
 
@@ -49,7 +49,7 @@ def read_matrix(path: str | PathLike[str]) -> NDArray[np.float64]:
             header = _read_header(file, path)
             data = file.read()
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", file=path) from error
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
     shape = (header.rows, header.columns, header.components)
     values = _values(data, header, path)
     if values.size != np.prod(shape):
@@ -70,7 +70,7 @@ def read_header(path: str | PathLike[str]) -> MatrixHeader:
         with open(path, "rb") as file:
             return _read_header(file, path)
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", file=path) from error
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
 
 
 def write_matrix(

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from mitsuba_cfs.sky import sun
 from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG
 from mitsuba_cfs.sky.plausible import checked_sun
@@ -106,7 +107,7 @@ def _table(path: str | PathLike[str]) -> pd.DataFrame:
     try:
         table = pd.read_csv(path, dtype=str, skipinitialspace=True)
     except (OSError, UnicodeDecodeError, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
-        raise DataError(f"cannot be read as CSV: {error}", file=path) from error
+        raise DataError(f"cannot be read as CSV: {reason(error)}", file=path) from error
     for name in COLUMNS:
         if name not in table:
             raise DataError("missing: expected " + ", ".join(COLUMNS), file=path, field=name)

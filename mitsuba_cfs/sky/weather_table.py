@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 FilePath = str | PathLike[str]
 
@@ -68,7 +69,7 @@ def read_lines(path: FilePath) -> list[str]:
     try:
         text = Path(path).read_text(encoding="latin-1")  # city names in any encoding pass
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", file=path) from error
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
     lines = text.removeprefix("ï»¿").rstrip().splitlines()  # the prefix: a UTF-8 byte order mark
     if not lines:
         raise DataError("the file is empty", file=path)

@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from scenes.calibration.traits import Traits
 
 FILE = Path(__file__).with_name("errors.json")
@@ -62,7 +63,9 @@ class MeasuredErrors:
             ]
             return cls(table["script"], table["made"], tuple(cases))
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise DataError(f"is no table of measured errors ({error})", file=path) from error
+            raise DataError(
+                f"is no table of measured errors ({reason(error)})", file=path
+            ) from error
 
     def expected(self, traits: Traits) -> dict[Pair, float]:
         """Expected relative error of DGP of each method and metric."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from mitsuba_cfs.interpreter import own_paths, own_python
 
 COMPILE = "from scenes.commands.compiling import compile_now; compile_now()"
 
@@ -25,7 +26,7 @@ def compiled_beside() -> Iterator[None]:
         return
     nowhere = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
     with subprocess.Popen(
-        [sys.executable, "-c", COMPILE], stderr=subprocess.DEVNULL, **nowhere
+        own_python("-c", COMPILE), env=own_paths(), stderr=subprocess.DEVNULL, **nowhere
     ) as process:
         try:
             yield

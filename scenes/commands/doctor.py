@@ -8,12 +8,12 @@ import platform
 import re
 import shutil
 import subprocess
-import sys
 from importlib import metadata
 
 import click
 
 from mitsuba_cfs import llvm
+from mitsuba_cfs.interpreter import own_paths, own_python
 
 PROGRAM = "mitsuba-cfs"
 PEERS = {
@@ -41,11 +41,12 @@ def command() -> None:
 
 def self_test() -> str | None:
     """Run the self-test in a process of its own; print its result, or return what went wrong."""
-    command_line = [sys.executable, "-m", "scenes.commands.self_test"]
+    command_line = own_python("-m", "scenes.commands.self_test")
     try:
         done = subprocess.run(
-            command_line, capture_output=True, text=True, timeout=TIME_LIMIT, check=False
-        )
+            command_line, env=own_paths(), capture_output=True, text=True, timeout=TIME_LIMIT,
+            check=False,
+        )  # fmt: skip
     except subprocess.TimeoutExpired:
         return f"self-test: no result after {TIME_LIMIT} s"
     if done.returncode != 0:

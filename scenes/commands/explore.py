@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 
@@ -53,7 +54,7 @@ def _serve(folder: Path, port: int, *, open_it: bool) -> None:
     try:
         running = server(folder, port)
     except OSError as error:
-        raise DataError(f"port {port} cannot be used: {error.strerror}", field="--port") from None
+        raise DataError(f"port {port} cannot be used: {reason(error)}", field="--port") from None
     with running:
         address = f"http://127.0.0.1:{running.server_port}/"
         click.echo(f"{address} until Ctrl-C")

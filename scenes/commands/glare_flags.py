@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 
 if TYPE_CHECKING:
     from mitsuba_cfs.glare.evaluation import GlareOptions
@@ -160,7 +161,7 @@ def given_view(request: Request, width: int, height: int) -> View | None:
         try:
             text = path.read_text(errors="replace")
         except OSError as error:
-            raise DataError(f"cannot be read ({error.strerror})", file=path) from None
+            raise DataError(f"cannot be read ({reason(error)})", file=path) from None
         changes = view_changes(text) | changes
     if not changes:
         return None

@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import check_file, write_table
+from mitsuba_cfs.files import check_file, reason, write_table
 from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
 from mitsuba_cfs.sky.cie import KINDS
 from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_PATCHES
@@ -273,7 +273,7 @@ def read_weather(path: Path) -> Weather:
         with open(path, "rb") as file:
             start = file.read(6).lower()
     except OSError as error:
-        raise DataError(f"cannot be read: {error.strerror}", file=path) from error
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
     found = read_wea(path, whole_year=False) if start.startswith(b"place") else read_epw(path)
     _tell(found)
     return found

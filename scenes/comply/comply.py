@@ -42,7 +42,7 @@ from scenes.room.equal_rooms import corner
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomSimulation, skies_for
 from scenes.run.building import building_of
-from scenes.run.inputs import named_spaces
+from scenes.run.inputs import named_spaces, no_window
 from scenes.run.notes import unused_notes
 from scenes.run.rooms import RoomSeries
 
@@ -80,7 +80,7 @@ def check_rooms(
     glazed = [space for space in spaces if space.windows]
     dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
     if not glazed:
-        raise DataError("no space has a window", file=options.building, element="IfcWindow")
+        raise no_window(building, check.file)
     views, view_problems = check.views(glazed)
     check.asked = {s.guid: asked_of(files.rules, s, uses[s.guid]) for s in glazed}
     lights, problems, notes = check.lights(glazed)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import write_text
+from mitsuba_cfs.files import reason, write_text
 
 BEFORE, AFTER = "cfs.give(", ");\n"  # of the JSON in a data file, a script
 
@@ -43,4 +43,4 @@ def read_data(path: Path) -> Any:
         text = path.read_text(encoding="utf-8")
         return json.loads(text.removeprefix(BEFORE).removesuffix(AFTER))
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise DataError(f"is no data of an explorer: {error}", file=path) from None
+        raise DataError(f"is no data of an explorer: {reason(error)}", file=path) from None

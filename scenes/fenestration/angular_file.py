@@ -36,6 +36,7 @@ from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.bsdf.pane_file import read_glazing_layers, read_pane_file
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from scenes.toml_file import Share, TomlTable
 
 COLUMNS = ("theta_deg", "transmittance")
@@ -130,7 +131,7 @@ def read_angular_table(path: Path) -> AngularTable:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.DictReader(line for line in stream if line.strip()))
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"cannot be read: {error}", file=path) from None
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
     if not rows or not set(COLUMNS) <= set(rows[0]):
         raise DataError(f"expected the columns {', '.join(COLUMNS)}", file=path)
     names = [*COLUMNS, *(name for name in OPTIONAL if name in rows[0])]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from mitsuba_cfs.sky import air
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -56,7 +57,7 @@ def read_measured(path: Path, table: MeasuredTable) -> Weather:
     try:
         data = pd.read_csv(path)
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise DataError(f"cannot be read: {error}", file=path) from error
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
     times = _times(data, table.time, path)
     step = _step(times, path)
     names = table.columns.model_dump(exclude_none=True)

@@ -24,6 +24,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from bim.use import KINDS, YearSchedule, day_of_year
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import reason
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.weather import Weather
 from scenes.plausible import Limits
@@ -270,7 +271,7 @@ def _column(path: Path, column: str, hours: int) -> FloatArray:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"cannot be read: {error}", file=path) from error
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from error
     names = [name for name in (rows[0] if rows else {}) if name]
     if column not in names:
         raise DataError(f"no column {column!r}; there are {', '.join(names)}", file=path)

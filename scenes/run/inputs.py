@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 
-from bim.model import Building, Problem, Space
+from bim.model import CUT_OFF, Building, Problem, Space
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
@@ -49,10 +49,15 @@ def chosen_spaces(
         return chosen
     chosen = [space for space in chosen if lit(space)]
     if not chosen:
-        why = _because(building, "window") or _because(building, "room")
-        what = f"no space has a window to the outside{why}"
-        raise DataError(what, file=path, element="IfcWindow")
+        raise no_window(building, path)
     return chosen
+
+
+def no_window(building: Building, path: Path) -> DataError:
+    """That no space has a window, with what the model's problems say of it."""
+    why = _because(building, "window") or _because(building, "room")
+    what = f"no space has a window to the outside{why}"
+    return DataError(what, file=path, element="IfcWindow")
 
 
 def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[Space]:
@@ -89,7 +94,8 @@ def _says(text: str, name: str) -> bool:
 
 
 def _because(building: Building, kind: str) -> str:
-    lost = _lost(building, kind)
+    cut_off = [problem for problem in building.problems if problem.kind == CUT_OFF]
+    lost = [*cut_off, *_lost(building, kind)]
     return f": {_quoted(lost)}" if lost else ""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_bytes
 from mitsuba_cfs.matrices.cache import digest
+from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.source_code import code_version
 from scenes.explore.folder import CASE, write_rooms
@@ -41,7 +43,7 @@ def explorer_key(case: Case) -> str:
     return digest(case.key, code_version(__name__))[:32]
 
 
-def compute_explorer(case: Case) -> ExploredCase:
+def compute_explorer(case: Case, progress: Progress = silent) -> ExploredCase:
     """Every hour's pictures, plan and temperatures of a case, as files of the explorer.
 
     Raises: as `scenes.study.one_case.compute_case`.
@@ -49,7 +51,7 @@ def compute_explorer(case: Case) -> ExploredCase:
     with ALONE, tempfile.TemporaryDirectory() as name:
         variants.activate()
         held, folder = CaseRoom.of(case), Path(name)
-        room, weather = held.year(case, explore=True), held.weather
+        room, weather = held.year(case, explore=True, progress=progress), held.weather
         run = RunResult(
             held.building, weather.midpoints, sun_directions(weather), (room,), (), {}
         )  # fmt: skip
@@ -60,11 +62,16 @@ def compute_explorer(case: Case) -> ExploredCase:
 
 
 def explorers(
-    cases: Sequence[Case], folder: Path, *, processes: int = 1, scheduler: str | None = None
+    cases: Sequence[Case],
+    folder: Path,
+    *,
+    processes: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = silent,
 ) -> Iterator[tuple[Case, ExploredCase]]:
     """The explorer of each case, once for each key: kept in the folder, or computed and kept.
 
-    Args: processes, scheduler: as of `scenes.study.schedule.computed`.
+    Args: processes, scheduler, progress: as of `scenes.study.schedule.computed`.
     """
     once = {explorer_key(case): case for case in cases}
     left = []
@@ -74,7 +81,9 @@ def explorers(
             left.append(case)
         else:
             yield case, kept
-    tasks = Tasks(left, compute_explorer, _failed, key=explorer_key, scene=attrgetter("scene"))
+    here = processes == 1 and scheduler is None
+    compute = partial(compute_explorer, progress=progress) if here else compute_explorer
+    tasks = Tasks(left, compute, _failed, key=explorer_key, scene=attrgetter("scene"))
     for found in tasks.results(processes=processes, scheduler=scheduler):
         if not found.error:
             _keep(found, folder)

@@ -21,6 +21,7 @@ from mitsuba_cfs.glare.classes import CLASSES, class_hours, hour_not_exceeded, p
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.metrics.schedules import working_hours
+from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
@@ -97,23 +98,24 @@ class CaseRoom:
         )  # fmt: skip
 
 
-def compute_case(case: Case) -> CaseResult:
+def compute_case(case: Case, progress: Progress = silent) -> CaseResult:
     """Figures and arrays of a case.
 
     Raises: `DataError` for a file that has changed or cannot be used, `RoomError` for a room that
     cannot be computed.
     """
     with ALONE:
-        return _computed(case)
+        return _computed(case, progress)
 
 
-def _computed(case: Case) -> CaseResult:
+def _computed(case: Case, progress: Progress) -> CaseResult:
     start = time.monotonic()
     variants.activate()
     held = CaseRoom.of(case)
     space, systems, weather = held.space, held.systems, held.weather
     hours = _rated_hours(weather, case.options)
-    room = held.year(case, rate=None if case.glare == "none" else (case.glare, hours))
+    rate = None if case.glare == "none" else (case.glare, hours)
+    room = held.year(case, rate=rate, progress=progress)
     figures, arrays = room_figures(room)
     figures |= {f"da300 {grid.name}": grid.metrics["da300"] for grid in room.daylight.grids}
     figures["straight_view_percent"] = _straight_view(room, systems, hours)

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from operator import attrgetter
+from typing import Protocol
 
+from mitsuba_cfs.progress import Progress, silent
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
 from scenes.user_errors import one_line, user_message
 from scenes.workers import Tasks
 
-Compute = Callable[[Case], CaseResult]
+
+class Compute(Protocol):
+    """A function of a module that computes a case."""
+
+    def __call__(self, case: Case, /, *, progress: Progress = ...) -> CaseResult:
+        """The result of a case."""
+        ...
 
 
 def computed(
-    cases: Sequence[Case], compute: Compute, *, processes: int = 1, scheduler: str | None = None
+    cases: Sequence[Case],
+    compute: Compute,
+    *,
+    processes: int = 1,
+    scheduler: str | None = None,
+    progress: Progress = silent,
 ) -> Iterator[CaseResult]:
     """The result of each case, once for each key, in the order in which they are ready.
 
@@ -24,9 +38,12 @@ def computed(
         processes: how many cases at a time on this machine.
         scheduler: address of a Dask scheduler, whose workers then do the work.  They read the
             input files under the same paths.
+        progress: of the case under way, where this process computes the cases itself.
     """
     once = list({case.key: case for case in cases}.values())
-    tasks = Tasks(once, compute, _failed, key=attrgetter("key"), scene=attrgetter("scene"))
+    here = processes == 1 and scheduler is None
+    of_case = partial(compute, progress=progress) if here else compute
+    tasks = Tasks(once, of_case, _failed, key=attrgetter("key"), scene=attrgetter("scene"))
     return tasks.results(processes=processes, scheduler=scheduler)
 
 

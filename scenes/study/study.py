@@ -119,12 +119,15 @@ def run_study(
     found = {key: result for key in cases if (result := store.load(key)) is not None}
     reused, total = len(found), len(cases)
 
-    def under_way() -> None:
-        progress(Stage("", "case", min(len(found) + 1, total), total), 0.0)
+    def under_way(stage: str = "", fraction: float = 0.0) -> None:
+        progress(Stage(stage, "case", min(len(found) + 1, total), total), fraction)
 
     under_way()
     left = [case for key, case in cases.items() if key not in found]
-    for result in computed(left, compute, processes=processes, scheduler=scheduler):
+    results_of_left = computed(
+        left, compute, processes=processes, scheduler=scheduler, progress=under_way
+    )
+    for result in results_of_left:
         if not result.error:
             store.save(result)
         found[result.key] = result
@@ -155,12 +158,17 @@ def with_explorers(
     """
     found: dict[str, ExploredCase] = {}
 
-    def under_way() -> None:
-        progress(Stage("", "explorer", min(len(found) + 1, len(chosen)), len(chosen)), 0.0)
+    def under_way(stage: str = "", fraction: float = 0.0) -> None:
+        number, total = min(len(found) + 1, len(chosen)), len(chosen)
+        progress(Stage(stage, "explorer", number, total), fraction)
 
     under_way()
     made = explorers(
-        tuple(chosen.values()), store.explorers(), processes=processes, scheduler=scheduler
+        tuple(chosen.values()),
+        store.explorers(),
+        processes=processes,
+        scheduler=scheduler,
+        progress=under_way,
     )
     for case, explored in made:
         found[explored.key] = explored

@@ -142,7 +142,7 @@ def _generated_file(**_options):
     return read_bsdf_xml(VENETIAN_BLIND), "made up"
 
 
-def _case(case):
+def _case(case, *, progress=None):
     from scenes.study.store import CaseResult
     from tests.scenes.study_noted import SAID
 

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.progress import Progress, silent
 from scenes.study.case import Case
 from scenes.study.store import CaseResult
 
@@ -13,11 +14,12 @@ SECONDS = 0.25  # of a case of these tests
 SAID = ("sda300_50", "da300", "operative_max_c", "seconds")  # in the line of a case
 
 
-def noted(case: Case) -> CaseResult:
+def noted(case: Case, *, progress: Progress = silent) -> CaseResult:
     """A case that takes its time and leaves a line when it is begun and when it is done."""
     log = Path(case.room)  # the tests put the log's path there
     with log.open("a") as file:
         file.write(f"begin {case.orientation_deg:g}\n")
+    progress("daylight", 0.5)
     time.sleep(SECONDS)
     if case.orientation_deg == 13:
         raise DataError("this one fails")

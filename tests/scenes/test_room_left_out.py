@@ -89,3 +89,20 @@ def test_the_tables_of_check_are_whole_when_piped(tmp_path, capsys):
     for row in csv.reader(io.StringIO(table.read_text())):
         if row[0] != "where":
             assert all(cell in said for cell in row)
+
+
+@pytest.mark.parametrize(
+    "command", [["run"], ["comply", "--standard", "en17037"], ["dgp"]], ids=lambda words: words[0]
+)
+def test_a_model_without_windows_whose_file_is_cut_off(command, tmp_path, capsys):
+    """What is missing may stand in the part that is lost: that is said, not that there is none."""
+    small = empty_project()
+    small.box("IfcSpace", "1", (0, 0, 0), (4, 4, 3), LongName="Hall")
+    path = tmp_path / "cut.ifc"
+    small.model.write(str(path))
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text[: text.index("ENDSEC;", text.index("DATA;"))], encoding="utf-8")
+    call = [*command, path, "--weather", WEATHER, "--cfs", VENETIAN_BLIND, "--out", tmp_path / "o"]
+    assert cli.run([str(word) for word in call]) == 1
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said.startswith(f"error: {path}: ") and "cut off" in said

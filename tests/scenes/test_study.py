@@ -185,7 +185,7 @@ def test_a_damaged_case_file_is_computed_again(done, tmp_path):
     place.write_bytes(place.read_bytes()[:2000])
     asked = []
 
-    def compute(case):
+    def compute(case, *, progress):
         asked.append(case.key)
         return CaseResult(case.key, {"da300": 1.0})
 
@@ -204,6 +204,22 @@ def test_shared_matrices_are_traced_once(tmp_path, monkeypatch):
     assert found.count("daylight-matrix") == 1, found
 
 
+@pytest.mark.parametrize(("processes", "told"), [(1, True), (2, False)])
+def test_a_case_computed_here_tells_its_stages(tmp_path, processes, told):
+    """A study's one case may take minutes: a bar that stands still says nothing of them."""
+    study = read_study(study_file(tmp_path, "orientations_deg = [0, 20]\n"))
+    room = study.room[0].model_copy(update={"name": str(tmp_path / "log")})
+    study = study.model_copy(update={"room": (room,)})
+    stages = []
+    run_study(
+        study, Store(tmp_path / "out"), compute=noted, processes=processes,
+        progress=lambda stage, fraction: stages.append((str(stage), stage.number, fraction)),
+    )  # fmt: skip
+    for number in (1, 2):
+        assert (("daylight", number, 0.5) in stages) == told
+        assert ("", number, 0.0) in stages
+
+
 def test_one_failed_case_leaves_the_others(tmp_path):
     study = read_study(study_file(tmp_path, "orientations_deg = [0, 13, 20]\n"))
     room = study.room[0].model_copy(update={"name": str(tmp_path / "log")})
@@ -215,7 +231,7 @@ def test_one_failed_case_leaves_the_others(tmp_path):
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 2  # a failure is tried again
 
 
-def _failing(case):
+def _failing(case, *, progress=None):
     """A case of which one orientation cannot be computed."""
     from thermal.errors import ThermalInputError
 
