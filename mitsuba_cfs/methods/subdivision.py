@@ -28,6 +28,7 @@ SKY = ReinhartSky(1)  # of the cells' matrices
 SUN_ALTITUDE = np.radians(35)  # of the clear skies that the parts are judged by
 DEPTHS = (0.5, 1.0, 2.0, 4.0)  # into the room, of the places that the parts are judged at [m]
 INDIRECT = 0.05  # of a window's exitance, falls on a place by reflection
+DARK = 1e-9  # least luminance to divide by: a window behind a wall sees none
 Array = NDArray[np.float64]
 
 
@@ -150,7 +151,8 @@ def subdivided(light: CellLight, parts: int | None = None, *, limit: float = LIM
     outside = light.daylight @ judging_skies()  # [C, K, H]
     judge = Judge(light, outside)
     weight = np.sqrt(KLEMS_FULL.projected_solid_angles() / np.pi)[:, None]
-    seen = (outside * weight / level(outside)).reshape(len(outside), -1)
+    bright = np.maximum(level(outside), DARK)
+    seen = (outside * weight / bright).reshape(len(outside), -1)
     regions = light.regions
     most = min(MOST_PARTS if parts is None else parts, len(seen))
     while len(regions) < most and (parts is not None or judge.error(regions) > limit):
@@ -175,7 +177,7 @@ class Judge:
         self._glazings = []  # clear, and one that scatters all: luminance, and light in all
         for luminance in (outside, np.broadcast_to(even, outside.shape)):
             whole = self._straight.light(luminance) + reflected
-            self._glazings.append((luminance, np.maximum(whole, 1e-9)))
+            self._glazings.append((luminance, np.maximum(whole, DARK)))
 
     def error(self, regions: Sequence[Region]) -> float:
         """Root mean square of the places, as a share of the light; worst of skies and glazings."""

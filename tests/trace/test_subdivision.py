@@ -205,6 +205,18 @@ def test_windows_at_other_depths_are_told_apart():
     assert {w.name for w in front.windows} == {"L"} and {w.name for w in back.windows} == {"gable"}
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("parts", [None, 2])
+def test_a_window_that_sees_nothing_is_cut_without_a_warning(parts):
+    """One behind a wall: no part sees more than another, and none more than nothing."""
+    from mitsuba_cfs.methods.subdivision import CellLight, subdivided
+
+    group = l_shape()
+    cells = window_cells(group)
+    dark = CellLight(group, cells, np.zeros((len(cells.area), K, ReinhartSky(1).size)))
+    assert len(subdivided(dark, parts).regions) == (parts or 1)
+
+
 def test_states_of_a_cut_group_go_together():
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.phase_light import PhaseSystems
