@@ -40,14 +40,14 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
     """Elements with holes cut, or left out, where they lie on the glass of a window."""
     elements = list(elements)
     problems: list[Problem] = []
+    used = {window.guid for space in spaces for window in space.windows}
     for _ in range(3 if elements else 0):  # a second element may lie behind the first
-        mesh = ray_mesh(np.concatenate([e.triangles for e in elements] or [np.empty((0, 3, 3))]))
-        owner = np.repeat(np.arange(len(elements)), [len(e.triangles) for e in elements])
+        near = _Near(elements, used)
         covers: dict[int, list[Window]] = {}
         for space in spaces:
             own = {window.guid for window in space.windows}
             for window in space.windows:
-                for index in _covering(window, own, elements, mesh, owner):
+                for index in near.covering(window, own):
                     covers.setdefault(index, []).append(window)
         if not covers:
             break
@@ -145,30 +145,67 @@ def _faces_in_view(
     return found
 
 
-def _covering(window: Window, own: set[str], elements, mesh, owner) -> set[int]:
-    """Elements that stop nearly every ray just outside the glass; empty if the window is free."""
-    areas = np.linalg.norm(area_vectors(window.triangles), axis=1)
-    points = window.triangles[np.argsort(-areas)[:3]].mean(axis=1) + 1e-4 * window.normal
-    directions = hemisphere(window.normal, RAYS)
-    directions = np.tile(directions[directions @ window.normal > GRAZING], (len(points), 1))
-    origins = np.repeat(points, len(directions) // len(points), axis=0)
-    mine = np.array([element.guid in own for element in elements])[owner]
-    cover = np.full(len(origins), -1)
-    travelled, going = np.zeros(len(origins)), np.ones(len(origins), dtype=bool)
-    for _ in range(8):  # the window's own panes and frame do not count
-        start = origins + travelled[:, None] * directions
-        distance, hit = mesh.first_hits(start, directions, AT_ONCE / GRAZING)
-        travelled = travelled + distance + 1e-5
-        going &= (hit >= 0) & (travelled * (directions @ window.normal) < AT_ONCE)
-        cover[going & ~mine[hit]] = owner[hit[going & ~mine[hit]]]
-        going &= mine[hit]
-        travelled[~going] = 0.0
-        if not going.any():
+class _Near:
+    """What rays from windows meet at once: windows of rooms, and what is none.
+
+    The two apart: a room's own panes and frames do not count, yet what lies in their very faces,
+    such as a window that the file draws again, does.
+    """
+
+    def __init__(self, elements: Sequence[Element], used: set[str]) -> None:
+        """Args: used: GUIDs of the rooms' windows."""
+        self._guids = np.array([element.guid for element in elements])
+        window = np.isin(self._guids, list(used))
+        self._parts = []
+        for chosen in (np.flatnonzero(~window), np.flatnonzero(window)):
+            triangles = [NOTHING, *(elements[index].triangles for index in chosen)]
+            owner = np.repeat(chosen, [len(elements[index].triangles) for index in chosen])
+            if len(owner):
+                self._parts.append((ray_mesh(np.concatenate(triangles)), owner))
+
+    def covering(self, window: Window, own: set[str]) -> set[int]:
+        """Elements that stop nearly every ray just outside the glass; none if it is free.
+
+        Args: own: GUIDs of the windows of its room.
+        """
+        areas = np.linalg.norm(area_vectors(window.triangles), axis=1)
+        points = window.triangles[np.argsort(-areas)[:3]].mean(axis=1) + 1e-4 * window.normal
+        directions = hemisphere(window.normal, RAYS)
+        directions = np.tile(directions[directions @ window.normal > GRAZING], (len(points), 1))
+        origins = np.repeat(points, len(directions) // len(points), axis=0)
+        mine = np.isin(self._guids, list(own))
+        cover, nearest = np.full(len(origins), -1), np.full(len(origins), np.inf)
+        for mesh, owner in self._parts:
+            distance, index = _first_of_others(mesh, owner, mine, origins, directions)
+            met = (distance * (directions @ window.normal) < AT_ONCE) & (distance < nearest)
+            cover[met], nearest[met] = index[met], distance[met]
+        if np.mean(cover >= 0) < COVERED:
+            return set()
+        found, counts = np.unique(cover[cover >= 0], return_counts=True)
+        return {int(i) for i, n in zip(found, counts, strict=True) if n > 0.2 * len(cover)}
+
+
+def _first_of_others(
+    mesh,
+    owner: NDArray[np.int64],
+    mine: NDArray[np.bool_],
+    origins: NDArray[np.float64],
+    directions: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Distance to, and number of, what each ray meets first that is not mine; else inf and -1."""
+    found, index = np.full(len(origins), np.inf), np.full(len(origins), -1)
+    travelled, rays = np.zeros(len(origins)), np.arange(len(origins))
+    for _ in range(8):  # through the window's own panes and frame
+        start = origins[rays] + travelled[rays, None] * directions[rays]
+        distance, hit = mesh.first_hits(start, directions[rays], AT_ONCE / GRAZING)
+        rays, distance, hit = rays[hit >= 0], distance[hit >= 0], owner[hit[hit >= 0]]
+        travelled[rays] += distance + 1e-5
+        others = ~mine[hit]
+        found[rays[others]], index[rays[others]] = travelled[rays[others]], hit[others]
+        rays = rays[~others & (travelled[rays] < AT_ONCE / GRAZING)]
+        if not len(rays):
             break
-    if np.mean(cover >= 0) < COVERED:
-        return set()
-    index, counts = np.unique(cover[cover >= 0], return_counts=True)
-    return {int(i) for i, n in zip(index, counts, strict=True) if n > 0.2 * len(cover)}
+    return found, index
 
 
 def _opened(

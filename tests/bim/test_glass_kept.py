@@ -11,6 +11,7 @@ from bim.ifc import building as reading
 from bim.ifc.building import read_ifc
 from bim.ifc.defects import DRAWN_TWICE
 from bim.planes import plane_through
+from bim.rays import hemisphere, ray_mesh
 from bim.rooms import Attachment, room_pieces, room_solid
 from bim.solids import prism
 from tests.bim.small_ifc import DEPTH, FRAME, GLASS_AREA, HEIGHT, OPENING, WIDTH, box_model
@@ -81,6 +82,25 @@ def test_a_window_that_is_drawn_twice_has_lost_nothing(tmp_path):
     assert sum(window.area for window in building.spaces[0].windows) == pytest.approx(GLASS_AREA)
     assert any(problem.kind == DRAWN_TWICE for problem in building.problems)
     assert not [problem for problem in building.problems if problem.kind == "lost glass"]
+
+
+def test_a_window_that_is_drawn_twice_sees_what_it_sees_alone(tmp_path):
+    """The copy's pane lies in the very faces of the window's own: the room was dark."""
+    seen = []
+    for twice in (False, True):
+        small, walls = box_model()
+        if twice:
+            small.window(walls["south"], name="W1 again")
+        path = tmp_path / f"{twice}.ifc"
+        small.model.write(str(path))
+        building = read_ifc(path)
+        (window,) = building.spaces[0].windows
+        outdoors = [e.triangles for e in building.elements if e.guid != window.guid]
+        directions = hemisphere(window.normal, 64)
+        origins = np.tile(window.centre + 1e-4 * window.normal, (len(directions), 1))
+        _, hit = ray_mesh(np.concatenate(outdoors)).first_hits(origins, directions, 100.0)
+        seen.append(np.mean(hit < 0))
+    assert seen[0] == seen[1] > 0.3
 
 
 def test_glass_above_a_room_and_behind_a_screen_is_said(tmp_path):
