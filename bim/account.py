@@ -43,6 +43,7 @@ class Account:
     found: bool = False  # rooms found from geometry: the file has none
     cut_off: bool = False  # the file has lost its end
     raised: tuple[str, ...] = ()  # rooms that end at the roof in place of the top of their space
+    shut_in: float = 0.0  # of the used glass: what stands before it leaves nothing open [m2]
 
     @property
     def glass_out(self) -> float:
@@ -125,6 +126,7 @@ class Account:
         for area, what in (
             (self.phantom, "transparent but no glass"),
             (self.closed, "openings without a window closed"),
+            (self.shut_in, "of glass with no sky or ground in sight"),
         ):
             if area > NOTABLE * self.glass_out:
                 found.append(f"{area:.1f} m2 {what}")
@@ -158,6 +160,7 @@ class Account:
         ]
         for area, what in (
             (self.glass_assumed, "assumed"),
+            (self.shut_in, "with no sky or ground in sight"),
             (self.glass_low, "above rooms that are too low"),
             (self.glass_missing, "with no room behind"),
             (self.phantom, "transparent but no glass"),

@@ -12,7 +12,7 @@ from bim.coarser import coarser
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
 from bim.model import Building, Element, Problem, Space
 from bim.names import JOINT, found_by_name, label_of
-from bim.outdoors import unblinded
+from bim.outdoors import shut_in_area, unblinded
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError, RoomError
@@ -216,4 +216,5 @@ def _account(
             label_of(room.name, room.long_name, room.guid) for room in rooms if room.guid in failed
         ),
         leaking=tuple(space.label for space in spaces if open_edges(space.shell)),
+        shut_in=shut_in_area(problems),
     )

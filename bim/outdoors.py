@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,9 +23,12 @@ SITE_CLASSES = ("IfcSite", "IfcGeographicElement")
 RAYS = 36
 FACE = 0.99  # cosine to the biggest part of a pane from which another is of its faces
 BEFORE_GLASS = 0.5  # what is nearer to a window's plane is of its own facade [m]
+SHUT_IN = "shut in"  # kind of the problem of a window before which hardly anything is open
+LEAST_OPEN = 0.02  # share of the half space before glass, by cosine: less is as good as nothing
 WINDOWS_AT_ONCE = 256  # that the faces of a pane are held against
 NOTHING = np.empty((0, 3, 3))
 GRAZING = 0.3  # cosine: flatter rays meet the reveals of every window
+NEAR = AT_ONCE / GRAZING  # the longest of rays that end at once [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +68,32 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
                 del elements[index]
                 done = "left out" if body is None else f"left out: {body}"
             problems.append(Problem(element.guid, what, done))
+    problems += _shut_in(elements, spaces)
     return Outdoors(tuple(elements), tuple(problems))
+
+
+def shut_in_area(problems: Iterable[Problem]) -> float:
+    """Area of the windows that problems say have nothing open before them [m2]."""
+    return sum({p.where: p.glass for p in problems if p.kind == SHUT_IN}.values())
+
+
+def _shut_in(elements: Sequence[Element], spaces: Sequence[Space]) -> list[Problem]:
+    """Windows before which hardly anything is open, such as those to a porch that is no space."""
+    if not elements:
+        return []
+    near, problems = _Near(elements, {w.guid for space in spaces for w in space.windows}), []
+    for space in spaces:
+        own = {window.guid for window in space.windows}
+        for window in space.windows:
+            free = near.open_share(window, own)
+            if free < LEAST_OPEN:
+                what = (
+                    f"{window.name}: before {window.area:.2f} m2 of glass of room {space.label} "
+                    f"{100 * free:.0f} % is open to sky and ground"
+                )
+                done = "kept: its light is what the surfaces and panes before it reflect"
+                problems.append(Problem(window.guid, what, done, glass=window.area, kind=SHUT_IN))
+    return problems
 
 
 def before_windows(elements: Sequence[Element], windows: Sequence[Window]) -> NDArray[np.float64]:
@@ -168,21 +196,35 @@ class _Near:
 
         Args: own: GUIDs of the windows of its room.
         """
-        areas = np.linalg.norm(area_vectors(window.triangles), axis=1)
-        points = window.triangles[np.argsort(-areas)[:3]].mean(axis=1) + 1e-4 * window.normal
-        directions = hemisphere(window.normal, RAYS)
-        directions = np.tile(directions[directions @ window.normal > GRAZING], (len(points), 1))
-        origins = np.repeat(points, len(directions) // len(points), axis=0)
+        origins, directions = _rays(window, GRAZING)
         mine = np.isin(self._guids, list(own))
         cover, nearest = np.full(len(origins), -1), np.full(len(origins), np.inf)
-        for mesh, owner in self._parts:
-            distance, index = _first_of_others(mesh, owner, mine, origins, directions)
+        for part in self._parts:
+            distance, index = _first_of_others(*part, mine, origins, directions, NEAR)
             met = (distance * (directions @ window.normal) < AT_ONCE) & (distance < nearest)
             cover[met], nearest[met] = index[met], distance[met]
         if np.mean(cover >= 0) < COVERED:
             return set()
         found, counts = np.unique(cover[cover >= 0], return_counts=True)
         return {int(i) for i, n in zip(found, counts, strict=True) if n > 0.2 * len(cover)}
+
+    def open_share(self, window: Window, own: set[str]) -> float:
+        """Share of the half space before a window, by cosine, in which nothing stands."""
+        origins, directions = _rays(window, 0.0)
+        mine, free = np.isin(self._guids, list(own)), np.ones(len(origins), dtype=bool)
+        for part in self._parts:
+            distance, _ = _first_of_others(*part, mine, origins, directions, np.inf)
+            free &= np.isinf(distance)
+        return float(np.average(free, weights=directions @ window.normal))
+
+
+def _rays(window: Window, flattest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Origins and directions [R, 3] of rays out of a window that have a cosine of so much."""
+    areas = np.linalg.norm(area_vectors(window.triangles), axis=1)
+    points = window.triangles[np.argsort(-areas)[:3]].mean(axis=1) + 1e-4 * window.normal
+    directions = hemisphere(window.normal, RAYS)
+    directions = directions[directions @ window.normal > flattest]
+    return np.repeat(points, len(directions), axis=0), np.tile(directions, (len(points), 1))
 
 
 def _first_of_others(
@@ -191,18 +233,19 @@ def _first_of_others(
     mine: NDArray[np.bool_],
     origins: NDArray[np.float64],
     directions: NDArray[np.float64],
+    reach: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Distance to, and number of, what each ray meets first that is not mine; else inf and -1."""
     found, index = np.full(len(origins), np.inf), np.full(len(origins), -1)
     travelled, rays = np.zeros(len(origins)), np.arange(len(origins))
     for _ in range(8):  # through the window's own panes and frame
         start = origins[rays] + travelled[rays, None] * directions[rays]
-        distance, hit = mesh.first_hits(start, directions[rays], AT_ONCE / GRAZING)
+        distance, hit = mesh.first_hits(start, directions[rays], reach)
         rays, distance, hit = rays[hit >= 0], distance[hit >= 0], owner[hit[hit >= 0]]
         travelled[rays] += distance + 1e-5
         others = ~mine[hit]
         found[rays[others]], index[rays[others]] = travelled[rays[others]], hit[others]
-        rays = rays[~others & (travelled[rays] < AT_ONCE / GRAZING)]
+        rays = rays[~others & (travelled[rays] < reach)]
         if not len(rays):
             break
     return found, index

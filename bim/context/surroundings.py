@@ -28,7 +28,7 @@ from bim.context.trees import monthly_transmittance, read_trees
 from bim.defaults import FACADE_REFLECTANCE, SITE_REFLECTANCE
 from bim.georeference import LONGITUDE_LATITUDE, local_metres, transformed
 from bim.model import TREES, Building, Element, Problem
-from bim.outdoors import lifted_sites, unblinded
+from bim.outdoors import lifted_sites, shut_in_area, unblinded
 from mitsuba_cfs.errors import DataError
 
 READ = (*SUFFIXES, ".city.json", *CITYGML, ".geojson", ".json", ".csv", ".toml", *GRIDS)
@@ -94,10 +94,12 @@ def with_surroundings(
     outdoors = unblinded([*building.elements, *free], building.spaces)
     leaves, told = _leaves(trees, building, centre, size)
     problems += [*more, *outdoors.problems, *told]
+    found = tuple(dict.fromkeys((*building.problems, *problems)))
     return replace(
         building,
         elements=(*outdoors.elements, *leaves),
-        problems=(*building.problems, *problems),
+        problems=found,
+        account=building.account and replace(building.account, shut_in=shut_in_area(found)),
     )
 
 

@@ -14,6 +14,7 @@ from bim.ifc.spaces import OVERLAPPING, SpaceRecord
 from bim.ifc.transparent import PHANTOM
 from bim.model import CUT_OFF, Problem, Space
 from bim.names import label_of
+from bim.outdoors import shut_in_area
 from bim.shell import open_edges
 
 
@@ -64,6 +65,7 @@ def account_of(
         found,
         any(p.kind == CUT_OFF for p in problems),
         tuple(space.label for space in built if space.raised),
+        shut_in_area(problems),
     )
 
 

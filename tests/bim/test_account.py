@@ -52,6 +52,7 @@ def account(**changed) -> Account:
         ({"glass_assumed": 2.1}, CARE, "2.1 m2 of glass assumed"),
         ({"phantom": 0.3}, CARE, "0.3 m2 transparent but no glass"),
         ({"closed": 0.3}, CARE, "0.3 m2 openings without a window closed"),
+        ({"shut_in": 0.3}, CARE, "0.3 m2 of glass with no sky or ground in sight"),
         ({"overlapping": ("A and B",)}, CARE, "1 pairs of spaces overlap"),
         ({"leaking": ("A",)}, CARE, "1 rooms with open edges"),
         ({"found": True}, CARE, "rooms found from geometry"),

@@ -10,6 +10,7 @@ from bim.apertures import Aperture, Filling
 from bim.ifc import building as reading
 from bim.ifc.building import read_ifc
 from bim.ifc.defects import DRAWN_TWICE
+from bim.outdoors import SHUT_IN
 from bim.planes import plane_through
 from bim.rays import hemisphere, ray_mesh
 from bim.rooms import Attachment, room_pieces, room_solid
@@ -101,6 +102,27 @@ def test_a_window_that_is_drawn_twice_sees_what_it_sees_alone(tmp_path):
         _, hit = ray_mesh(np.concatenate(outdoors)).first_hits(origins, directions, 100.0)
         seen.append(np.mean(hit < 0))
     assert seen[0] == seen[1] > 0.3
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_window_to_a_closed_porch_is_said(tmp_path, closed):
+    """It looks out, and is used; what it gives is hardly daylight."""
+    small, _ = box_model()
+    for name, origin, size in (
+        ("front", (-0.5, -3.0, 0.0), (WIDTH + 1.0, 0.2, HEIGHT)),
+        ("left", (-0.5, -3.0, 0.0), (0.2, 3.0, HEIGHT)),
+        ("right", (WIDTH + 0.3, -3.0, 0.0), (0.2, 3.0, HEIGHT)),
+        ("floor", (-0.5, -3.0, -0.2), (WIDTH + 1.0, 3.0, 0.2)),
+        ("roof", (-0.5, -3.0, HEIGHT), (WIDTH + 1.0, 3.0, 0.2)),
+    )[: 5 if closed else 4]:
+        small.box("IfcWall" if size[2] == HEIGHT else "IfcSlab", name, origin, size)
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    said = [problem for problem in building.problems if problem.kind == SHUT_IN]
+    assert len(building.spaces[0].windows) == 1
+    assert [problem.glass for problem in said] == pytest.approx([GLASS_AREA] if closed else [])
+    assert building.account.shut_in == pytest.approx(GLASS_AREA if closed else 0.0)
 
 
 def test_glass_above_a_room_and_behind_a_screen_is_said(tmp_path):

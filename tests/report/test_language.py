@@ -38,7 +38,7 @@ EVERYTHING = Account(  # that can be said of a model which is usable with care
     (StoreyAccount("EG", 3, 5, 20.0, 15.5), StoreyAccount("OG", 0, 0, 2.5, 0.0)), 9, 7,
     glass_assumed=4.2, glass_low=1.5, glass_missing=0.5, phantom=3.1, closed=1.1,
     overlapping=("1.01 / 1.02",), low=("1.03",), missing=("1.04", "1.05"), leaking=("1.06",),
-    raised=("1.07",),
+    raised=("1.07",), shut_in=0.6,
 )  # fmt: skip
 ENGLISH = re.compile(
     r"\b(of|that|none|the|rooms?|glass|windows?|spaces|usable|with|used|pairs|closed)\b"
