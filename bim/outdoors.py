@@ -23,6 +23,7 @@ SITE_CLASSES = ("IfcSite", "IfcGeographicElement")
 RAYS = 36
 FACE = 0.99  # cosine to the biggest part of a pane from which another is of its faces
 BEFORE_GLASS = 0.5  # what is nearer to a window's plane is of its own facade [m]
+FARTHEST = 50e3  # from the rooms, of what counts as their surroundings [m]
 SHUT_IN = "shut in"  # kind of the problem of a window before which hardly anything is open
 LEAST_OPEN = 0.02  # share of the half space before glass, by cosine: less is as good as nothing
 WINDOWS_AT_ONCE = 256  # that the faces of a pane are held against
@@ -41,8 +42,7 @@ class Outdoors:
 
 def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
     """Elements with holes cut, or left out, where they lie on the glass of a window."""
-    elements = list(elements)
-    problems: list[Problem] = []
+    elements, problems = _within_reach(elements, spaces)
     used = {window.guid for space in spaces for window in space.windows}
     for _ in range(3 if elements else 0):  # a second element may lie behind the first
         near = _Near(elements, used)
@@ -70,6 +70,30 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
             problems.append(Problem(element.guid, what, done))
     problems += _shut_in(elements, spaces)
     return Outdoors(tuple(elements), tuple(problems))
+
+
+def _within_reach(
+    elements: Sequence[Element], spaces: Sequence[Space]
+) -> tuple[list[Element], list[Problem]]:
+    """The elements without those that stand beyond every horizon, as strays of a file do."""
+    if not spaces:
+        return list(elements), []
+    corners = np.concatenate([space.shell.reshape(-1, 3) for space in spaces])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    kept, problems = [], []
+    for element in elements:
+        points = element.triangles.reshape(-1, 3)
+        gap = np.maximum(points.min(axis=0, initial=np.inf) - high, 0.0)
+        gap = np.maximum(gap, low - points.max(axis=0, initial=-np.inf))
+        away = float(np.linalg.norm(gap))
+        if away <= FARTHEST:
+            kept.append(element)
+            continue
+        what = (
+            f"{element.ifc_class} {element.name}: stands {away / 1000:.0f} km away from every room"
+        )
+        problems.append(Problem(element.guid, what, "left out"))
+    return kept, problems
 
 
 def shut_in_area(problems: Iterable[Problem]) -> float:
@@ -106,12 +130,12 @@ def before_windows(elements: Sequence[Element], windows: Sequence[Window]) -> ND
     rest = np.concatenate([NOTHING, *(element.triangles for element in elements)])
     found = [NOTHING]
     for window in planes.values():
-        found.append(_beyond(rest, window.normal, window.centre))
-        rest = _beyond(rest, -window.normal, window.centre)
+        found.append(beyond(rest, window.normal, window.centre))
+        rest = beyond(rest, -window.normal, window.centre)
     return np.concatenate(found)
 
 
-def _beyond(
+def beyond(
     triangles: NDArray[np.float64], normal: NDArray[np.float64], origin: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """What of the triangles lies on the side of a plane that its normal points to."""

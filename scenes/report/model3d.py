@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Building, Space
+from bim.outdoors import beyond
 from bim.to_tracer import element_surfaces
 from scenes.figures.plan import sensor_cells
 from scenes.figures.scale import ColourScale
@@ -29,6 +30,8 @@ ON_TOP = 0.1  # what stands outdoors and begins so far below a storey's end lies
 TERRAIN = ("IfcSite", "IfcGeographic")
 BESIDE = 1.0  # what stands this near belongs to the building [m]
 STOREYS_ABOVE = 3  # without rooms, the roof with them
+SHOWN = 300.0  # of the surroundings at the least, from the rooms [m]
+SHOWN_SIZES = 5  # or so many times the rooms' size
 STEPS = 32000  # of the 16-bit coordinates over the model's half size
 
 
@@ -72,11 +75,13 @@ class Model3D:
 def model3d(result: RunResult) -> Model3D:
     """The mesh of the run's rooms, all elements outdoors, and the sensors in their colours."""
     spaces = tuple(room.space for room in result.spaces)
-    outdoors, left_out = largest_triangles(element_surfaces(result.building.elements).triangles)
     shells = [space.shell.reshape(-1, 3) for space in spaces]
     corners = np.concatenate(shells)
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre = (low + high) / 2
+    around = element_surfaces(result.building.elements).triangles
+    shown = max(float((high - low).max()) * SHOWN_SIZES, SHOWN)
+    outdoors, left_out = largest_triangles(cut_to(around, low - shown, high + shown))
     reach = np.abs(np.concatenate([corners, outdoors.reshape(-1, 3)]) - centre).max()
     unit = float(reach) / STEPS
     names, levels, tops = storey_levels(spaces)
@@ -116,6 +121,16 @@ def model3d(result: RunResult) -> Model3D:
     return Model3D(
         tuple(centre), whole, unit, tuple(batches), sensors, layers(result), labels, names, left_out
     )
+
+
+def cut_to(
+    triangles: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What of the triangles [T, 3, 3] lies in an upright box."""
+    for axis, sign, corner in [(a, s, c) for a in range(3) for s, c in ((1.0, low), (-1.0, high))]:
+        if (sign * (triangles[..., axis] - corner[axis]) < 0).any():
+            triangles = beyond(triangles, sign * np.eye(3)[axis], corner)
+    return triangles
 
 
 def building_box(building: Building) -> NDArray[np.float64]:

@@ -104,6 +104,20 @@ def test_a_window_that_is_drawn_twice_sees_what_it_sees_alone(tmp_path):
     assert seen[0] == seen[1] > 0.3
 
 
+def test_a_wall_beyond_every_horizon_is_left_out(tmp_path):
+    """A stray of the file: with it the building is a point in pictures and octrees."""
+    small, _ = box_model()
+    small.box("IfcWall", "stray", (1.7e6, 3e5, 0.0), (0.3, 3.0, 2.5))
+    small.box("IfcWall", "beside", (4e3, 0.0, 0.0), (0.3, 3.0, 2.5))
+    path = tmp_path / "model.ifc"
+    small.model.write(str(path))
+    building = read_ifc(path)
+    names = {element.name for element in building.elements}
+    assert "beside" in names and "stray" not in names
+    (said,) = [problem.what for problem in building.problems if "km away" in problem.what]
+    assert said == "IfcWall stray: stands 1726 km away from every room"
+
+
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_window_to_a_closed_porch_is_said(tmp_path, closed):
     """It looks out, and is used; what it gives is hardly daylight."""

@@ -209,6 +209,19 @@ def test_mesh_keeps_positions_to_a_step_and_every_sensor() -> None:
     assert all(len(rgb) == 3 * sensors for rgb in colours)
 
 
+def test_wide_terrain_leaves_the_rooms_their_steps() -> None:
+    """Terrain of 20 km: 16 bits of it are half a metre, and a room of metres is a line."""
+    result = run_result(picture_size=32, pictures=1)
+    ground = slab([-1e4, -1e4, -3.0], [1e4, 1e4, -2.9])
+    terrain = Element("g", "ground", "IfcSite", ground, 0.3, 0.3)
+    building = replace(result.building, elements=(*result.building.elements, terrain))
+    model = model3d(replace(result, building=building))
+    assert model.unit < 0.02
+    (shown,) = [b for b in model.batches if b["kind"] == "outdoors" and b["storey"] == 0]
+    points = np.frombuffer(base64.b64decode(shown["t"]), "<i2").reshape(-1, 3) * model.unit
+    assert 200 < np.abs(points[:, :2]).max() < 700
+
+
 def test_outline_bridges_slits_but_not_rooms() -> None:
     mask = np.zeros((60, 60), bool)
     mask[20:37:4, 10:50] = True  # slats, slits of three pixels
