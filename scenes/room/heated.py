@@ -156,10 +156,10 @@ def _said(rooms: Sequence[RoomZone]) -> str:
         f"{through:.1f} m2 of walls, floors and doors."
     )
     apart = {
-        "of their sides towards each other, of which no other face was found": among,
+        "towards each other where no face of the other was found": among,
         "towards rooms that are not computed": other,
     }
     behind = " and ".join(f"{area:.1f} m2 {what}" for what, area in apart.items() if area >= 0.05)
     if behind:
-        text += f" Behind {behind} a room of the same temperature is taken to lie."
+        text += f" Behind these sides a room of the same temperature is taken to lie: {behind}."
     return text
