@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import pickle
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -44,10 +44,11 @@ class Tasks(Generic[T, R]):
     key: Callable[[T], str]  # of each item once
     scene: Callable[[T], str]
 
-    def results(self, *, processes: int = 1, scheduler: str | None = None) -> Iterator[R]:
+    def results(self, *, processes: int = 1, scheduler: str | None = None) -> Generator[R]:
         """The result of each task in the order in which they are ready.
 
-        Closing the iterator ends the work.
+        Closing the generator ends the work: a consumer that may stop before the end uses
+        `contextlib.closing`, or the processes work on for as long as its exception is held.
 
         Args:
             processes: how many tasks at a time on this machine.
@@ -195,9 +196,10 @@ class _Crew(Generic[T]):
     """
 
     def __init__(self, processes: int, work: tuple[Callable, Callable]) -> None:
+        given = pickle.dumps(work)
         self._folder = TemporaryDirectory()
         file = Path(self._folder.name) / "work"
-        file.write_bytes(pickle.dumps(work))
+        file.write_bytes(given)
         self._processes, self._first = processes, partial(_Work.keep, file, processes)
         self._pool = process_pool(processes, self._first)
         self._started: dict[int | None, BaseProcess] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -101,11 +102,12 @@ def _write_rooms(
     )  # fmt: skip
     # a process takes as long to begin as it does to write some rooms
     processes = min(processes, len(rooms) // ROOMS_A_PROCESS)
-    written = zip(result.spaces, tasks.results(processes=processes), strict=True)
-    for number, (_, error) in enumerate(written, 1):  # a room passed goes out of memory
-        if error is not None:
-            raise error
-        progress("results", number / (len(rooms) + 1))
+    with closing(tasks.results(processes=processes)) as written:
+        passed = zip(result.spaces, written, strict=True)
+        for number, (_, error) in enumerate(passed, 1):  # a room passed goes out of memory
+            if error is not None:
+                raise error
+            progress("results", number / (len(rooms) + 1))
 
 
 def _fault(item: tuple[RoomYear, Path], error: BaseException) -> BaseException:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -18,7 +19,7 @@ from scenes.room.equal_rooms import OutdoorLight, same_systems
 
 R = TypeVar("R")
 # Some rooms to what comes of each, in any order: its result or why it has none
-Beside = Callable[[Sequence[Space]], Iterator[tuple[Space, R | BaseException]]]
+Beside = Callable[[Sequence[Space]], Generator[tuple[Space, R | BaseException]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +45,17 @@ class RoomSeries(Generic[R]):
 
         Raises: `DataError` where the only room cannot be computed.
         """
-        found, problems, notes = [], [], []
         templates = _Templates(self)
-        ahead = self._ahead(templates, progress)
+        with closing(self._ahead(templates, progress)) as ahead:
+            return self._in_turn(templates, ahead, progress)
+
+    def _in_turn(
+        self,
+        templates: _Templates,
+        ahead: Iterator[tuple[str, R | BaseException]],
+        progress: Progress,
+    ) -> tuple[list[R], list[Problem], list[str]]:
+        found, problems, notes = [], [], []
         computed: dict[str, R | BaseException] = {}
         for number, space in enumerate(self.spaces, 1):
             steps = item(progress, "room", number, len(self.spaces), space.label)
@@ -81,7 +90,7 @@ class RoomSeries(Generic[R]):
 
     def _ahead(
         self, templates: _Templates, progress: Progress
-    ) -> Iterator[tuple[str, R | BaseException]]:
+    ) -> Generator[tuple[str, R | BaseException]]:
         """The rooms that are computed beside each other, as they are ready."""
         if self.beside is None:
             return
@@ -91,9 +100,10 @@ class RoomSeries(Generic[R]):
                 rooms.append(space)
             progress("equal rooms", number / len(self.spaces))
         progress(Stage("", "room", 1, len(rooms)), 0.0)
-        for done, (space, result) in enumerate(self.beside(rooms), 1):
-            yield space.guid, result
-            progress(Stage("", "room", min(done + 1, len(rooms)), len(rooms)), 0.0)
+        with closing(self.beside(rooms)) as beside:
+            for done, (space, result) in enumerate(beside, 1):
+                yield space.guid, result
+                progress(Stage("", "room", min(done + 1, len(rooms)), len(rooms)), 0.0)
 
 
 class _Templates:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Generic, TypeVar
@@ -54,7 +55,7 @@ class RoomWork(Generic[R]):
 
     def beside(
         self, spaces: Sequence[Space], *, workers: Workers
-    ) -> Iterator[tuple[Space, R | BaseException]]:
+    ) -> Generator[tuple[Space, R | BaseException]]:
         """Each room, in any order, with its result or with why it has none."""
         rooms = {space.guid: space for space in spaces}
         here = workers.scheduler is None
@@ -63,8 +64,9 @@ class RoomWork(Generic[R]):
         tasks = Tasks(
             list(rooms), compute, _failed, key=lambda guid: f"{run}{guid}", scene=lambda guid: guid
         )
-        for guid, result in tasks.results(**asdict(workers)):
-            yield rooms[guid], result
+        with closing(tasks.results(**asdict(workers))) as results:
+            for guid, result in results:
+                yield rooms[guid], result
 
     def of(self, guid: str) -> R:
         """What comes of the room with a GUID."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from operator import attrgetter
@@ -68,7 +69,7 @@ def explorers(
     processes: int = 1,
     scheduler: str | None = None,
     progress: Progress = silent,
-) -> Iterator[tuple[Case, ExploredCase]]:
+) -> Generator[tuple[Case, ExploredCase]]:
     """The explorer of each case, once for each key: kept in the folder, or computed and kept.
 
     Args: processes, scheduler, progress: as of `scenes.study.schedule.computed`.
@@ -84,10 +85,11 @@ def explorers(
     here = processes == 1 and scheduler is None
     compute = partial(compute_explorer, progress=progress) if here else compute_explorer
     tasks = Tasks(left, compute, _failed, key=explorer_key, scene=attrgetter("scene"))
-    for found in tasks.results(processes=processes, scheduler=scheduler):
-        if not found.error:
-            _keep(found, folder)
-        yield once[found.key], ExploredCase(found.key, {}, found.shown, found.error)
+    with closing(tasks.results(processes=processes, scheduler=scheduler)) as results:
+        for found in results:
+            if not found.error:
+                _keep(found, folder)
+            yield once[found.key], ExploredCase(found.key, {}, found.shown, found.error)
 
 
 def _kept(key: str, folder: Path) -> ExploredCase | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import Protocol
@@ -29,10 +29,10 @@ def computed(
     processes: int = 1,
     scheduler: str | None = None,
     progress: Progress = silent,
-) -> Iterator[CaseResult]:
+) -> Generator[CaseResult]:
     """The result of each case, once for each key, in the order in which they are ready.
 
-    A case that fails gives a result with its error.  Closing the iterator ends the work.
+    A case that fails gives a result with its error.  Closing the generator ends the work.
 
     Args:
         processes: how many cases at a time on this machine.

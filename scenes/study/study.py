@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -127,13 +128,14 @@ def run_study(
     results_of_left = computed(
         left, compute, processes=processes, scheduler=scheduler, progress=under_way
     )
-    for result in results_of_left:
-        if not result.error:
-            store.save(result)
-        found[result.key] = result
-        under_way()
-        if on_case is not None:
-            on_case(cases[result.key], result, len(found), total)
+    with closing(results_of_left):
+        for result in results_of_left:
+            if not result.error:
+                store.save(result)
+            found[result.key] = result
+            under_way()
+            if on_case is not None:
+                on_case(cases[result.key], result, len(found), total)
     results = tuple(found[case.key] for case in plan.cases)
     seconds = round(time.monotonic() - start, 3)
     return StudyResult(study.title, plan, results, reused, seconds, study.quick)
@@ -170,11 +172,12 @@ def with_explorers(
         scheduler=scheduler,
         progress=under_way,
     )
-    for case, explored in made:
-        found[explored.key] = explored
-        under_way()
-        if on_case is not None:
-            on_case(case, explored)
+    with closing(made):
+        for case, explored in made:
+            found[explored.key] = explored
+            under_way()
+            if on_case is not None:
+                on_case(case, explored)
     every = {number: found[explorer_key(case)] for number, case in chosen.items()}
     return replace(result, explored={n: one for n, one in every.items() if not one.error})
 

@@ -114,7 +114,8 @@ def test_blinds_are_moved_group_by_group(room):
     # with closed blinds it is darker, with open ones the same
     opened, moved = operated.open[lit], operated.operated[lit]
     assert (moved[over.any(axis=0)] < opened[over.any(axis=0)]).all()
-    np.testing.assert_array_equal(moved[~over.any(axis=0)], opened[~over.any(axis=0)])
+    still = ~over.any(axis=0)
+    np.testing.assert_allclose(moved[still], opened[still], rtol=1e-6)  # sums in float32
 
 
 def test_glass_is_seen_through_and_a_diffuser_is_not():

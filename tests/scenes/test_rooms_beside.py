@@ -19,8 +19,8 @@ from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.room.options import RoomOptions
+from scenes.run import outputs, rooms_apart
 from scenes.run import rooms as series
-from scenes.run import rooms_apart
 from scenes.run.job import JobInputs, read_inputs
 from scenes.run.options import JobOptions
 from scenes.run.rooms import RoomSeries
@@ -84,9 +84,31 @@ def test_a_room_that_fails_leaves_the_others_and_is_no_template():
 
 def test_what_is_no_fault_of_a_room_ends_the_run():
     rooms, _ = named([ROOM, box("deep", 6.0)])
-    broken = replace(rooms, beside=lambda some: iter([(some[0], DataError("file is gone"))]))
+    ended = []
+
+    def beside(some):
+        try:
+            yield some[0], DataError("file is gone")
+            raise AssertionError("asked for another")
+        finally:
+            ended.append("the processes")
+
     with pytest.raises(DataError, match="file is gone"):
-        broken.results()
+        replace(rooms, beside=beside).results()
+    assert ended
+
+
+def test_a_folder_that_cannot_be_written_ends_the_processes(tmp_path):
+    """At once: not when the exception that somebody holds is let go."""
+    spaces = [box(f"{number}", 4.0) for number in range(2 * outputs.ROOMS_A_PROCESS)]
+    years = [SimpleNamespace(space=space) for space in spaces]
+    result = SimpleNamespace(spaces=years, times=None)
+    with pytest.raises(OSError, match="no-folder") as held:
+        outputs._write_rooms(result, [tmp_path / "no-folder" / "room"] * 16, 2, silent)
+    end = time.monotonic() + 10.0
+    while multiprocessing.active_children() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not multiprocessing.active_children(), held.value
 
 
 @pytest.mark.usefixtures("variant")
