@@ -11,7 +11,14 @@ import logging
 import pickle
 from collections import defaultdict, deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
@@ -30,6 +37,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 CONNECT_SECONDS = 10
 AHEAD = 2  # tasks for each process: one at work, one for when its result is being looked at
+FETCHED = 8  # results of a cluster that are here before they are looked at
 
 log = logging.getLogger(__name__)
 
@@ -126,34 +134,51 @@ class Tasks(Generic[T, R]):
             raise DataError(message, element=address, field="--scheduler") from error
         leaders, followers = self._waves()
         by_key = {self._name(item): item for item in self.items}
+        held: dict[str, Any] = {}
+
+        def begin(some: Sequence[T]) -> list:
+            # one task for each key, whoever runs it: a worker that dies has its tasks run again
+            started = [
+                client.submit(
+                    _attempted, self.compute, self.failed, item, key=self._name(item), pure=True
+                )
+                for item in some
+            ]
+            held.update({future.key: future for future in started})
+            return started
+
+        def ready() -> Iterator[R]:
+            done = as_completed(begin(leaders), loop=client.loop)
+            for future in done:
+                item = by_key[future.key]
+                result = self._collected(future.result, item)
+                held.pop(future.key).release()  # or a dying worker would have it done again
+                done.update(begin(followers.pop(self.key(item), [])))
+                yield result
+
         with client:
-            held = {}
-
-            def begin(some: Sequence[T]) -> list:
-                # one task for each key, whoever runs it: a worker that dies has its tasks run again
-                started = [
-                    client.submit(
-                        _attempted, self.compute, self.failed, item,
-                        key=self._name(item), pure=True,
-                    )
-                    for item in some
-                ]  # fmt: skip
-                held.update({future.key: future for future in started})
-                return started
-
-            try:
-                ready = as_completed(begin(leaders), loop=client.loop)
-                for future in ready:
-                    item = by_key[future.key]
-                    result = self._collected(future.result, item)
-                    held.pop(future.key).release()  # or a dying worker would have it done again
-                    ready.update(begin(followers.pop(self.key(item), [])))
-                    yield result
-            finally:
-                client.cancel(list(held.values()))
+            yield from _fetched(ready(), lambda: client.cancel(list(held.values())))
 
     def _name(self, item: T) -> str:
         return f"cfs-{self.key(item)}"
+
+
+def _fetched(ready: Iterator[R], cancel: Callable[[], object]) -> Iterator[R]:
+    """What is ready, fetched while what came before is being looked at.
+
+    A worker that dies takes with it what it has done and nobody has fetched.
+    """
+    end = object()
+    with ThreadPoolExecutor(1) as thread:
+        asked = deque(thread.submit(next, ready, end) for _ in range(FETCHED))
+        try:
+            while (result := asked.popleft().result()) is not end:
+                asked.append(thread.submit(next, ready, end))
+                yield result
+        finally:
+            for one in asked:
+                one.cancel()
+            cancel()  # the one that is being waited for ends, too
 
 
 def check_dask() -> None:

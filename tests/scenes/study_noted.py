@@ -26,3 +26,12 @@ def noted(case: Case, *, progress: Progress = silent) -> CaseResult:
     with log.open("a") as file:
         file.write(f"end {case.orientation_deg:g}\n")
     return CaseResult(case.key, {"angle": case.orientation_deg} | dict.fromkeys(SAID, 0.0))
+
+
+def held_up(case: Case, *, progress: Progress = silent) -> CaseResult:
+    """The same; a case of another angle than 0 waits until a file beside the log lets it go."""
+    go = Path(f"{case.room}.go")
+    end = time.monotonic() + 20.0
+    while case.orientation_deg and not go.exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    return noted(case, progress=progress)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ from scenes.study.schedule import computed
 from scenes.study.study_file import read_study
 from tests.conftest import REPOSITORY
 from tests.scenes.study_files import study_file
-from tests.scenes.study_noted import noted
+from tests.scenes.study_noted import SECONDS, held_up, noted
 
 pytest.importorskip("distributed")
 
@@ -110,8 +111,9 @@ def test_a_worker_killed_midway_loses_and_doubles_nothing(cluster, tmp_path):
     found, killed = [], None
     for result in computed(wanted, noted, scheduler=cluster.address):
         found.append(result)
-        if len(found) == 6 and killed is None:
+        if len(found) == 2 and killed is None:
             killed = cluster.workers[0]
+            until(lambda: log.read_text().count("end") >= 8, 20)  # while a result is looked at
             until(another_begun(log), 20)  # in the midst of a case
             killed.send_signal(signal.SIGKILL)
             killed.wait()
@@ -132,6 +134,17 @@ def test_a_case_that_fails_on_a_worker_leaves_the_others(cluster, tmp_path):
     wanted, _ = cases(tmp_path, [0, 13, 20])
     found = {r.key: r for r in computed(wanted, noted, scheduler=cluster.address)}
     assert [found[case.key].error for case in wanted] == ["", "this one fails", ""]
+
+
+def test_who_stops_early_waits_for_nothing_and_leaves_no_work_behind(cluster, tmp_path):
+    wanted, log = cases(tmp_path, [10 * i for i in range(12)])
+    with closing(computed(wanted, held_up, scheduler=cluster.address)) as results:
+        next(results)
+    assert log.read_text().count("begin") == 1  # the others are held up still
+    Path(f"{log}.go").touch()
+    until(lambda: log.read_text().count("end") > 1, 20)  # what a worker had in hand
+    time.sleep(4 * SECONDS)
+    assert log.read_text().count("begin") <= 3
 
 
 def test_no_scheduler_is_one_clear_line(tmp_path, monkeypatch):
