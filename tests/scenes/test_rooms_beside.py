@@ -16,6 +16,7 @@ import pytest
 from bim.model import Building, Space
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError, RoomError
+from mitsuba_cfs.processes import BLAS_THREADS
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.room.options import RoomOptions
@@ -133,8 +134,12 @@ def test_a_worker_with_other_files_than_the_command_has_computes_nothing(tmp_pat
 
 
 @pytest.mark.slow
-def test_two_processes_give_what_one_gives(variant, weather, glass):
-    """Bit by bit: the same random numbers, one after the other or beside each other."""
+def test_two_processes_give_what_one_gives(variant, weather, glass, monkeypatch):
+    """Bit by bit: the same random numbers, one after the other or beside each other.
+
+    Given products by as many threads as here: by fewer, the library adds up in another order.
+    """
+    monkeypatch.setenv(BLAS_THREADS, os.environ.get(BLAS_THREADS, str(os.cpu_count())))
     spaces = [ROOM, box("deep", 6.0), box("shallow", 3.0)]
     building: Building = replace(BOX, spaces=tuple(spaces))
     systems = {w.guid: (glass,) for s in spaces for w in s.windows}
