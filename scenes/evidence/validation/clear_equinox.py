@@ -38,7 +38,8 @@ from scenes.evidence.benchmarks import radiance
 from scenes.evidence.validation.rendered_scene import RenderedScene
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 
 FloatArray = NDArray[np.float64]
