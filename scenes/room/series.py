@@ -74,7 +74,8 @@ class OutdoorLight:
 
     def _daylight(self, band: str) -> NDArray[np.float64]:
         """D of every season [.., K, P], one after the other."""
-        found, groups = [], window_groups(self.space)
+        found: list[PhaseScene] = []
+        groups = window_groups(self.space)
         for season in seasons(self.building):
             exterior = exterior_surfaces(season.building, self.space, band)
             scene = DaylightScene(Surfaces.none(), exterior, groups)
