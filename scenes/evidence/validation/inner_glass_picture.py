@@ -37,7 +37,7 @@ from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.trace.sampling import spread_rays
+from mitsuba_cfs.trace.kernels.sampling import spread_rays
 from scenes.evidence.validation import inner_glass, inner_glass_ifc
 from scenes.evidence.validation.cut_groups import Quads
 from scenes.evidence.validation.inner_glass import luminance_by_path, overcast
