@@ -19,7 +19,7 @@ from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 from mitsuba_cfs.trace.sun.picture_beam import beam_light
 from scenes.cost import room as box
 from scenes.demo import WEATHER
-from scenes.evidence.validation import fireflies
+from tests.validation import fireflies
 
 pytestmark = pytest.mark.usefixtures("variant")
 
