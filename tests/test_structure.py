@@ -10,7 +10,7 @@ from graphlib import CycleError, TopologicalSorter
 
 import pytest
 
-from tests.modules import EVIDENCE, MODULES, dotted, file_name, imports
+from tests.modules import MODULES, dotted, file_name, imports
 
 # The ranks of what lies directly in a package, lowest first: who imports must stand higher than
 # what it imports.  What shares a rank knows nothing of the others there.
@@ -39,7 +39,6 @@ RANKS = {
         {"study_report"},
         {"commands"},
         {"cli"},
-        {"evidence"},
     ),
 }  # fmt: skip
 MOST_POSITIONAL = 6
@@ -95,8 +94,6 @@ def _repeated_classes(sources: Mapping[str, str]) -> dict[str, list[str]]:
     """Public class names that several modules of the product have, with these."""
     found: dict[str, list[str]] = defaultdict(list)
     for name, source in sources.items():
-        if name.startswith(EVIDENCE):  # scripts beside the product, not in the wheel
-            continue
         for node in ast.walk(_tree(source)):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found[node.name].append(name)
@@ -133,7 +130,7 @@ def _system_words(name: str, source: str) -> Iterator[str]:
 
 def test_errors_of_the_system_are_said_in_words() -> None:
     apart = ("bim/bonsai/",)  # has nothing of this program
-    sources = {n: s for n, s in SOURCES.items() if not n.startswith((*apart, EVIDENCE))}
+    sources = {n: s for n, s in SOURCES.items() if not n.startswith(apart)}
     assert not [fault for module in sources.items() for fault in _system_words(*module)]
 
 
@@ -175,7 +172,7 @@ def test_no_function_takes_many_positional_parameters() -> None:
         ("scenes/results.py", "if TYPE_CHECKING:\n    from scenes.report.page import write_report"),
         ("scenes/heat/x.py", "from importlib import import_module\nimport_module('scenes.study')"),
         ("scenes/study/x.py", "from scenes.commands.parameters import seed_option"),
-        ("scenes/commands/x.py", "from scenes.evidence import bench"),
+        ("scenes/commands/x.py", "from scenes.cli import run"),
     ],
 )
 def test_planted_rank_is_found(name: str, source: str) -> None:
@@ -203,7 +200,6 @@ def test_planted_class_name_is_found() -> None:
     assert not _repeated_classes(one | {"bim/y.py": "class Windows: ...\nclass _Part: ..."})
     again = "@dataclass\nclass Window: ..."
     assert _repeated_classes(one | {"bim/y.py": again}) == {"Window": ["bim/x.py", "bim/y.py"]}
-    assert not _repeated_classes(one | {f"{EVIDENCE}y.py": again})
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.trace.picture_outdoors import outdoors
 from scenes.demo import WEATHER
-from scenes.evidence.validation import fireflies
+from tests.validation import fireflies
 
 pytestmark = pytest.mark.usefixtures("variant")
 

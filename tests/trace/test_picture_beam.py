@@ -19,7 +19,7 @@ from mitsuba_cfs.trace.scene import kept_scene
 from mitsuba_cfs.trace.straight_view import straight_view_matrix
 from scenes.cost import room as box
 from scenes.demo import WEATHER
-from scenes.evidence.validation import fireflies
+from tests.validation import fireflies
 
 pytestmark = pytest.mark.usefixtures("variant")
 
