@@ -12,8 +12,8 @@ from bim.outer_faces import OuterFaces
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.estimate import cache_entry
-from mitsuba_cfs.trace.view_factors import sky_shares
+from mitsuba_cfs.trace.kernels.estimate import cache_entry
+from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 
 SAMPLES = 4096  # rays from each surface and window
 
