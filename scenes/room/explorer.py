@@ -12,7 +12,7 @@ from mitsuba_cfs.methods.glare import light_seen_from
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.picture_year.year import picture_year
 from mitsuba_cfs.progress import Progress, part
-from mitsuba_cfs.trace.direct_sun import through_beams
+from mitsuba_cfs.trace.kernels.scattering import through_beams
 from scenes.results import ExploredRoom
 
 LARGEST = 400  # pixels of a side of its pictures

@@ -15,7 +15,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.escape import SIDES, Escape, escaped_view
+from mitsuba_cfs.trace.matrices.escape import SIDES, Escape, escaped_view
 
 SPACING, WORK_PLANE = 1.0, 0.8  # of the sensors that are looked from [m]
 EYE_PIXELS = 64  # of the eye's view, of which only place and direction count

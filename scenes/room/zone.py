@@ -24,8 +24,8 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.estimate import cache_entry
-from mitsuba_cfs.trace.view_factors import sky_shares
+from mitsuba_cfs.trace.kernels.estimate import cache_entry
+from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
