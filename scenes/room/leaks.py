@@ -23,7 +23,7 @@ MOST_LOST = 0.01  # of a sensor's view, before it is a problem
 WHERE = {"floor": "through the floor", "ceiling": "through the ceiling"}
 
 
-def hole_problems(
+def leak_problems(
     space: Space,
     scene: DaylightScene,
     *,
@@ -45,7 +45,7 @@ def hole_problems(
     return (_problem(space, points, found),)
 
 
-def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None) -> list[str]:
+def leak_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None) -> list[str]:
     """The problems of a room's holes as sentences, where no scene with sensors is at hand."""
     try:
         points, _ = sensor_grid(space, spacing=SPACING, height=WORK_PLANE, margin=SPACING / 2)
@@ -59,7 +59,7 @@ def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None)
         np.tile([0.0, 0.0, 1.0], (len(points), 1)),
         fisheye(*view_point(space), EYE_PIXELS),
     )
-    found = hole_problems(space, scene, seed=seed, cache=cache)
+    found = leak_problems(space, scene, seed=seed, cache=cache)
     return [f"{problem.what}: {problem.consequence}" for problem in found]
 
 

@@ -19,10 +19,10 @@ from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.processes import BLAS_THREADS
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.room import series
 from scenes.room.options import RoomOptions
 from scenes.room.series import RoomSeries
 from scenes.run import outputs, rooms_apart
-from scenes.run import rooms as series
 from scenes.run.job import JobInputs, read_inputs
 from scenes.run.options import JobOptions
 from scenes.run.rooms_apart import Workers
@@ -42,7 +42,7 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
     """Rooms whose result is their name, computed last room first, and which were asked for."""
     asked: list[list[str]] = []
 
-    def beside(rooms):
+    def parallel(rooms):
         asked.append([room.name for room in rooms])
         for room in reversed(rooms):
             yield room, RoomError("no floor") if room.name == fails else room.name
@@ -54,7 +54,7 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
     return RoomSeries(
         replace(BOX, spaces=tuple(spaces)), spaces, {}, SMALL.sampling, None, here,
         lambda result, space: f"{space.name} like {result}",
-        alike=lambda one, other: alike, beside=beside,
+        alike=lambda one, other: alike, parallel=parallel,
     ), asked  # fmt: skip
 
 
@@ -87,7 +87,7 @@ def test_what_is_no_fault_of_a_room_ends_the_run():
     rooms, _ = named([ROOM, box("deep", 6.0)])
     ended = []
 
-    def beside(some):
+    def parallel(some):
         try:
             yield some[0], DataError("file is gone")
             raise AssertionError("asked for another")
@@ -95,7 +95,7 @@ def test_what_is_no_fault_of_a_room_ends_the_run():
             ended.append("the processes")
 
     with pytest.raises(DataError, match="file is gone"):
-        replace(rooms, beside=beside).results()
+        replace(rooms, parallel=parallel).results()
     assert ended
 
 

@@ -34,8 +34,8 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import read_system
-from scenes.room.daylight import room_scene
 from scenes.room.inner_glass import PANE, inner_glass, lending_rooms, opened
+from scenes.room.light import room_scene
 from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 from tests.benchmarks.radiance import polygon, write_surfaces
