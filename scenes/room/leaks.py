@@ -1,4 +1,4 @@
-"""Light that leaves a room through holes of its model, as problems of the room."""
+"""Leaks in the model of a room: light that leaves it through no window."""
 
 from __future__ import annotations
 
