@@ -17,7 +17,7 @@ NO_EVIDENCE = {
         "| index | of | source |", "| option | default | |",
         "| part of a five-phase picture | resolution |",
     },
-    "thermal.md": {"| closure | absorptances from | layer resistance | films of the layers |"},
+    "thermal.md": {"| closure | absorptances from | layer resistance | film resistances |"},
     "comply.md": {"| in the folder of results | what |", "| option | what |"},
     "studies.md": {"| in the folder | what |"},
     "pv.md": {"| key | meaning |"},
