@@ -45,7 +45,7 @@ def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> l
     opened, factor = light.illuminance(), overcast_factor(light)
     through = light.direct_sun_by_group() or []
     points = traced.scene.points
-    seen = [room.windows.of_state(j, lambda one: sight_through(one).is_view) for j in (0, 1)]
+    seen = [[sight_through(one).is_view for one in room.windows.in_state(j)] for j in (0, 1)]
     found, first = [], 0
     for number, grid in enumerate(room.grids):
         count = len(grid_points(room.space, grid))

@@ -151,18 +151,18 @@ def default_hours(
     eye_illuminance: NDArray[np.float32],
     count: int,
 ) -> list[int]:
-    """The year's brightest hour at the eye, and with it hours of the equinox and the solstices.
+    """The year's brightest hour at the eye, and hours of the equinox and the solstices.
 
-    In all up to `count`; these at 9, 12 and 15 o'clock, as far as the sun is up.
+    At most `count` hours; those of the three days at 9, 12 and 15 o'clock if the sun is up.
 
     Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
     """
     moments = [datetime(2000, *day, clock) for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
     lit_set = set(lit.tolist())
-    found = [hour for moment in moments if (hour := hour_index(moment, times)) in lit_set]
+    usual = [hour for moment in moments if (hour := hour_index(moment, times)) in lit_set]
     brightest = int(lit[np.argmax(eye_illuminance)])
-    chosen = {brightest, *[hour for hour in found if hour != brightest][: count - 1]}
-    return [hour for hour in dict.fromkeys([*found, brightest]) if hour in chosen]
+    chosen = {brightest, *[hour for hour in usual if hour != brightest][: count - 1]}
+    return [hour for hour in dict.fromkeys([*usual, brightest]) if hour in chosen]
 
 
 def room_glare(

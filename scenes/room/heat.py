@@ -82,9 +82,9 @@ def room_humidity(
 
 
 def felt_by(person: ComfortTable, result: ZoneResult, humidity: Humidity) -> dict[str, FloatArray]:
-    """Relative humidity of the air [%], the person's PMV, PPD [%] and SET [degC], each [H].
+    """Relative humidity of the air [%], PMV, PPD [%] and SET [degC] of a person, each [H].
 
-    The person is in the humidity stated, else in the air's.
+    Comfort is computed with the humidity of the table, else with that of the air.
     """
     air = 100.0 * np.clip(humidity.relative, 0.0, 1.0)
     about = person.model_dump(exclude={"mean_radiant"})
@@ -229,9 +229,9 @@ def heat_of(
         store=store,
     )  # fmt: skip
     passed = iter if store is None else store.each
-    moist = room_humidity(rooms, passed(results), weather, air_links=air_links)
+    humidities = room_humidity(rooms, passed(results), weather, air_links=air_links)
     heats: list[Heat] = []
-    for room, balance, humidity in zip(rooms, passed(results), moist, strict=True):
+    for room, balance, humidity in zip(rooms, passed(results), humidities, strict=True):
         comfort = (room.operation or OperationTables()).comfort
         thermal = thermal_result(room, balance, weather, felt_by(comfort, balance, humidity))
         operation = None if room.operation is None else operated_year(room, balance, weather)
@@ -292,11 +292,13 @@ def _coupling_note(rooms: Sequence[RoomZone]) -> str:
         f"The heat of the {len(rooms)} rooms is balanced together: it flows between them through "
         f"{through:.1f} m2 of walls, floors and doors."
     )
-    apart = {
+    uncoupled = {
         "towards each other where no face of the other was found": among,
         "towards rooms that are not computed": other,
     }
-    behind = " and ".join(f"{area:.1f} m2 {what}" for what, area in apart.items() if area >= 0.05)
+    behind = " and ".join(
+        f"{area:.1f} m2 {what}" for what, area in uncoupled.items() if area >= 0.05
+    )
     if behind:
         text += f" Behind these sides a room of the same temperature is taken to lie: {behind}."
     return text

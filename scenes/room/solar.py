@@ -242,7 +242,7 @@ def _gains_in_state(
         return Solar(dark, dark, np.zeros_like(facade), facade), {}
     heats = _in_state(zone.thermals, state)
     area = np.array([g.area for g in zone.windows.groups])
-    T = np.stack(zone.windows.of_state(state, lambda system: system.solar.transmission_matrix()))
+    T = np.stack([s.solar.transmission_matrix() for s in zone.windows.in_state(state)])
     shares = absorbed_shares(heats, T, area, absorption)
     sums = np.split(
         directional_sums(outdoors, skies, np.concatenate(shares)),

@@ -28,7 +28,7 @@ from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.heat import DaylitRoom, coupled_years
-from scenes.room.inner_glass import lending_rooms
+from scenes.room.inner_glass import source_rooms
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
@@ -223,9 +223,7 @@ def _series(
 
     def borrows(*spaces: Space) -> bool:
         """Whether what a room gets depends on a neighbour: then none stands for another."""
-        return options.inner_glass and any(
-            lending_rooms(inputs.building, space) for space in spaces
-        )
+        return options.inner_glass and any(source_rooms(inputs.building, space) for space in spaces)
 
     return RoomSeries(
         inputs.building,
