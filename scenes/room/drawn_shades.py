@@ -9,6 +9,7 @@ import numpy as np
 
 from bim.drawn_shades import without_drawn_shades
 from bim.model import Building
+from bim.report.issue import issue_text
 from scenes.fenestration.systems import FenestrationSystem, States
 
 SCATTERED = (
@@ -27,9 +28,9 @@ def traced_building(building: Building, systems: Mapping[str, States]) -> Buildi
     shaded = {
         guid for guid, states in systems.items() if any(held[id(system)] for system in states)
     }
-    building, problems = without_drawn_shades(building, shaded)
-    for problem in problems:
-        _log.warning("%s: %s", problem.what, problem.consequence)
+    building, issues = without_drawn_shades(building, shaded)
+    for issue in issues:
+        _log.warning("%s", issue_text(issue).line)
     return building
 
 

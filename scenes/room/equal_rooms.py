@@ -21,7 +21,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
 from scenes.results import RoomYear
 from scenes.room.heated import DaylitRoom
-from scenes.room.holes import moved_problem
+from scenes.room.holes import moved_issue
 
 R = TypeVar("R", RoomYear, DaylitRoom)
 BANDS = ("visible", "solar")
@@ -111,7 +111,7 @@ def moved_result(result: R, space: Space) -> R:
         glare=replace(glare, view=replace(glare.view, position=place)),
         seconds={},
         explored=None,  # the template's serves both
-        problems=tuple(moved_problem(problem, space, name) for problem in result.problems),
+        issues=tuple(moved_issue(issue, space, name) for issue in result.issues),
         template=name,
     )
 

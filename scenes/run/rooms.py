@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Effect, Issue
 from bim.templates import template_rooms
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -40,7 +41,7 @@ class RoomSeries(Generic[R]):
     beside: Beside[R] | None = None  # computes rooms beside each other in place of `compute`
     kept: Callable[[R], R] = lambda result: result  # what is held of each
 
-    def results(self, progress: Progress = silent) -> tuple[list[R], list[Problem], list[str]]:
+    def results(self, progress: Progress = silent) -> tuple[list[R], list[Issue], list[str]]:
         """The results in the rooms' order, what was left out, and what was given twice.
 
         Raises: `DataError` where the only room cannot be computed.
@@ -54,8 +55,8 @@ class RoomSeries(Generic[R]):
         templates: _Templates,
         ahead: Iterator[tuple[str, R | BaseException]],
         progress: Progress,
-    ) -> tuple[list[R], list[Problem], list[str]]:
-        found, problems, notes = [], [], []
+    ) -> tuple[list[R], list[Issue], list[str]]:
+        found, issues, notes = [], [], []
         computed: dict[str, R | BaseException] = {}
         for number, space in enumerate(self.spaces, 1):
             steps = item(progress, "room", number, len(self.spaces), space.label)
@@ -82,11 +83,12 @@ class RoomSeries(Generic[R]):
                 if len(self.spaces) == 1:
                     where = f"space {space.label}"
                     raise DataError(str(error), file=self.file, element=where) from error
-                problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+                values = {"room": space.label, "reason": str(error)}
+                issues.append(Issue("room-not-simulated", space.guid, values, Effect("room")))
                 continue
             found.append(result)
             self.on_room(result)
-        return found, problems, notes
+        return found, issues, notes
 
     def _ahead(
         self, templates: _Templates, progress: Progress
