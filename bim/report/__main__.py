@@ -17,9 +17,8 @@ is data: `code`, `where` (GUID, name or file), `values`, `effect` and `severity`
 import bim
 
 building = bim.read_ifc("house.ifc")
-for issue in building.issues:
-    if issue.severity == "loss":
-        print(issue.code, issue.where, bim.issue_text(issue).line)
+losses = [issue for issue in building.issues if issue.severity == "loss"]
+lines = [f"{issue.where} {bim.issue_text(issue).line}" for issue in losses]
 ```
 
 `problems.csv` of every command has the columns where, what, consequence, code and severity.

@@ -13,7 +13,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from scenes.demo import OFFICE
 from scenes.fenestration.systems import read_system
 from scenes.room.daylight import room_scene
-from scenes.room.holes import hole_issues, moved_issue
+from scenes.room.leaks import hole_issues, moved_issue
 from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 
