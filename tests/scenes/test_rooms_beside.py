@@ -19,10 +19,10 @@ from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.processes import BLAS_THREADS
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.room import series
 from scenes.room.options import RoomOptions
 from scenes.room.series import RoomSeries
 from scenes.run import outputs, rooms_apart
-from scenes.run import rooms as series
 from scenes.run.job import JobInputs, read_inputs
 from scenes.run.options import JobOptions
 from scenes.run.rooms_apart import Workers
