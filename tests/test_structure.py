@@ -24,6 +24,7 @@ RANKS = {
         {"picture_year", "trace"},
         {"methods"},
     ),
+    "mitsuba_cfs.trace": ({"kernels"}, {"matrices"}, {"sun"}, {"paths"}, {"pictures"}),
     "scenes": (
         {"language"},
         {"demo", "figures", "plausible", "quick", "result_folder", "results", "streams",
@@ -54,25 +55,30 @@ def _tree(source: str) -> ast.Module:
     return ast.parse(source)
 
 
-def _part(module: str) -> str:
-    """What lies directly in a package and holds a module; nothing for the package's face."""
-    return module.partition(".")[2].partition(".")[0]
+def _part(module: str, package: str) -> str:
+    """The part directly in a package that a module belongs to; empty for the package itself."""
+    return module.removeprefix(package).removeprefix(".").partition(".")[0]
 
 
 def _rank_faults(name: str, source: str) -> list[str]:
-    """Imports of a module from parts of its package that stand no lower than its own."""
-    package, module = name.partition("/")[0], dotted(name)
-    levels = RANKS.get(package, ())
-    rank = {part: level for level, parts in enumerate(levels) for part in parts}
-    rank[""] = len(levels)  # the face
-    faults = []
+    """Imports of a module from parts of its packages that do not rank lower than its own part."""
+    module = dotted(name)
+    packages = [package for package in RANKS if f"{module}.".startswith(f"{package}.")]
+    faults = [fault for package in packages for fault in _upward(package, module, source)]
+    return [f"{name}:{line}: {words}" for line, words in dict.fromkeys(faults)]
+
+
+def _upward(package: str, module: str, source: str) -> Iterator[tuple[int, str]]:
+    """Line and message of each import that goes up within one package."""
+    rank = {part: level for level, parts in enumerate(RANKS[package]) for part in parts}
+    rank[""] = len(RANKS[package])  # the package's face
+    importer = _part(module, package)
     for imported, line in imports(_tree(source)):
-        mine, other = _part(module), _part(imported)
-        if imported.partition(".")[0] != package or not levels or mine == other:
+        other = _part(imported, package)
+        if not f"{imported}.".startswith(f"{package}.") or importer == other:
             continue
-        if rank.get(mine, -1) <= rank.get(other, rank[""]):
-            faults.append(f"{name}:{line}: {package}.{other} does not stand below {package}.{mine}")
-    return list(dict.fromkeys(faults))
+        if rank.get(importer, -1) <= rank.get(other, rank[""]):
+            yield line, f"{package}.{other} does not stand below {package}.{importer}"
 
 
 def _circle(sources: Mapping[str, str]) -> list[str]:
@@ -142,7 +148,7 @@ def test_modules_import_only_from_below() -> None:
 @pytest.mark.parametrize("package", RANKS)
 def test_the_ranks_hold_each_part_once(package: str) -> None:
     modules = (dotted(name) for name in SOURCES)
-    parts = {_part(m) for m in modules if m.startswith(f"{package}.")}
+    parts = {_part(m, package) for m in modules if m.startswith(f"{package}.")}
     assert sorted(part for level in RANKS[package] for part in level) == sorted(parts)
 
 
@@ -162,13 +168,18 @@ def test_no_function_takes_many_positional_parameters() -> None:
 @pytest.mark.parametrize(
     ("name", "source"),
     [
-        ("mitsuba_cfs/files.py", "from mitsuba_cfs.trace import scene"),  # upwards
+        ("mitsuba_cfs/files.py", "from mitsuba_cfs.trace.kernels import scene"),  # upwards
         ("mitsuba_cfs/sky/x.py", "import mitsuba_cfs.bsdf.klems"),  # aside
         ("mitsuba_cfs/sky/x.py", "import mitsuba_cfs.new"),  # to what has no rank
         ("mitsuba_cfs/new.py", "from mitsuba_cfs.errors import DataError"),  # from what has none
         ("mitsuba_cfs/methods/x.py", "import mitsuba_cfs as cfs"),  # the face
-        ("mitsuba_cfs/trace/x.py", "from mitsuba_cfs import methods"),
-        ("mitsuba_cfs/trace/x.py", "def f():\n    from mitsuba_cfs.methods.glare import pictures"),
+        ("mitsuba_cfs/trace/kernels/x.py", "from mitsuba_cfs import methods"),
+        ("mitsuba_cfs/trace/kernels/x.py", "import mitsuba_cfs.trace.matrices.view"),
+        ("mitsuba_cfs/trace/sun/x.py", "from mitsuba_cfs.trace import paths"),
+        (
+            "mitsuba_cfs/trace/sun/x.py",
+            "def f():\n    from mitsuba_cfs.methods.glare import pictures",
+        ),
         ("scenes/results.py", "if TYPE_CHECKING:\n    from scenes.report.page import write_report"),
         ("scenes/heat/x.py", "from importlib import import_module\nimport_module('scenes.study')"),
         ("scenes/study/x.py", "from scenes.commands.parameters import seed_option"),

@@ -37,8 +37,8 @@ OUTDOORS = {"open": lambda: room.NOTHING, "shaded": shaded}
 
 def ours(outdoors: str, samples: int, batches: int = BATCHES, seed: int = 1):
     """Our daylight matrix [G, K, P] as an `Estimate`."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     return daylight_matrix(
         OUTDOORS[outdoors](),

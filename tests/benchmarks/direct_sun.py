@@ -55,7 +55,7 @@ def klems_blind() -> Blind:
     """The demo's blind and glazing, by Klems matrices."""
 
     def scattering():
-        from mitsuba_cfs.trace.direct_sun import KlemsScattering
+        from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
         block = read_bsdf_xml(SYSTEM).band("Visible").filled().transmission_front
         return KlemsScattering(KLEMS_FULL, block, np.zeros(KLEMS_FULL.size))
@@ -77,7 +77,7 @@ def tree_blind() -> Blind:
         import mitsuba as mi
 
         from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
-        from mitsuba_cfs.trace.direct_sun import PluginScattering
+        from mitsuba_cfs.trace.kernels.scattering import PluginScattering
 
         return PluginScattering(mi.load_dict(tensor_tree_plugin(tree, up=(0, 1, 0))))
 
@@ -98,8 +98,8 @@ def black_room() -> Surfaces:
 
 def ours(blind: Blind, points: int, batches: int = BATCHES, seed: int = 1) -> NDArray[np.float64]:
     """Our C_ds [S, Q] in lux per unit of a disc's luminance."""
-    from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     return direct_sun_matrix(
         black_room(),
@@ -132,7 +132,7 @@ def write_scene(blind: Blind, folder: Path) -> None:
 
 def theirs(folder: Path) -> NDArray[np.float64]:
     """Radiance's C_ds [S, Q], of wider discs and scaled to the sun's solid angle."""
-    from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
+    from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     points, directions = room.sensors(SPACING)
     command = COMMAND.replace(" scene.oct", f" -y {len(points)} scene.oct")

@@ -40,10 +40,10 @@ class BenchmarkYear:
 
     def __init__(self, every: int, size: int = SIZE) -> None:
         """Trace and multiply everything that the pictures need."""
-        from mitsuba_cfs.trace.annual_pictures import FivePhasePictures, view_matrices
-        from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-        from mitsuba_cfs.trace.direct_sun import KlemsScattering
-        from mitsuba_cfs.trace.picture_sun import PictureSun
+        from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+        from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+        from mitsuba_cfs.trace.pictures.annual import FivePhasePictures, view_matrices
+        from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
         weather, groups = read_epw(WEATHER), room.window_groups()
         series = sky_series(weather)

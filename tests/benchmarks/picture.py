@@ -48,7 +48,7 @@ class PictureScene:
     """The room, its blind and its sky, for both programs."""
 
     def __init__(self, folder: Path) -> None:
-        from mitsuba_cfs.trace.lit_room import LitRoom, Sky
+        from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
 
         fenestration = PicturedSystem("blind", folder)
         moment = moments(read_epw(WEATHER))[MOMENT]
@@ -59,7 +59,7 @@ class PictureScene:
 
     def ours(self, size: int, samples: int, **options) -> NDArray[np.float32]:
         """Our picture."""
-        from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+        from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
         view = fisheye(EYE, DIRECTION, size)
         return point_in_time_picture(self.room, self.sky, view, samples=samples, **options)

@@ -22,8 +22,8 @@ REFERENCE_BATCHES, REFERENCE_SAMPLES = 32, 8192
 
 def ours(spacing: float, groups: int, samples: int, batches: int = BATCHES, seed: int = 1):
     """Our view matrix of the room [S, G, K] as an `Estimate`."""
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     return view_matrix(
         room.room(),

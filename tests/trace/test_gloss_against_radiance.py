@@ -14,8 +14,8 @@ RTRACE = {"mirror": (8062.0, 6.1), "metal": (6998.9, 10.7), "floor": (2650.9, 2.
 
 @pytest.mark.parametrize("name", RTRACE)
 def test_illuminance_at_the_eye_is_that_of_rtrace(name):
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.point_in_time import point_in_time
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.paths.point_in_time import point_in_time
     from tests.validation import gloss
 
     given, view = gloss.case(name), fisheye(gloss.EYE, gloss.DIRECTION, 50)

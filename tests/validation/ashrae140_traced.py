@@ -29,8 +29,8 @@ from mitsuba_cfs.sky.matrix import series_matrix, sky_series
 from mitsuba_cfs.sky.sun import is_up
 from mitsuba_cfs.sky.three_part import three_part
 from mitsuba_cfs.sky.weather import Weather
-from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.estimate import Stopping
+from mitsuba_cfs.trace.kernels.estimate import Stopping
+from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from tests.validation.ashrae140 import RANGES, WEATHER
 from tests.validation.ashrae140_cases import HEIGHT, Opening, cases
 from tests.validation.ashrae140_sun import ANGLES, AshraeGlazing, glass

@@ -25,7 +25,7 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs.bsdf.glazing import Pane, pane_values
 from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
 from mitsuba_cfs.glare.annual import full_picture
-from mitsuba_cfs.trace.direct_sun import KlemsScattering
+from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from tests.validation.before_after_rooms import (
     DARK,
     PAIRS,

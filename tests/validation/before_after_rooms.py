@@ -22,8 +22,7 @@ from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.methods.optics import GivenOptics, States
 from mitsuba_cfs.methods.phase_light import PhaseLight
-from mitsuba_cfs.trace.direct_sun import PluginScattering
-from mitsuba_cfs.trace.systems import WINDOW_UP
+from mitsuba_cfs.trace.kernels.scattering import WINDOW_UP, PluginScattering
 from tests.validation.tree_peak import fabric
 
 SIZE = 110  # [px]

@@ -35,14 +35,14 @@ from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.daylight_coefficients import daylight_coefficients
-from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.lit_room import LitRoom, PathOptics, Sky
-from mitsuba_cfs.trace.point_in_time import point_in_time
-from mitsuba_cfs.trace.sun_discs import Scattering
-from mitsuba_cfs.trace.systems import lit_system, sun_scattering
-from mitsuba_cfs.trace.view_matrix import view_matrix
+from mitsuba_cfs.trace.kernels.estimate import Stopping
+from mitsuba_cfs.trace.kernels.scattering import Scattering, sun_scattering
+from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+from mitsuba_cfs.trace.matrices.view import view_matrix
+from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
+from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.paths.systems import lit_system
 from tests.validation.blind_room import (
     TILTS,
     BlindRoom,

@@ -10,8 +10,8 @@ from mitsuba_cfs.bsdf.plugin import klems_plugin
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
-from mitsuba_cfs.trace.direct_sun import KlemsScattering
-from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
+from mitsuba_cfs.trace.kernels.scattering import AngularBeam, KlemsScattering
+from mitsuba_cfs.trace.paths.path_scene import PathOptics
 
 
 class TreeBehind:
@@ -40,7 +40,7 @@ class TreeBehind:
         self._from_sun = mi.BSDFContext(mi.TransportMode.Importance)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
-        """See `mitsuba_cfs.trace.direct_sun.Scattering`."""
+        """See `mitsuba_cfs.trace.sun.direct.Scattering`."""
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(outward))
         si.n = mi.Normal3f(0, 0, 1)
         si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
@@ -49,7 +49,7 @@ class TreeBehind:
         return value * self._glass.at(outward) + self._sun_between.scattered(sun, outward)
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
-        """See `mitsuba_cfs.trace.direct_sun.Scattering`."""
+        """See `mitsuba_cfs.trace.sun.direct.Scattering`."""
         known = mi.Vector3f(sun)
         straight = self._local.through(self._from_sun, known, known.z > 0)
         return straight * self._glass.at(known)

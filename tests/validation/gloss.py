@@ -31,10 +31,11 @@ from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
-from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-from mitsuba_cfs.trace.picture_paths import point_in_time_picture
-from mitsuba_cfs.trace.point_in_time import point_in_time
+from mitsuba_cfs.trace.kernels.estimate import Stopping
+from mitsuba_cfs.trace.kernels.scattering import AngularBeam
+from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
 from tests.validation.rendered_scene import RenderedScene

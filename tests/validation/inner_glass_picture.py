@@ -37,7 +37,7 @@ from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.trace.sampling import spread_rays
+from mitsuba_cfs.trace.kernels.sampling import spread_rays
 from scenes.room.inner_glass import opened
 from tests.validation import inner_glass, inner_glass_ifc
 from tests.validation.cut_groups import Quads

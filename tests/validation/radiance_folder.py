@@ -32,10 +32,10 @@ from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
-from mitsuba_cfs.trace.systems import sun_scattering
-from mitsuba_cfs.trace.view_matrix import view_matrix
+from mitsuba_cfs.trace.kernels.scattering import KlemsScattering, sun_scattering
+from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+from mitsuba_cfs.trace.matrices.view import view_matrix
+from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 from scenes.demo import VENETIAN_BLIND
 from tests.benchmarks.radiance import environment, run
 

@@ -36,9 +36,10 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather
-from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-from mitsuba_cfs.trace.picture_paths import point_in_time_picture
-from mitsuba_cfs.trace.systems import lit_system
+from mitsuba_cfs.trace.kernels.scattering import AngularBeam
+from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+from mitsuba_cfs.trace.paths.systems import lit_system
+from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
 from tests.benchmarks.annual_product import SYSTEM, WEATHER
