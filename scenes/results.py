@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.picture_year.year import PictureYear
@@ -157,7 +158,7 @@ class RoomYear:
     operation: OperationResult | None = None  # None: first shading state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours of `rate`
-    problems: tuple[Problem, ...] = ()  # of the traced model
+    issues: tuple[Issue, ...] = ()  # of the traced model
     explored: ExploredRoom | None = None  # for the explorer
     template: str = ""  # name of the equal room that was computed; "": this room
     borrowed: str = ""  # note on the daylight through inner glass; "": none
@@ -187,7 +188,7 @@ class RunResult:
     times: pd.DatetimeIndex  # [H] middle of each interval, local standard time
     sun: NDArray[np.float64]  # [H, 3] direction to the sun
     spaces: Sequence[RoomYear]
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
     manifest: dict  # of run.json: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # sentences for the head of the results
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS

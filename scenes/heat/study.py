@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
+from bim.report.issue import issue_text
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -29,7 +30,7 @@ from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.room.heat import felt_by, room_humidity
 from scenes.room.inputs import room_inputs
-from scenes.room.leaks import leak_problems
+from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
 from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
@@ -117,10 +118,8 @@ def run_study(
             operation=study, skies=skies, cache=cache,
         )  # fmt: skip
         if space.windows:
-            leaks = leak_problems(
-                space, visible_scene(room), seed=options.sampling.seed, cache=cache
-            )
-            notes |= dict.fromkeys(f"{one.what}: {one.consequence}" for one in leaks)
+            leaks = leak_issues(space, visible_scene(room), seed=options.sampling.seed, cache=cache)
+            notes |= dict.fromkeys(issue_text(one, "command").line for one in leaks)
         zone, radiant = operated_zone(room, progress=steps), None
         if trace.view_factors:
             radiant = radiant_room(

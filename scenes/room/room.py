@@ -44,7 +44,7 @@ from scenes.room.glare import annual_glare, coloured, rated_hours, rating_of, ro
 from scenes.room.heat import DaylitRoom, heat_alone
 from scenes.room.inner_glass import borrowed_share
 from scenes.room.inputs import FileSensors, RoomInputs, room_inputs
-from scenes.room.leaks import leak_problems
+from scenes.room.leaks import leak_issues
 from scenes.room.light import room_light
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
@@ -169,7 +169,7 @@ def lit_room(
         state = shading_state(room, light, outdoors, progress=progress)
         daylight = room_daylight(room, light, state, progress=progress)
     with times.stage("leaks"):
-        leaks = leak_problems(space, light.scene, seed=options.sampling.seed, cache=cache)
+        leaks = leak_issues(space, light.scene, seed=options.sampling.seed, cache=cache)
     if options.outputs.annual_glare:
         with times.stage("annual glare"):
             year = annual_glare(room, light, state, progress=progress)
@@ -194,7 +194,7 @@ def lit_room(
             outdoors = seasonal_outdoors(room, light, progress=progress)
         zone = room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
     return DaylitRoom(
-        space, daylight, glare, zone, times.seconds, year, dgp=dgp, problems=leaks,
+        space, daylight, glare, zone, times.seconds, year, dgp=dgp, issues=leaks,
         explored=explored, borrowed=borrowed_share(space, light.light, light.inner),
     )  # fmt: skip
 
