@@ -179,8 +179,8 @@ def run_to_folder(
     for note in result.notes:
         if note != quick_run.NOTE:
             click.echo(f"note: {note}")
-    if result.problems:
-        found = ngettext("{count} problem", "{count} problems", len(result.problems))
+    if result.issues:
+        found = ngettext("{count} problem", "{count} problems", len(result.issues))
         click.echo(f"{found} in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
     if options.explore:

@@ -56,10 +56,12 @@ HEARD = (
     N_("{name}: window model: {model}."),
     N_("--cfs fills the windows: [[system]] of {file} is not used."),
     N_(
-        "{name} holds several shading states; without --operation the first of each window ({names}) holds all year."
+        "{name} holds several shading states; without --operation the first of each window "
+        "({names}) holds all year."
     ),
     N_(
-        "The building's site ({north} N, {east} E) is far from the weather station {site} ({other_north} N, {other_east} E): the sun is the weather station's."
+        "The building's site ({north} N, {east} E) is far from the weather station {site} "
+        "({other_north} N, {other_east} E): the sun is the weather station's."
     ),
 )
 

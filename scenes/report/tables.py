@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from bim.ranking import ranked
+from bim.report.ranking import ranked
 from scenes.language.catalogue import N_, gettext
 from scenes.language.numbers import cell
 from scenes.report.names import Quantity, quantity
@@ -160,8 +160,8 @@ def problems_table(result: RunResult) -> Table:
         Column(gettext("Treatment in the model"), numeric=False),
     )
     rows = tuple(
-        (cell(one.glass, 2) if one.glass else "–", one.first.where, one.what, one.first.consequence)
-        for one in ranked(result.problems)
+        (cell(one.glass, 2) if one.glass else "–", one.first.where, *one.text("command").pair)
+        for one in ranked(result.issues)
     )
     return Table(gettext("Problems by element"), columns, rows)
 

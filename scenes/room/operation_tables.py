@@ -1,23 +1,24 @@
-"""The tables of a TOML file that say how rooms are operated: states, control, gains, air, loads."""
+"""The tables of an operation file: states, control, gains, air, loads, envelope, comfort, plant."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.heat_island import in_city
+from mitsuba_cfs.sky.weather import Weather
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
-from scenes.room.air_tables import AirTable
-from scenes.room.envelope_tables import EnvelopeTable
-from scenes.room.heat_island import HeatIslandTable
-from scenes.room.load_tables import LoadsTable, PlantTable
 from scenes.room.schedules import (
     CLOCK,
     CalendarTable,
+    Hours,
     OrSchedule,
     ScheduleTable,
     clock_or_name,
@@ -27,10 +28,288 @@ from scenes.room.schedules import (
     unknown_name,
 )
 from scenes.toml_file import Positive, Share, TomlTable
+from thermal.ground import SHIELDS, SOILS
+from thermal.ventilation import BLAST, DOE2, DOOR_DISCHARGE, Leakage, aim2, sherman_grimsrud
+from thermal.zone import OUTSIDE_ABSORPTANCE, ROUGHNESS
+
+
+class HeatIslandTable(TomlTable):
+    """Urban heat island: the street of the room, see `mitsuba_cfs.sky.heat_island`."""
+
+    sky_view: Share
+    vegetation: Share
+    hourly_shares: Annotated[tuple[Share, ...], Field(min_length=24, max_length=24)]
+
+    def warmed(self, weather: Weather, file: Path | None) -> Weather:
+        """The weather with the air of the street; a note of the weather states the warming.
+
+        Args: file: of the table, named in messages.
+
+        Raises: `DataError` outside the range of the equation.
+        """
+        try:
+            return in_city(weather, self.sky_view, self.vegetation, self.hourly_shares)
+        except ValueError as error:
+            raise DataError(str(error), file=file, field="heat_island") from error
+
+
+NAMED = {"constant": (1.0, 0.0, 0.0, 0.0), "doe-2": DOE2, "blast": BLAST}
+
+
+def _factors(value: Any) -> Any:
+    if isinstance(value, str) and value not in NAMED:
+        raise ValueError(f"expected four numbers or one of {', '.join(NAMED)}, got {value!r}")
+    return NAMED.get(value, value) if isinstance(value, str) else value
+
+
+Factor = Annotated[float, Field(ge=0)]
+
+
+class LeakageTable(TomlTable):
+    """Leakage from a pressure test: an area at 4 Pa, or a coefficient with its exponent."""
+
+    area_cm2: Annotated[Positive, plausible.LEAK] | None = None
+    coefficient: Positive | None = None  # [m3/(s Pa^n)]
+    exponent: Annotated[float, Field(ge=0.5, le=1.0)] = 0.67
+    stack: Annotated[float, Field(ge=0, le=1)]
+    wind: Annotated[float, Field(ge=0, le=1)]
+    shelter: Annotated[float, Field(ge=0, le=1)] = 1.0  # of the wind, with `coefficient`
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> LeakageTable:
+        if (self.area_cm2 is None) == (self.coefficient is None):
+            raise ValueError("give either `area_cm2` or `coefficient`")
+        return self
+
+    def leakage(self) -> Leakage:
+        """The leakage of the heat balance."""
+        if self.area_cm2 is not None:
+            return sherman_grimsrud(self.area_cm2, stack=self.stack, wind=self.wind)
+        return aim2(
+            self.coefficient, self.exponent,
+            stack=self.stack, wind=self.wind, shelter=self.shelter,
+        )  # fmt: skip
+
+
+class OpenedTable(TomlTable):
+    """Airing by opened windows, EN 16798-7."""
+
+    # share of the glass that opens, while allowed; or a schedule
+    share: Annotated[float | str, OrSchedule(plausible.SHARE)] = 0.1
+    flow: Literal["single-sided", "cross"] = "single-sided"
+    when: Literal["always", "occupied"] = "occupied"  # a share that is a number
+    open_above_c: Annotated[float, plausible.TEMPERATURE] = 24.0
+    close_below_c: Annotated[float, plausible.TEMPERATURE] = 22.0
+    least_difference: Annotated[float, Field(ge=-20, le=20)] = 0.0  # above outdoors [K]
+    greatest_wind: Annotated[Positive, plausible.WIND] = 60.0  # [m/s]
+    least_outdoor_c: Annotated[float, plausible.OUTDOOR] = -30.0
+
+    @model_validator(mode="after")
+    def _do_not_cross(self) -> OpenedTable:
+        if self.close_below_c > self.open_above_c:
+            raise ValueError("close_below_c: lies above open_above_c")
+        return self
+
+
+class NeighbourAirTable(TomlTable):
+    """Air exchanged with a neighbour of known temperature, the same flow each way."""
+
+    temperature_c: Annotated[float | str, OrSchedule(plausible.TEMPERATURE)]
+    # of an opening with buoyant exchange, warm air above and cool air below: an open door
+    width: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    height: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    discharge: Annotated[Positive, Field(le=1)] = DOOR_DISCHARGE
+    open: Annotated[float | str, OrSchedule(plausible.SHARE)] = 1.0  # share of its width
+    m3_h: Annotated[float | str, OrSchedule(plausible.FLOW)] = 0.0  # at any temperature
+
+    @model_validator(mode="after")
+    def _has_a_size_or_a_flow(self) -> NeighbourAirTable:
+        if (self.width is None) != (self.height is None):
+            raise ValueError("width and height belong together")
+        if self.width is None and self.m3_h == 0.0:
+            raise ValueError("give `width` and `height` of an opening, or `m3_h`")
+        return self
+
+
+class AirTable(TomlTable):
+    """Outdoor air."""
+
+    infiltration_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.5
+    # a, b, c, d: infiltration (a + b dT + c v + d v^2); "constant", "doe-2" or "blast"
+    infiltration_factors: Annotated[
+        tuple[Factor, Factor, Factor, Factor], BeforeValidator(_factors)
+    ] = NAMED["constant"]
+    leakage: LeakageTable | None = None  # besides the infiltration
+    windows: OpenedTable | None = None
+    night_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0  # by night
+    night: Hours = (0, 7)
+    # of a fan, while occupied; or a schedule
+    ventilation_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0
+    heat_recovery: Share = 0.0  # of the fan's air
+    bypass_above_c: Annotated[float, plausible.TEMPERATURE] | None = None  # no recovery above
+    least_supply_c: Annotated[float, plausible.TEMPERATURE] | None = None  # heated to that
+    supply_c: Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)] = None
+    fan_w_m3_s: Annotated[float, plausible.FAN] = 0.0  # electricity of the fan
+    neighbour: tuple[NeighbourAirTable, ...] = ()  # rooms that are not simulated
+    # each way through every open door between coupled rooms [m3/s]; 0: the doors are shut
+    door_m3_s: Annotated[float, plausible.DOOR_FLOW] = 0.0
+
+    @model_validator(mode="after")
+    def _one_temperature(self) -> AirTable:
+        if self.supply_c is not None and (self.heat_recovery or self.least_supply_c is not None):
+            raise ValueError("supply_c: leaves nothing to recover or to heat")
+        return self
+
+
+SetPoint = Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)]
+Cop = Annotated[Positive, plausible.COP]
+
+
+class SlabTable(TomlTable):
+    """Pipes or wires in a construction, with power proportional to the deviation of the air."""
+
+    faces: tuple[str, ...] = ("floor",)  # side of the box, or kind of faces; the largest surface
+    depth: Annotated[Positive, plausible.LAYER] = 0.05  # below the inside face [m]
+    heating_c: SetPoint = None
+    cooling_c: SetPoint = None
+    heating_w_m2: Annotated[float, plausible.GAIN] = 60.0  # at full power
+    cooling_w_m2: Annotated[float, plausible.GAIN] = 40.0
+    band: Annotated[Positive, Field(le=20)] = 2.0  # from none to full power [K]
+
+
+class LoadsTable(TomlTable):
+    """Ideal heating and cooling; a room without set points floats."""
+
+    heating_c: SetPoint = None
+    cooling_c: SetPoint = None
+    heating_limit_w: Annotated[Positive, plausible.POWER] | None = None
+    cooling_limit_w: Annotated[Positive, plausible.POWER] | None = None
+    heating_radiant: Share = 0.0  # radiators 0.3, ceilings 0.6
+    cooling_radiant: Share = 0.0
+    slab: SlabTable | None = None
+    humidify_to: Annotated[float, plausible.PERCENT] | None = None  # relative humidity [%]
+    dehumidify_to: Annotated[float, plausible.PERCENT] | None = None
+
+    @model_validator(mode="after")
+    def _do_not_cross(self) -> LoadsTable:
+        if isinstance(self.heating_c, float) and isinstance(self.cooling_c, float):
+            if self.heating_c > self.cooling_c:
+                raise ValueError("the set points cross: heating_c lies above cooling_c")
+        low, high = self.humidify_to, self.dehumidify_to
+        if low is not None and high is not None and low > high:
+            raise ValueError("humidify_to: lies above dehumidify_to")
+        return self
+
+
+class PlantTable(TomlTable):
+    """An ideal plant by its COP, and primary energy factors."""
+
+    # heat per final energy: a number, or pairs of outdoor temperature and COP between which it
+    # is linear
+    heating_cop: Cop | tuple[tuple[Annotated[float, plausible.OUTDOOR], Cop], ...] = 1.0
+    cooling_cop: Cop | tuple[tuple[Annotated[float, plausible.OUTDOOR], Cop], ...] = 3.0
+    heating_factor: Annotated[float, plausible.FACTOR] = 1.1  # primary per final energy
+    electricity_factor: Annotated[float, plausible.FACTOR] = 2.5  # of cooling, fans, lamps, plugs
+
+    @model_validator(mode="after")
+    def _rises(self) -> PlantTable:
+        for key in ("heating_cop", "cooling_cop"):
+            pairs = getattr(self, key)
+            if isinstance(pairs, tuple):
+                at = [temperature for temperature, _ in pairs]
+                if not at or any(b <= a for a, b in pairwise(at)):
+                    raise ValueError(f"{key}: expected pairs by rising outdoor temperature")
+        return self
+
+
+KINDS = ("slab", "suspended", "basement", "unheated basement")
+
+
+class BridgeTable(TomlTable):
+    """A thermal bridge to outdoors, along a line or at a point."""
+
+    name: str = ""
+    psi: Annotated[float, plausible.PSI] | None = None  # [W/(m K)]
+    length: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    chi: Annotated[float, plausible.CHI] | None = None  # [W/K]
+    number: Annotated[int, Field(ge=1)] = 1
+
+    @model_validator(mode="after")
+    def _line_or_point(self) -> BridgeTable:
+        if (self.psi is None) == (self.chi is None) or (self.psi is None) != (self.length is None):
+            raise ValueError("give either `psi` with its `length`, or `chi`")
+        return self
+
+    @property
+    def conductance(self) -> float:
+        """Heat flow per kelvin [W/K]."""
+        each = self.chi if self.psi is None else self.psi * self.length
+        return self.number * each
+
+
+class GroundTable(TomlTable):
+    """The ground below a room by ISO 13370, for the whole building."""
+
+    kind: Literal[KINDS] = "slab"
+    area: Annotated[Positive, plausible.AREA] | None = None  # of the building's floor [m2]
+    perimeter: Annotated[Positive, plausible.PERIMETER]  # of it, exposed [m]
+    wall_thickness: Annotated[float, plausible.LAYER] = 0.3  # of the walls above [m]
+    soil: Literal[tuple(SOILS)] = "sand"  # ISO 13370: where nothing is known
+    conductivity: Annotated[Positive, plausible.CONDUCTIVITY] | None = None  # [W/(m K)]
+    heat_capacity: Annotated[Positive, plausible.SOIL_CAPACITY] | None = None  # [J/(m3 K)]
+    indoor_c: Annotated[float, plausible.TEMPERATURE] = 20.0  # the year's mean inside
+    # insulation at the edge of a slab: depth or width [m], resistance [m2 K/W]
+    edge: tuple[Positive, Annotated[float, plausible.RESISTANCE]] | None = None
+    edge_lies: Literal["vertical", "horizontal"] = "vertical"
+    depth: Annotated[Positive, plausible.DEPTH] | None = None  # of a basement's floor [m]
+    # above the ground outside: of the floor over a crawl space, of a cellar's walls [m]
+    height: Annotated[float, Field(ge=0), plausible.LENGTH] = 0.5
+    wall_u: Annotated[Positive, plausible.U_VALUE] = 1.0  # of those walls [W/(m2 K)]
+    vents: Annotated[float, Field(ge=0, le=0.5)] = 0.0015  # of a crawl space [m2/m]
+    shield: Literal[tuple(SHIELDS)] = "average"
+    # of what lies on the ground below a crawl space or cellar, and of a cellar's walls [m2 K/W]
+    below_resistance: Annotated[float, plausible.RESISTANCE] = 0.0
+    wall_resistance: Annotated[float, plausible.RESISTANCE] = 0.0
+
+    @model_validator(mode="after")
+    def _has_its_depth(self) -> GroundTable:
+        if (self.depth is not None) != self.kind.endswith("basement"):
+            raise ValueError("depth: goes with a basement, and a basement with it")
+        if self.edge is not None and self.kind != "slab":
+            raise ValueError("edge: belongs to a slab")
+        return self
+
+
+class NeighbourTable(TomlTable):
+    """A neighbour of known temperature behind some of a room's faces."""
+
+    faces: tuple[str, ...] = ()  # sides of the box, or kinds of faces: "wall", "floor", "ceiling"
+    spaces: tuple[str, ...] = ()  # rooms of the model, by name or GUID
+    temperature_c: Annotated[float | str, OrSchedule(plausible.TEMPERATURE)]
+    film: Annotated[float, plausible.RESISTANCE] = 0.13  # at the far side [m2 K/W]; 0: its face
+
+    @model_validator(mode="after")
+    def _names_some(self) -> NeighbourTable:
+        if not self.faces and not self.spaces:
+            raise ValueError("name `faces` or `spaces`")
+        return self
+
+
+class EnvelopeTable(TomlTable):
+    """Properties of the envelope that a building model does not contain."""
+
+    ground: GroundTable | None = None  # without: undisturbed soil half a metre down
+    neighbour: tuple[NeighbourTable, ...] = ()
+    bridge: tuple[BridgeTable, ...] = ()
+    # of all outdoor surfaces except frames
+    outside_absorptance: Share = OUTSIDE_ABSORPTANCE  # solar
+    outside_roughness: Literal[tuple(ROUGHNESS)] = "medium rough"  # DOE-2, for the outside film
+    frame_u: Annotated[Positive, plausible.FRAME_U] | None = None  # with films 0.13 and 0.04
+    frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]
 
 
 class ControlTable(TomlTable):
-    """Which state holds: states are numbered from 0 in the order of the file."""
+    """Control of the shading state; states are numbered from 0 in the order of the file."""
 
     rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
     state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
@@ -47,13 +326,13 @@ class ControlTable(TomlTable):
     slat_spacing: Annotated[Positive, plausible.SLAT] = 0.072  # [m]
 
     def fault(self, states: int) -> tuple[str, str] | None:
-        """The key that does not fit windows of so many states, and what is wrong with it."""
+        """The key that does not fit windows with `states` states, and the fault."""
         if isinstance(self.schedule, str):
-            return None  # its states are known with the weather
+            return None  # its states are checked with the weather
         if self.rule == "schedule" and len(self.schedule) != CLOCK:
             return "schedule", f"expected {CLOCK} states, got {len(self.schedule)}"
-        wanted = self.schedule if self.rule == "schedule" else (self.state,)
-        if any(not 0 <= state < states for state in wanted):
+        used = self.schedule if self.rule == "schedule" else (self.state,)
+        if any(not 0 <= state < states for state in used):
             return "state", f"a state outside 0 to {states - 1}: the windows have {states}"
         if self.rule == "cut-off" and len(self.slat_tilts_deg) != states:
             return "slat_tilts_deg", f"expected one for each of {states} states"
@@ -61,20 +340,20 @@ class ControlTable(TomlTable):
 
 
 class GainsTable(TomlTable):
-    """Heat in the room during the occupied hours."""
+    """Internal gains during the occupied hours."""
 
     equipment_w_m2: Annotated[float | str, OrSchedule(plausible.GAIN)] = 8.0
     persons: Annotated[float | str, OrSchedule(plausible.PERSONS)] = 1.0
     person_w: Annotated[float, plausible.PERSON] = 75.0  # dry
     person_vapour_g_h: Annotated[float, plausible.VAPOUR] = 50.0
-    vapour_g_h: Annotated[float | str, OrSchedule(plausible.VAPOUR)] = 0.0  # of all else
+    vapour_g_h: Annotated[float | str, OrSchedule(plausible.VAPOUR)] = 0.0  # of other sources
     lighting_w_m2: Annotated[float | str, OrSchedule(plausible.LAMPS)] = 0.0
     lighting_target_lx: Annotated[Positive, plausible.TARGET] = (
-        500.0  # of the mean on the work plane; daylight dims
+        500.0  # mean of the work plane, to which the lamps are dimmed
     )
     lighting_dimmed: bool = True  # False: daylight does not dim the lamps
     radiant_share: Share = 0.5
-    # clock hours of every day, or a schedule of the share that is there: numbers above hold then
+    # clock hours of every day, or a schedule of the share of people; multiplies the constants above
     occupied: Annotated[tuple[int, int] | str, OrSchedule(plausible.SHARE, clock_or_name)] = (8, 18)
 
 
@@ -89,7 +368,7 @@ class ComfortTable(TomlTable):
 
 
 class RoomsTable(TomlTable):
-    """Rooms that are operated otherwise: what is stated here goes before the file's own tables."""
+    """Tables of some rooms; their values replace those of the file's tables for all rooms."""
 
     spaces: tuple[str, ...] = ()  # names or GUIDs
     types: tuple[str, ...] = ()  # of the IFC's space types
@@ -110,15 +389,15 @@ PARTS = ("control", "gains", "air", "loads", "envelope")
 
 
 def operated_tables(tables: TomlTable) -> Iterator[tuple[str, TomlTable]]:
-    """The parts of a room's tables and the tables within them, with their places."""
+    """The parts of a room's tables and the tables within them, with their paths."""
     for part in PARTS:
         yield from tables_within(getattr(tables, part), part)
 
 
 class OperationTables(TomlTable):
-    """How rooms are operated: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s."""
+    """Operation of rooms: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s file."""
 
-    system: tuple[StateTable, ...] = ()  # states, from open to closed; none: those of the windows
+    system: tuple[StateTable, ...] = ()  # states, open to closed; none: the building file's
     control: ControlTable = ControlTable()
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
@@ -126,11 +405,9 @@ class OperationTables(TomlTable):
     envelope: EnvelopeTable = EnvelopeTable()
     comfort: ComfortTable = ComfortTable()
     plant: PlantTable = PlantTable()
-    terrain: Literal["country", "suburbs", "city"] = (
-        "suburbs"  # what the weather station's wind becomes
-    )
-    heat_island: HeatIslandTable | None = None  # the air of a street in place of the station's
-    rooms: tuple[RoomsTable, ...] = ()  # the first that names a room holds for it
+    terrain: Literal["country", "suburbs", "city"] = "suburbs"  # of the site, for the wind profile
+    heat_island: HeatIslandTable | None = None  # air of a street in place of the weather station's
+    rooms: tuple[RoomsTable, ...] = ()  # the first entry that names a room applies to it
     schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
     calendar: CalendarTable = CalendarTable()
 
@@ -146,7 +423,7 @@ class OperationTables(TomlTable):
         return self
 
     def control_fault(self, states: int) -> tuple[str, str] | None:
-        """The key of `control` that does not fit windows of so many states, and what is wrong."""
+        """The key of `control` that does not fit windows with `states` states, and the fault."""
         name = self.control.schedule
         if self.control.rule != "schedule" or not isinstance(name, str):
             return self.control.fault(states)
@@ -156,13 +433,13 @@ class OperationTables(TomlTable):
         return None
 
     def with_rooms(self, rooms: RoomsTable) -> OperationTables:
-        """The tables with what an entry of `rooms` states."""
-        found = {}
+        """The tables with the values of an entry of `rooms`."""
+        parts = {}
         for part in PARTS:
             stated = getattr(rooms, part)
             update = {key: getattr(stated, key) for key in stated.model_fields_set}
-            found[part] = getattr(self, part).model_copy(update=update)
-        return self.model_copy(update=found)
+            parts[part] = getattr(self, part).model_copy(update=update)
+        return self.model_copy(update=parts)
 
     @property
     def variants(self) -> tuple[OperationTables, ...]:
@@ -178,7 +455,10 @@ class OperationTables(TomlTable):
         return self if chosen is None else self.with_rooms(chosen)
 
     def entry_of(self, building: Building, space: Space) -> RoomsTable | None:
-        """The first entry of `rooms` that names a room; None without one. Raises: as `of_room`."""
+        """The first entry of `rooms` that names a room; None without one.
+
+        Raises: see `of_room`.
+        """
         chosen = None
         for number, rooms in reversed(tuple(enumerate(self.rooms))):
             guids = {building.room(name).space.guid for name in rooms.spaces}

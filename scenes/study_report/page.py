@@ -8,6 +8,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from bim.report.issue import issue_rows
 from mitsuba_cfs.files import write_text
 from scenes.language.catalogue import decimal, gettext, in_language, ngettext
 from scenes.language.numbers import rounded, share
@@ -143,7 +144,7 @@ def problems_table(study: StudyResult) -> tables.Table:
     return tables.Table(
         gettext("Problems by element"),
         columns,
-        tuple((p.where, p.what, p.consequence) for p in study.problems),
+        tuple(row[:3] for row in issue_rows(study.issues, "command")),
     )
 
 

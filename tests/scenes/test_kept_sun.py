@@ -12,7 +12,7 @@ import scenes.demo
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.sun import sun_directions
-from scenes.room import kept_sun as module
+from scenes.room import skies as module
 
 EPW = Path(scenes.demo.__file__).with_name("USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw")
 
@@ -43,5 +43,5 @@ def test_what_is_kept_is_what_is_computed_for_each_weather(tmp_path, weather, mo
     for again in (False, True):
         for one, model in cases:
             expected = sun_directions(one, model=model)
-            np.testing.assert_array_equal(module.kept_sun(one, model, cache), expected)
+            np.testing.assert_array_equal(module.cached_sun_directions(one, model, cache), expected)
         assert len(asked) == len(cases), again
