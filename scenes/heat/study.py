@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
+from bim.report.issue import issue_text
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -114,7 +115,7 @@ def run_study(
             operation=study, skies=skies, cache=cache, progress=steps,
         )  # fmt: skip
         if space.windows:
-            notes |= dict.fromkeys(f"{one.what}: {one.consequence}" for one in room.holes())
+            notes |= dict.fromkeys(issue_text(one, "command").line for one in room.holes())
         zone, radiant = room.zone, None
         if trace.view_factors:
             radiant = radiant_room(
