@@ -191,7 +191,7 @@ class PhaseScene:
         interior, parts = self.scene.interior, self.parts.groups
         return window_elements(
             kept_scene(interior, parts),
-            float(interior.areas.sum()),
+            interior,
             samples=self._exchange_samples(parts, EXCHANGE_SHARE),
             seed=self.sampling.seed,
         )
