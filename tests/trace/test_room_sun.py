@@ -12,8 +12,7 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
-from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows
-from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
 from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks

@@ -24,8 +24,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows
-from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scene import kept_scene
 from mitsuba_cfs.trace.matrices.pixel_view import PictureBlock, picture_part_blocks
 from mitsuba_cfs.trace.pictures.outdoors import OutdoorCoefficients

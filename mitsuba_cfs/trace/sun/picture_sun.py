@@ -21,13 +21,15 @@ from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaqu
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, kept_scene
 from mitsuba_cfs.trace.sun.lit_points import on_disc_of, place_and_hour
-from mitsuba_cfs.trace.sun.picture_disc import (
+from mitsuba_cfs.trace.sun.pixels import (
+    EDGE_PLACES,
     before_eye,
     disc_parts,
     disc_rays,
     disc_reach,
+    edge_pixels,
+    places_in_pixels,
 )
-from mitsuba_cfs.trace.sun.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
 from mitsuba_cfs.trace.sun.room_cells import Beam, RoomCells
 from mitsuba_cfs.trace.sun.room_sun import EDGE_POINTS, SunElements
 from mitsuba_cfs.trace.sun.specular_paths import SunWay, sun_ways

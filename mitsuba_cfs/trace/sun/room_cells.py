@@ -34,9 +34,8 @@ from mitsuba_cfs.trace.kernels.sampling import (
 )  # fmt: skip
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.discs import SPREAD
 from mitsuba_cfs.trace.sun.lit_points import Places, met_faces, on_disc_of
-from mitsuba_cfs.trace.sun.specular_paths import SunWay, sun_ways
+from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SunWay, sun_ways
 
 CELLS = 4096  # that the surfaces' area is divided into, about, on either side
 AREA_POINTS = 2**18  # that the cells' areas are counted by

@@ -33,8 +33,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import View, pixel_solid_angles
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, shown_hits
-from mitsuba_cfs.trace.kernels.pixel_sharing import FACE_STEPS, numbered
+from mitsuba_cfs.trace.kernels.pixel_rows import FACE_STEPS, PictureRows, numbered, shown_hits
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
