@@ -1,12 +1,11 @@
-"""The rows that a picture's pixels share, and what sums over two halves of the pixels make of them.
+"""Rows of a view matrix that the pixels of a tile share, their smoothing, and their noise.
 
-A row is what the pixels of a tile have in common that show one face of the scene.
-
-Light that varies slowly over a face of the scene, shared among the pixels that show the face.
-
-A picture is cut into square tiles.  What paths bring to a face in a tile is one mean, which the
-tiles round it on the same face smooth; a pixel takes it between the tiles' middles.  Neither an
-edge of the scene nor what is sharp (the sun's beam, the sky behind glass) is ever blurred.
+Light that varies slowly over a face of the scene is shared among the pixels that show the face.
+The picture is cut into square tiles.  One row, the mean over a tile's pixels that show one face,
+stands for these pixels; the tiles around it on the same face smooth it, and a pixel interpolates
+between the centres of tiles.  Edges of the scene and sharp light (the sun's beam, the sky through
+glass) are never blurred.  Half the difference of the means over two halves of the pixels is the
+noise of the row.
 """
 
 from __future__ import annotations
@@ -30,6 +29,8 @@ STEPS = (1, 2)  # [tiles] of the smoothing, one after the other
 BALANCINGS = 64  # rounds at most, by which the sums agree to 1e-4
 BALANCED = 1e-9  # of its weight: a round that changes none by more is the last
 FACE_STEPS = 8  # normals that differ less than 1/16 in each component are one face
+SMOOTHED_TILES = 16  # whole ones behind a row that is smoothed, below which its pixels have more
+MOST_TIMES = 32  # as many paths
 
 
 def face_numbers(surface: NDArray, normal: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -40,7 +41,7 @@ def face_numbers(surface: NDArray, normal: NDArray[np.float64]) -> NDArray[np.in
 
 
 def numbered(row: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The number of each among those of its row [n]."""
+    """The number of each entry among those of its row [n]."""
     order = np.argsort(row, kind="stable")
     _, first, place = np.unique(row[order], return_index=True, return_inverse=True)
     number = np.empty(len(row), dtype=np.int64)
@@ -62,13 +63,13 @@ class Tiles:
     width: int
 
     def key(self, column: ArrayLike, row: ArrayLike, face: ArrayLike) -> NDArray[np.int64]:
-        """The number of a face in the tile at a column and row of tiles."""
+        """Number of a face in the tile at a column and row of tiles."""
         across = -(-self.width // self.size) + 2 * MARGIN
         column, row = np.asarray(column) + MARGIN, np.asarray(row) + MARGIN
         return (np.asarray(face, dtype=np.int64) << 40) + row * across + column
 
     def of_pixels(self, pixel: NDArray[np.int64], face: NDArray) -> NDArray[np.int64]:
-        """The numbers of the faces in the tiles of pixels (row * width + column)."""
+        """Numbers of the faces in the tiles of pixels (row * width + column)."""
         row, column = np.divmod(pixel, self.width)
         return self.key(column // self.size, row // self.size, face)
 
@@ -100,15 +101,15 @@ def smoothing(
     count: NDArray,
     close: NDArray[np.bool_] | None = None,
 ) -> sparse.csr_array:
-    """What means over tiles [m] become when the tiles round each on its face smooth them [m, m].
+    """Smoothing of means over tiles by the tiles around each on its face [m, m].
 
-    An even face stays even, and the sum of count times mean stays what it is: the weights 1 2 1
+    A uniform face stays uniform, and the sum of count times mean is conserved: the weights 1 2 1
     are scaled to diag(x) A diag(x) with row and column sums of 1 (Sinkhorn and Knopp 1967).
 
     Args:
-        key: [m] as of `neighbours`; count: [m] how much stands behind each mean.
-        close: [m] tiles that another surface is close to, as in a corner: light changes fast there,
-            and they are smoothed by the tiles that touch them alone.
+        key: [m] as of `neighbours`; count: [m] weight of each mean.
+        close: [m] tiles that another surface is close to, as in a corner, where light changes fast:
+            only the tiles that touch them smooth them.
     """
     count = np.maximum(np.asarray(count, dtype=float), 1e-12)
     whole = sparse.csr_array(sparse.eye_array(len(key)))
@@ -127,7 +128,7 @@ def smoothing(
 
 
 def _apart(near: sparse.csr_array, close: NDArray[np.bool_]) -> sparse.csr_array:
-    """Weights of neighbours [m, m] with some tiles [m] for themselves."""
+    """Weights of neighbours [m, m] without those of some tiles [m]."""
     others = sparse.diags_array((~close).astype(float))
     return sparse.csr_array(others @ near @ others + sparse.diags_array(close.astype(float)))
 
@@ -135,13 +136,13 @@ def _apart(near: sparse.csr_array, close: NDArray[np.bool_]) -> sparse.csr_array
 def _find(
     table: NDArray[np.int64], key: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Where in a rising table each number stands, and whether it does."""
+    """Position of each number in a sorted table, and whether it is in the table."""
     place = np.minimum(np.searchsorted(table, key), len(table) - 1)
     return place, table[place] == key
 
 
 class SharedLight:
-    """Means of what paths bring to faces, tile by tile."""
+    """Means of the light on faces, tile by tile."""
 
     def __init__(
         self,
@@ -191,15 +192,11 @@ class SharedLight:
         return value / np.maximum(share, 1e-300)
 
 
-SMOOTHED_TILES = 16  # whole ones behind a row that is smoothed, below which its pixels have more
-MOST_TIMES = 32  # as many paths
-
-
 @dataclass(frozen=True, slots=True)
 class PictureRows:
-    """The pixels that show something, and the row that each shares with those beside it.
+    """The pixels that show something, and the row that each belongs to.
 
-    The halves of a row are its pixels on the squares of one colour of a chequerboard.
+    The halves of a row are its pixels on the two colours of a chequerboard.
     """
 
     tiles: Tiles
@@ -234,21 +231,21 @@ class PictureRows:
 
     @property
     def half(self) -> NDArray[np.int64]:
-        """The half of its row that each pixel is of [n]: 2 * row or 1 more."""
+        """Half of a row that each pixel belongs to [n]: 2 * row or 2 * row + 1."""
         row, column = np.divmod(self.pixels, self.tiles.width)
         return 2 * self.row + (row + column) % 2
 
     @property
     def number(self) -> NDArray[np.int64]:
-        """The number of each pixel among those of its half of a row [n]."""
+        """Number of each pixel among those of its half [n]."""
         return numbered(self.half)
 
     def times(self, *, smoothed: bool) -> NDArray[np.int64]:
-        """How often each pixel [n] is to be traced, so that no row has far fewer paths than others.
+        """How often to trace each pixel [n], so that no row has far fewer paths than others.
 
-        A row at the rim, or of a sliver of a face, has few pixels or one, and few to smooth it.
+        A row at the rim, or of a sliver of a face, has few pixels, and few neighbours.
 
-        Args: smoothed: whether its light is; then as many pixels are behind it as stand there.
+        Args: smoothed: whether neighbours smooth its light, so that their pixels count too.
         """
         if self.tiles.size == 1:
             return np.ones(len(self.row), dtype=np.int64)
@@ -263,9 +260,9 @@ class PictureRows:
     def of_halves(
         self, share: NDArray[np.float32], least: float
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """What sums over the halves [2 m] become: the rows' means, and their noise [m, 2 m].
+        """From sums over the halves [2 m] to the means of the rows and their noise [m, 2 m].
 
-        Args: share: [n] of each pixel that is behind a sum; least: of a row's, or it is a sliver.
+        Args: share: [n] weight of each pixel in its sum; least: weight of a row that counts.
         """
         m = len(self.keys)
         first, second = np.bincount(self.half, share, minlength=2 * m).reshape(-1, 2).T
@@ -280,9 +277,9 @@ class PictureRows:
     def smoothing(
         self, share: NDArray[np.float32], least: float, close: NDArray[np.bool_] | None = None
     ) -> sparse.csr_array:
-        """What the rows' means become when those beside each on its face smooth them [m, m].
+        """Smoothing of the rows' means by their neighbours on the same face [m, m].
 
-        Args: share, least: as of `of_halves`; close: as of `picture_sharing.smoothing`.
+        Args: share, least: as in `of_halves`; close: as in `smoothing`.
         """
         if self.tiles.size == 1:
             return sparse.csr_array(sparse.eye_array(len(self.keys), dtype=np.float32))
@@ -294,7 +291,7 @@ class PictureRows:
 def shown_hits(
     tracer: TracedScene, view: View, pixels: NDArray[np.int64], samples: int
 ) -> tuple[mi.Point3f, mi.Vector3f, Any, mi.Bool]:
-    """Rays spread over pixels [n]: eye, directions, first hits [n * samples], which are valid."""
+    """Rays spread over pixels [n]: eye, directions, first hits [n * samples], validity."""
     eye = tracer.place(view.position)
     directions, exists = spread_rays(view, pixels, samples)
     way, exist = vectors(directions), column(exists, mi.Bool)

@@ -139,11 +139,11 @@ def daylight_matrix(
     that sees no obstruction sums to 1.
 
     Args:
-        surfaces: what stands outdoors, in the band of the radiances; the windows' own panes and
-            whatever lies behind them must not be among it.
+        surfaces: outdoors, in the band of the radiances, without the windows' own panes and
+            anything on the room side of them.
         subdivision: Reinhart's MF (1, 2, 4, 6).
         samples: paths for each window patch in each batch.
-        cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
+        cache: of traced matrices, `MatrixCache.of_user()`; none by default.
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
@@ -194,11 +194,11 @@ def sky_irradiance_matrix(
     A row sums to pi where nothing around the sensor absorbs.
 
     Args:
-        points, directions: [S, 3] sensor positions [m] and normals; or [S, K, 3] places of each
-            sensor, of which its rows are the mean.
-        acceptance: what the sensor takes up of light at even steps from normal to grazing
-            incidence, 0 to 90 degrees; all of it by default.
-        max_depth: 1 leaves the sky that the sensor sees itself.
+        points, directions: [S, 3] sensor positions [m] and normals; or [S, K, 3] points of each
+            sensor, over which its row is averaged.
+        acceptance: angular acceptance at even steps of incidence from 0 to 90 degrees; 1 by
+            default.
+        max_depth: 1 for direct sky light only.
         samples: paths for each sensor in each batch.
     """
     points = np.asarray(points, dtype=float)

@@ -1,8 +1,8 @@
 """View matrices V: irradiance at sensors, or radiance of pixels, per unit radiance of a patch.
 
-The light of windows that a point sees, integrated patch by patch rather than sampled.
-
-Interreflection at many sensors at once: what one of them sees serves the others too.
+V = direct part + interreflection.  The direct part is integrated over each patch of each window
+(`add_window_light`).  The interreflection is sampled for many sensors together: the points that the
+rays of one sensor meet serve the others too (`indirect_rows`).
 """
 
 from __future__ import annotations
@@ -35,15 +35,20 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
 from mitsuba_cfs.trace.kernels.view_paths import add_mirrored, add_view_paths
 
-MOST_SENSORS = 64  # that share their hits; more would cost more than they help
+MOST_SENSORS = 64  # that share hits; more cost more than they save
 RAYS_OF_PATH = 4  # shadow rays and bounces, on average
+STEEPEST = 1e4  # tangent of the largest polar angle
+NEWTON_STEPS = 3  # the integrand is nearly linear within a ring
+DIRECT_SHARE = 2  # strata of the direct part for each path of a sensor
+LEAST_STRATA = 4  # their error falls with the power 1.5
+BLOCK_LANES = 1 << 26
 
 
 def shares(sensors: int, samples: int) -> tuple[int, int]:
     """Hits of each sensor, and paths from each hit, at about the cost of `samples` paths.
 
-    Each hit costs a shadow ray to every sensor and its paths; the more sensors take part in a
-    hit, the more is its row of the matrix worth.
+    Each hit costs a shadow ray to every sensor and its paths; the more sensors share a hit, the
+    more paths it deserves.
     """
     paths = max(1, sensors // 8)
     hits = max(1, round(RAYS_OF_PATH * samples / (1 + sensors + RAYS_OF_PATH * paths)))
@@ -177,7 +182,7 @@ def mirrored_rows(
     max_depth: int,
     key: mi.UInt32,
 ) -> NDArray[np.float64]:
-    """What sensors see by the gloss of what their rays meet first [C, G * K], each for itself."""
+    """Part of the view matrix that the gloss of the first surfaces reflects [C, G * K]."""
     C = dr.width(place)
     columns = len(tracer.groups) * bins.size
     rows = empty_sums(C * columns)
@@ -201,10 +206,6 @@ def mirrored_rows(
     return sums_of(rows, (C, columns))
 
 
-STEEPEST = 1e4  # tangent of the last polar angle that is looked at
-NEWTON_STEPS = 3  # the integrand is nearly linear within a ring
-
-
 @dr.syntax
 def add_window_light(
     tracer: TracedScene,
@@ -224,8 +225,8 @@ def add_window_light(
 
     In a half-plane of constant azimuth the triangle is an interval of polar angles, and so is the
     patch's ring; over both the cosine at `normal` has a closed integral.  Azimuth is stratified,
-    and one shadow ray, placed as the integrand, says whether the interval is seen.  Where nothing
-    stands in the way only the azimuth is left to chance, within one patch.
+    and one shadow ray, distributed as the integrand, tests the visibility.  Without
+    an obstruction only the azimuth is random, within one patch.
     """
     group, corners = tracer.window_triangle(triangle, position)
     a, b, c = corners
@@ -295,11 +296,6 @@ def _wrapped(angle: mi.Float) -> mi.Float:
     return angle - dr.two_pi * dr.floor(angle * dr.inv_two_pi + 0.5)
 
 
-DIRECT_SHARE = 2  # strata of the direct part for each path of a sensor
-LEAST_STRATA = 4  # their error falls with the power 1.5
-BLOCK_LANES = 1 << 26
-
-
 def view_matrix(
     surfaces: Surfaces,
     groups: Sequence[WindowGroup],
@@ -322,11 +318,11 @@ def view_matrix(
     share of the sensor's view, direct and reflected, that ends on the windows.
 
     Args:
-        surfaces: what the room is made of, in the band of the radiances (visible or solar).
+        surfaces: of the room, in the band of the radiances (visible or solar).
         points, directions: [S, 3] sensor positions [m] and normals.
         samples: paths for each sensor in each batch.
         max_depth: most bounces of a path; Russian roulette ends most before.
-        cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
+        cache: of traced matrices, `MatrixCache.of_user()`; none by default.
 
     Returns: an `Estimate` of shape [S, G, K] [sr, projected].
 

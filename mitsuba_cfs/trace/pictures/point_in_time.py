@@ -41,6 +41,9 @@ from mitsuba_cfs.trace.paths.point_in_time import add_paths, leave, window_parts
 from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
 from mitsuba_cfs.trace.paths.sun import Vertex, on_disc, surface_sun
 
+BLOCK = 2**19  # paths traced at a time
+WINDOW_STEPS = (1,)  # [tiles] of the smoothing where windows scatter
+
 
 def _sharp_light(
     room: LitRoom,
@@ -80,10 +83,6 @@ def _sharp_light(
         )  # fmt: skip
         sharp += seen
     return sharp
-
-
-BLOCK = 2**19  # paths traced at a time
-WINDOW_STEPS = (1,)  # [tiles] of the smoothing where windows scatter
 
 
 def point_in_time_picture(

@@ -43,6 +43,10 @@ from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SunWay, sun_ways
 
 BOUNCES = 5  # surfaces that a path meets at most
 ROULETTE = 0.5  # share of light below which paths are thinned out
+STEP = float(np.radians(4.0))  # between nodes, about the zenith
+CHECKED = 8  # of places whose nodes agree, one in so many has a ray to the sun itself
+MIRRORED = 32  # the same of the sun in a mirror, which few places have
+KEY = 2**32  # of a node's number along one axis, to hold both
 
 
 @dataclass(frozen=True)
@@ -240,12 +244,6 @@ def _shone(
     cosine = dr.select(middle > SUN_RADIUS, middle, slant)
     share = way.reaching(mi.Ray3f(point, to_sun), slant > 0)
     return dr.select(cosine > 0, cosine * share, 0.0)
-
-
-STEP = float(np.radians(4.0))  # between nodes, about the zenith
-CHECKED = 8  # of places whose nodes agree, one in so many has a ray to the sun itself
-MIRRORED = 32  # the same of the sun in a mirror, which few places have
-KEY = 2**32  # of a node's number along one axis, to hold both
 
 
 @dataclass(frozen=True)

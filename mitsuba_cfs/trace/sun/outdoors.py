@@ -33,6 +33,7 @@ from mitsuba_cfs.trace.sun.picture_sun import LANES
 from mitsuba_cfs.trace.sun.pixels import edge_pixels
 
 MOST_MIRRORS = 4  # specular reflections of a pixel's ray
+GATHERED = 16  # points at most that reflect the sun to a tile
 
 
 @dataclass(frozen=True)
@@ -150,9 +151,6 @@ class RoughSun:
             found = self._faces.lobes(self._outside, suns[hours]) * self._weight[:, None]
             for hour, light in zip(hours, found.T, strict=True):
                 np.add.at(values[hour], self._faces.pixel, light * illuminance[hour])
-
-
-GATHERED = 16  # points at most that reflect the sun to a tile
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ SUBPIXEL = np.radians(0.025)  # between rays to the sun's disc, which so gets 36
 RAYS = 1 << 20  # tried at a time
 PARTS = 512  # of the disc, for its visible share: an edge across it is found to 1 %
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))  # [rad]
+EDGE_PLACES = 32  # rays of a pixel at an edge: 8 may show a quarter for a strip of sun of 2 %
 
 
 def disc_parts(sun: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -74,9 +75,6 @@ def disc_rays(
         owners.append(pixel + start)
         ways.append(directions[pixel, place])
     return np.concatenate(owners), np.concatenate(ways), 1 / count**2
-
-
-EDGE_PLACES = 32  # rays of a pixel at an edge: 8 may show a quarter for a strip of sun of 2 %
 
 
 def edge_pixels(
