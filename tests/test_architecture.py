@@ -50,7 +50,7 @@ LIMITED = {
     "ifcopenshell": IFC,
     "matplotlib": PLOTTING,
 }
-LONGEST_MODULE = 400
+LONGEST_MODULE = 600  # advice: a concept that needs more says why
 CATCH_ALL_NAMES = {"utils.py", "util.py", "common.py", "helpers.py", "misc.py"}
 
 
@@ -103,7 +103,7 @@ def test_module_keeps_to_the_rules(path: Path) -> None:
         ("scenes/x.py", "from tests import validation"),
         ("scenes/room/x.py", "def f():\n    from tests.benchmarks import harness"),
         ("bim/utils.py", ""),
-        ("bim/x.py", "x = 1\n" * 401),
+        ("bim/x.py", "x = 1\n" * 601),
         ("bim/x.py", "def f():\n    print(1)\n"),
     ],
 )

@@ -36,7 +36,8 @@ from scenes.comply.needs import Equinox, SunlightExposure
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from tests.benchmarks import radiance
 from tests.validation.rendered_scene import RenderedScene

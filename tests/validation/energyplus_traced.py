@@ -32,7 +32,8 @@ from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.study_file import StudyFile, read_study
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import RoomZone, balances
 from tests.validation.energyplus_cases import (

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.sky.weather import Weather
-from scenes.room.load_tables import PlantTable
+from scenes.room.operation_tables import PlantTable
 from scenes.room.zone import RoomZone
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity

@@ -1,4 +1,4 @@
-"""Where the sun is in a weather's intervals, computed once and kept on disk."""
+"""The skies of a year and the cached directions of the sun."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 
@@ -24,3 +26,22 @@ def kept_sun(weather: Weather, model: str, cache: MatrixCache | None) -> NDArray
         by=sun_directions.__module__,
     )  # fmt: skip
     return kept_or_found(entry, lambda: sun_directions(weather, model=model))
+
+
+def skies_for(
+    weather: Weather,
+    method: str,
+    sampling: Sampling,
+    cache: MatrixCache | None = None,
+    /,
+    **choices: str,
+) -> AnnualSky:
+    """The year's skies as a method needs them; the same for every room.
+
+    Args: cache: where the sun's directions are found and kept; choices: `RoomOptions.sky`.
+    """
+    with_sun = method != "three-phase"
+    towards = kept_sun(weather, choices.get("sun_model", "spa"), cache)
+    return annual_sky(
+        weather, sampling.subdivision, sun=with_sun, solar=True, towards=towards, **choices
+    )
