@@ -13,6 +13,7 @@ from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
 from scenes.commands.room_options import (
     building_options,
+    chosen_language,
     directions_option,
     eye_height_option,
     grid_option,
@@ -90,7 +91,7 @@ def command(
     from scenes.page_options import DossierSection, read_page
     from scenes.result_folder import ResultFolder
 
-    page_options = read_page(page, DossierSection)
+    page_options = read_page(page, DossierSection, chosen_language())
     inputs = (building, weather, system, own["closed"], own["uses"])
     inputs += (*surroundings, *page_options.inputs)
     folder = ResultFolder(out, "comply", inputs=inputs)

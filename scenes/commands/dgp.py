@@ -11,6 +11,7 @@ from scenes.commands.parameters import BUILDING_FILE
 from scenes.commands.quick_option import given, quick_option
 from scenes.commands.room_options import (
     aperture_option,
+    chosen_language,
     directions_option,
     eye_height_option,
     furniture_option,
@@ -20,6 +21,7 @@ from scenes.commands.room_options import (
     join_option,
     method_option,
     out_folder_option,
+    page_option,
     room_files,
     samples_option,
     seed_option,
@@ -80,9 +82,15 @@ _DEFAULT = YearOptions(Path(), Path())
 @sun_option
 @sky_ground_option
 @seed_option
+@page_option
 @quick_option
 def command(
-    building: Path | None, weather: Path | None, system: Path | None, out: Path, **chosen
+    building: Path | None,
+    weather: Path | None,
+    system: Path | None,
+    out: Path,
+    page: Path | None,
+    **chosen,
 ) -> None:
     """Daylight glare probability of a room's views in every hour with the sun up.
 
@@ -98,18 +106,22 @@ def command(
     start, end = chosen["occupied"]
     if start == end or start == 24:
         raise click.UsageError(f"--occupied {start} {end}: expected two different hours, 0 to 24")
+    from scenes.page_options import GlareSection, read_page
     from scenes.result_folder import ResultFolder
     from scenes.year_of_glare.files import read_files
 
     if chosen["quick"]:
         chosen |= quick.picks(quick.VIEWS, given())
+    page_options = read_page(page, GlareSection, chosen_language())
     files = (building, weather, system, *map(Path, chosen["views"]), *chosen["surroundings"])
+    files += page_options.inputs
     options = YearOptions(*room_files(building, weather, system), **chosen)
     folder = ResultFolder(out, "dgp", inputs=files)
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.language.catalogue import ngettext
-    from scenes.year_of_glare import outputs, page
+    from scenes.year_of_glare import outputs
+    from scenes.year_of_glare.page import write_page
     from scenes.year_of_glare.year import rate_views, read_year
 
     if options.quick:
@@ -120,7 +132,7 @@ def command(
         with folder.replaced() as place:
             rows = [outputs.write_view(year, rated, place) for rated in views]
             table = outputs.write_summary(year, rows, place)
-            page.write_page(year, table, place / "report.html")
+            write_page(year, table, place / "report.html", page_options)
     worst = table.loc[table["highest_dgp"].idxmax()]
     views = ngettext("{count} view", "{count} views", len(table))
     hours = ngettext("{count} hour", "{count} hours", len(year.sky.lit))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
-from bim.report.issue import issue_text
+from bim.report.issue import issue_note
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -119,7 +119,7 @@ def run_study(
         )  # fmt: skip
         if space.windows:
             leaks = leak_issues(space, visible_scene(room), seed=options.sampling.seed, cache=cache)
-            notes |= dict.fromkeys(issue_text(one, "command").line for one in leaks)
+            notes |= dict.fromkeys(map(issue_note, leaks))
         zone, radiant = operated_zone(room, progress=steps), None
         if trace.view_factors:
             radiant = radiant_room(

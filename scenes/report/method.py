@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.language.catalogue import N_, gettext
+from scenes.language.catalogue import N_, gettext, translated
 from scenes.language.numbers import rounded, share
 from scenes.results import RunResult
 
@@ -180,7 +180,7 @@ def _sources(result: RunResult) -> str:
     """Where each system comes from; empty where that is not known."""
     tables = [values for room in result.spaces for values in room.heat.fenestration]
     sources = {
-        gettext("{system}: from {source}.", system=t["system"], source=t["source"])
+        gettext("{system}: from {source}.", system=t["system"], source=translated(t["source"]))
         for t in tables
         if t.get("source")
     }
@@ -196,7 +196,7 @@ def _glare(result: RunResult) -> str:
     text = gettext(PICTURES[result.method])
     rule = next((room.glare.rule for room in result.spaces if room.glare.rule), "")
     if rule:
-        text += " " + gettext("Glare sources: {rule}.", rule=rule)
+        text += " " + gettext("Glare sources: {rule}.", rule=translated(rule))
     if any(room.annual_glare is not None for room in result.spaces):
         text += " " + gettext(
             "All hours with the sun up are rated in the same way; EN 17037 requires that DGP "

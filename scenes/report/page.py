@@ -13,8 +13,7 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
-from scenes.language.catalogue import N_, gettext, in_language, ngettext
-from scenes.language.heard import heard, heard_list
+from scenes.language.catalogue import N_, gettext, in_language, ngettext, translated
 from scenes.language.numbers import cell, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
@@ -175,13 +174,12 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
     rows.append((gettext("Rooms"), rooms))
     account = building.account
     read = () if account is None else account.facts
-    return (*rows, *((gettext(title), prose(heard_list(text, ", "))) for title, text in read))
+    return (*rows, *((translated(title), prose(translated(text))) for title, text in read))
 
 
-def notes(result: RunResult) -> tuple[tuple[str, bool], ...]:
-    """What is to be known first, and whether it is there in English alone."""
-    found = [(note, gettext(note) if note == NOTE else heard(note)) for note in result.notes]
-    return tuple((text, text == note) for note, text in found)
+def notes(result: RunResult) -> tuple[str, ...]:
+    """Assumptions and limits of the run, in the page's language."""
+    return tuple(gettext(NOTE) if note == NOTE else translated(note) for note in result.notes)
 
 
 def comparison(result: RunResult, rooms) -> tables.Table | None:
@@ -272,6 +270,14 @@ STAGES = {  # whose seconds are noted
     "colour": N_("colour picture"),
     "explorer": N_("explorer"),
     "thermal": N_("heat balance"),
+    "leaks": N_("check for leaks"),
+    "reading": N_("reading of files"),
+    "view and sunlight": N_("view out and sunlight"),
+    "V and D": N_("matrices V and D"),
+    "light and blinds of every hour": N_("light and blinds of every hour"),
+    "glare by pictures": N_("glare by pictures"),
+    "temperatures": N_("temperatures"),
+    "what else light takes": N_("other steps of the light"),
 }
 
 

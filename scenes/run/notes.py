@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from bim.account import NOT_USABLE
 from bim.model import Building
-from bim.report.issue import Issue, issue_text
+from bim.report.issue import issue_note
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 
 TREES = "trees-by-month"
@@ -18,29 +19,32 @@ def model_notes(building: Building) -> tuple[str, ...]:
         issue for issue in building.issues
         if issue.severity == "unused" or issue.code in AT_THE_HEAD
     )  # fmt: skip
-    return (*_account_notes(building), *map(_note, issues))
+    return (*_account_notes(building), *map(issue_note, issues))
 
 
 def unused_notes(building: Building) -> tuple[str, ...]:
     """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
     found = [*tree_notes(building)]
-    found += [_note(issue) for issue in building.issues if issue.severity == "unused"]
-    held = {
-        "uses of rooms": building.uses, "sensor grids": building.grids, "views": building.views,
-    }  # fmt: skip
-    counts = [f"{len(some)} {what}" for what, some in held.items() if some]
-    if counts and building.file is not None:
-        found.append(f"{building.file.name} holds {', '.join(counts)}: not used here.")
+    found += [issue_note(issue) for issue in building.issues if issue.severity == "unused"]
+    parts = (building.uses, building.grids, building.views)
+    if any(parts) and building.file is not None:
+        found.append(
+            Note(
+                "{file} contains {uses} uses of rooms, {grids} sensor grids and {views} views; "
+                "they "
+                "are not used here.",
+                file=building.file.name,
+                uses=len(building.uses),
+                grids=len(building.grids),
+                views=len(building.views),
+            )
+        )
     return tuple(found)
 
 
 def tree_notes(building: Building) -> tuple[str, ...]:
     """How much light the trees outdoors let pass."""
-    return tuple(_note(issue) for issue in building.issues if issue.code == TREES)
-
-
-def _note(issue: Issue) -> str:
-    return f"{issue_text(issue, 'command').line}."
+    return tuple(issue_note(issue) for issue in building.issues if issue.code == TREES)
 
 
 def _account_notes(building: Building) -> tuple[str, ...]:
@@ -57,8 +61,14 @@ def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
     east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
     if max(abs(north), abs(east)) <= FAR_SITE_DEG:
         return ()
-    return (
-        f"The building's site ({building.latitude_deg:.1f} N, {building.longitude_deg:.1f} E) is "
-        f"far from the weather station {weather.site} ({weather.latitude_deg:.1f} N, "
-        f"{weather.longitude_deg:.1f} E): the sun is the weather station's.",
+    note = Note(
+        "The site of the building ({north:.1f} N, {east:.1f} E) is far from the weather station "
+        "{station} ({station_north:.1f} N, {station_east:.1f} E); the solar positions are those of "
+        "the weather station.",
+        north=building.latitude_deg,
+        east=building.longitude_deg,
+        station=weather.site,
+        station_north=weather.latitude_deg,
+        station_east=weather.longitude_deg,
     )
+    return (note,)

@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from bim.model import Building, Space
-from bim.report.issue import Issue, issue_text
+from bim.report.issue import Issue, issue_note
 from bim.sensors import held_grids
 from bim.templates import same_hues
 from bim.to_thermal import same_surfaces
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import sun_directions
@@ -26,6 +27,7 @@ from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
 from scenes.fenestration.resolver import source_notes
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import thermal_system
+from scenes.language.catalogue import N_
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.heat import DaylitRoom, coupled_years
@@ -133,7 +135,7 @@ def run_inputs(
         *_state_notes(inputs, options),
         *notes,
         *(result.borrowed for result in results if result.borrowed),
-        *(f"{issue_text(hole, 'command').line}." for hole in holes),
+        *map(issue_note, holes),
         *weather.notes,
         *site_notes(building, weather),
     ]
@@ -177,7 +179,7 @@ def _rooms(
     light = RoomWork(lit_room, inputs, spaces, skies, options)
     together = _series(light, workers, compute_light, moved_light, store, same_surfaces)
     heard = on_light or (lambda room: None)
-    together = replace(together, on_room=heard, shared="daylight, glare and sun are")
+    together = replace(together, on_room=heard, shared=N_("daylight, glare and solar gains"))
     lit, issues, notes = together.results(progress)
     years, said = _coupled(lit, inputs, options, progress, store)
     found = _passed(years, store)
@@ -296,13 +298,20 @@ def _state_notes(inputs: JobInputs, options: JobOptions) -> tuple[str, ...]:
     """A sentence where windows have more states than are used."""
     if inputs.operation is not None and inputs.operation.systems and options.system is not None:
         file = inputs.operation.file.name
-        return (f"--cfs fills the windows: [[system]] of {file} is not used.",)
+        note = Note(
+            "--cfs sets the fenestration of the windows; [[system]] of {file} is not used.",
+            file=file,
+        )
+        return (note,)
     several = () if options.operation is not None else inputs.several
     if not several:
         return ()
     names = ", ".join(dict.fromkeys(several))
     held_by = inputs.building.name if options.building is None else options.building.name
-    return (
-        f"{held_by} holds several shading states; without --operation the first of "
-        f"each window ({names}) holds all year.",
+    note = Note(
+        "{file} has several shading states; without --operation the first state of each window "
+        "({windows}) is used all year.",
+        file=held_by,
+        windows=names,
     )
+    return (note,)

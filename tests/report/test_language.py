@@ -9,13 +9,13 @@ from html import unescape
 from itertools import pairwise
 
 import pytest
+from scenes.language.heard import heard
 
 from bim.account import Account, StoreyAccount
 from mitsuba_cfs.errors import DataError
 from scenes.language import catalogue
 from scenes.language.catalogue import TRANSLATED, in_language
-from scenes.language.heard import heard
-from scenes.page_options import DossierSection, PageOptions, RunSection, read_page
+from scenes.page_options import PageOptions, RunSection, read_page
 from scenes.report.page import report_html, summary
 from scenes.study_report.page import study_report_html
 from tests.report.browser import chromium, inspect
@@ -136,21 +136,17 @@ def test_english_is_as_it_was(result) -> None:
     assert report_html(result, PageOptions()) == report_html(result)
 
 
-@pytest.mark.parametrize(
-    ("text", "sections", "translated", "words"),
-    [
-        ("language = 'it'", RunSection, True, "language: expected 'en', 'de' or 'fr', got 'it'"),
-        ("language = 'de'", DossierSection, False, "language: de: this page is there in English"),
-    ],
-)
-def test_another_language_is_one_line(tmp_path, text, sections, translated, words) -> None:
+def test_another_language_is_one_line(tmp_path) -> None:
     path = tmp_path / "page.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text("language = 'it'", encoding="utf-8")
     with pytest.raises(DataError) as error:
-        read_page(path, sections, translated=translated)
+        read_page(path, RunSection)
+    words = "language: expected 'en', 'de' or 'fr', got 'it'"
     assert str(error.value).startswith(f"{path}: {words}")
     path.write_text("language = 'de'", encoding="utf-8")
-    assert read_page(path, RunSection, translated=True).language == "de"
+    assert read_page(path, RunSection).language == "de"
+    assert read_page(path, RunSection, "fr").language == "fr"
+    assert read_page(None, RunSection, "fr").language == "fr"
 
 
 @pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
