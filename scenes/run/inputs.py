@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 from bim.model import Building, Space
+from bim.names import AmbiguousName, UnknownName
 from bim.report.issue import Issue, issue_text
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
@@ -75,9 +76,9 @@ def named_spaces(building: Building, names: Sequence[str], path: Path) -> list[S
 def _space(building: Building, name: str, path: Path) -> Space:
     try:
         return building.space(name)
-    except (KeyError, ValueError) as error:
+    except (UnknownName, AmbiguousName) as error:
         lost = [p for p in _lost(building, "room") if p.where == name or _names(p, name)]
-        if isinstance(error, KeyError) and lost:
+        if isinstance(error, UnknownName) and lost:
             message = f"space {name!r} was left out: {_quoted(lost)}"
         else:
             message = str(error.args[0])
