@@ -30,6 +30,7 @@ class ReadOptions:
     apertures: tuple[str, ...] = ()  # materials of the surfaces that are windows
     surroundings: tuple[Path, ...] = ()  # files of what stands around, with any format
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
+    facade_panes: tuple[str, ...] = ()  # materials of panes before dark rooms: they mirror
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +58,8 @@ def read_building_file(
     options = options or ReadOptions()
     path = Path(path)
     kind = _format(path)
-    for field, value in (("join", options.join), ("apertures", options.apertures)):
-        if value and field not in kind.has:
+    for field in FLAGS:
+        if getattr(options, field) and field not in kind.has:
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
     building = kind.read(path, options, progress or (lambda stage, fraction: None))
     return surrounded(building, options.surroundings, options.surroundings_offset)
@@ -132,7 +133,7 @@ def _read_radiance(path: Path, options: ReadOptions, progress: Progress) -> Buil
     from bim.radiance.building import read_radiance_building
 
     progress("opening", 0.0)
-    return read_radiance_building(path, options.apertures)
+    return read_radiance_building(path, options.apertures, options.facade_panes)
 
 
 def _check_honeybee(path: Path) -> None:
@@ -161,9 +162,11 @@ def _read_gbxml(path: Path, options: ReadOptions, progress: Progress) -> Buildin
     return read_gbxml(path, join=options.join, furniture=options.furniture)
 
 
-FLAGS = {"join": "join", "apertures": "aperture"}
+FLAGS = {"join": "join", "apertures": "aperture", "facade_panes": "facade-pane"}
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join",))
-RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures",))
+RADIANCE = BuildingFormat(
+    "Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes")
+)
 HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
 GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
 FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)

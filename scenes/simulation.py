@@ -14,16 +14,16 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes import plots
 from scenes import quick as quick_run
-from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import checked_system
+from scenes.input_files import InputFiles, overrides_of
+from scenes.inputs import inputs_of
 from scenes.report import write_report
 from scenes.report.headline import cards
 from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions
-from scenes.run.files import JobFiles
-from scenes.run.job import job_inputs
 from scenes.run.netcdf import year_dataset
 from scenes.run.options import JobOptions
 from scenes.run.outputs import write_results
@@ -58,6 +58,12 @@ class SimulatedYear(RoomYear):
         Raises: `DataError` where xarray is not installed.
         """
         return year_dataset(self._whole_run())
+
+    @property
+    def head(self) -> tuple[str, ...]:
+        """What was left out of the model, what was assumed, and how much it matters."""
+        record = self.run.manifest["head"]
+        return (*record["model"], *record["left_out"], *record["assumed"])
 
     def plot_illuminance(self, axes: Axes | None = None) -> Axes:
         """The work plane's mean illuminance by day and hour."""
@@ -132,11 +138,9 @@ def simulate(
         quick=quick,
         room=RoomOptions.of(**options),
     )
-    states = () if operation is None else operation.systems
-    states = states if system is None else (system,)
-    files = JobFiles(weather, system, operation, Given(states))
-    inputs = job_inputs(building, chosen.spaces, files)
-    run = run_inputs(inputs, chosen, progress)
+    overrides = overrides_of(chosen, system, operation)
+    files = InputFiles(weather, overrides, operation)
+    run = run_inputs(inputs_of(building, chosen, files), chosen, progress)
     (year,) = run.spaces
     own = {name: getattr(year, name) for name in RoomYear.__dataclass_fields__}
     return SimulatedYear(**own, run=replace(run, spaces=()))

@@ -198,9 +198,9 @@ def export(
             check_file(path, field=field, inputs=[building])
     folders = result_folders({"--radiance": radiance, "--mitsuba": mitsuba})
     from bim.ifc.building import read_ifc
+    from scenes.chosen_rooms import named_spaces
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration_exports import known_fenestration
-    from scenes.run.inputs import named_spaces
 
     with ProgressBar() as progress:
         read = read_ifc(building, join=join, furniture=furniture, progress=progress)

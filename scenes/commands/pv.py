@@ -37,7 +37,7 @@ def command(
     study_file: Path,
     out: Path,
     seed: int,
-    no_cache: bool,
+    cache: bool,
     quick: bool,
 ) -> None:
     """Irradiance and yield of the photovoltaic modules of a building.
@@ -59,12 +59,12 @@ def command(
     from scenes.photovoltaics.study import run_pv
 
     variants.activate()
-    cache = None if no_cache else MatrixCache.of_user()
     if quick:
         click.echo(quick_run.NOTE)
     with ProgressBar() as progress:
         result = run_pv(
-            building, climate, study, file=study_file, seed=seed, progress=progress, cache=cache,
+            building, climate, study, file=study_file, seed=seed, progress=progress,
+            cache=MatrixCache.of_user() if cache else None,
             **(quick_run.PV if quick else {}),
         )  # fmt: skip
         progress("results", 0.0)

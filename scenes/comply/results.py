@@ -17,6 +17,7 @@ from scenes.comply.rules import RuleTable
 from scenes.comply.sunlight import SunDay, SunExposure
 from scenes.comply.uses import RoomUse
 from scenes.comply.view_out import ViewOut
+from scenes.head import Head
 
 FloatArray = NDArray[np.float64]
 
@@ -70,6 +71,7 @@ class Compliance:
     weather: Weather
     day: SunDay
     assumptions: tuple[str, ...]  # sentences
+    head: Head  # what was left out of the model, what was assumed of it
     notes: tuple[str, ...]
     problems: tuple[Problem, ...]
     seconds: dict[str, float]  # by part

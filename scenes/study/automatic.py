@@ -17,7 +17,7 @@ from scenes.calibration.errors import MeasuredErrors, measured_errors
 from scenes.calibration.shipped import this_machines_costs
 from scenes.calibration.traits import Traits, hidden_sky, sun_in_view, system_traits
 from scenes.fenestration.systems import read_system
-from scenes.run.inputs import read_weather
+from scenes.input_files import read_weather
 from scenes.study.case import AUTO, Case, with_method
 from scenes.study.one_case import case_systems
 from scenes.study.plan import StudyPlan

@@ -26,9 +26,11 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
-from scenes.fenestration.systems import Given, States, read_system
+from scenes.fenestration.systems import States, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import thermal_system
+from scenes.head import tree_notes
 from scenes.heat.box import box_building
+from scenes.input_files import read_weather
 from scenes.results import RoomYear
 from scenes.room.drawn_shades import traced_building
 from scenes.room.operation import Operation, check_states, read_operation
@@ -36,8 +38,6 @@ from scenes.room.options import RoomOptions
 from scenes.room.room import skies_for
 from scenes.room.room_year import RoomChoices, compute_room
 from scenes.room.stated_use import used_operation
-from scenes.run.inputs import read_weather
-from scenes.run.notes import tree_notes
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
 from scenes.study.straight_view import straight_view
@@ -202,7 +202,7 @@ def case_systems(case: Case, space: Space, operation: Operation | None = None) -
         given = {"u_value": case.u_value, "g_value": case.g_value}
         states = (read_system(case.bsdf.path, **given),)
     file = case.building.path if isinstance(case.building, InputFile) else None
-    return fill_windows(space.windows, Given(states, ask="a [[system]]"), file)
+    return fill_windows(space.windows, WindowOverrides(states, ask="a [[system]]"), file)
 
 
 def _rated_hours(weather: Weather, options: RoomOptions) -> NDArray[np.int64]:

@@ -9,11 +9,11 @@ from pathlib import Path
 from bim.building_file import ReadOptions, held_states, read_building_file, surrounded
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
+from scenes.chosen_rooms import chosen_spaces
 from scenes.fenestration.thermal_file import files_beside
 from scenes.heat.box import box_building
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
-from scenes.run.inputs import chosen_spaces
 from scenes.study.case import AUTO, Case, InputFile, program_version
 from scenes.study.study_file import RoomTable, Study, SystemTable
 

@@ -52,8 +52,8 @@ def _compliance(options, *_others):
     from scenes.comply.findings import calendar_of
     from scenes.comply.results import Compliance
     from scenes.comply.sunlight import sun_day
-    from scenes.run.building import read_building
-    from scenes.run.inputs import read_weather
+    from scenes.input_files import read_weather
+    from scenes.inputs import read_building
 
     weather, building = read_weather(options.weather), read_building(options.building)
     rooms = tuple(_checked(space) for space in building.spaces)

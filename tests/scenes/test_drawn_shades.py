@@ -7,11 +7,10 @@ import pytest
 
 from bim.ifc.building import read_ifc
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
+from scenes.inputs import read_inputs
 from scenes.room.drawn_shades import holds_shade
-from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
 from tests.bim.small_ifc import OPENING, WALL, WIDTH, SmallIfc, box_room
 
@@ -68,7 +67,7 @@ def inputs(model, folder, toml: str):
     system = folder / "system.xml"
     system.write_bytes(VENETIAN_BLIND.read_bytes())
     system.with_suffix(".toml").write_text(toml)
-    return read_inputs(JobOptions(model, WEATHER, system=system), silent).building
+    return read_inputs(JobOptions(model, WEATHER, system=system)).building
 
 
 def test_the_blind_of_the_bsdf_is_left_out_and_named_with_its_area(model, tmp_path, caplog):

@@ -18,10 +18,10 @@ from bim.seasons import seasons
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import WEATHER
+from scenes.head import model_notes, unused_notes
 from scenes.room.room import RoomSimulation, skies_for
 from scenes.room.room_year import lit_room
 from scenes.room.windows import in_all_windows
-from scenes.run.notes import model_notes, unused_notes
 from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, HOURS, SMALL
 

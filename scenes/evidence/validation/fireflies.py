@@ -34,10 +34,10 @@ import mitsuba_cfs as cfs
 from bim.sensors import view_point
 from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.glare.annual import full_picture
+from scenes.chosen_rooms import chosen_spaces
 from scenes.cost import room as box
 from scenes.evidence.validation import geneva_scene as geneva
-from scenes.run.building import read_building
-from scenes.run.inputs import chosen_spaces
+from scenes.inputs import read_building
 
 LIMIT = 1.5  # times the brightest of the neighbourhood
 FINER = 2  # times as many pixels across in the pictures by paths
