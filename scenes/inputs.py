@@ -24,11 +24,10 @@ from scenes.fenestration.thermal_file import files_beside
 from scenes.head import Head, head_of
 from scenes.input_files import InputFiles, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
-from scenes.room.drawn_shades import traced_building
 from scenes.room.inner_glass import lending_rooms, opened
-from scenes.room.operation import Operation, check_states
+from scenes.room.operation import Operation, check_states, stated_note, used_operation
 from scenes.room.operation_hours import check_schedules
-from scenes.room.stated_use import stated_note, used_operation
+from scenes.room.windows import traced_building
 
 Systems = Mapping[str, States]  # by window GUID
 ChooseStates = Callable[[Systems], Systems]

@@ -12,8 +12,8 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene
 from scenes.inputs import Inputs
-from scenes.room.colour import band_scenes
-from scenes.room.holes import hole_notes
+from scenes.room.glare import band_scenes
+from scenes.room.leaks import hole_notes
 from scenes.room.windows import room_windows
 
 

@@ -10,7 +10,8 @@ DOCS = REPOSITORY / "docs"
 SAID = ("- Judge:", "- Shared:", "- Cannot show:")
 # Heads of tables that claim nothing: what there is, what is asked for, what is written
 NO_EVIDENCE = {
-    "bim.md": "all", "formats.md": "all", "glossary.md": "all", "quickstart.md": "all",
+    "architecture.md": "all", "bim.md": "all", "formats.md": "all", "glossary.md": "all",
+    "quickstart.md": "all",
     "validation.md": {"| subject | judged by | page |"},
     "daylight.md": {"| function | gives |"},
     "glare.md": {
@@ -20,7 +21,7 @@ NO_EVIDENCE = {
     "thermal.md": {"| closure | absorptances from | layer resistance | films of the layers |"},
     "comply.md": {"| in the folder of results | what |", "| option | what |"},
     "studies.md": {"| in the folder | what |"},
-    "pv.md": {"| key | what |"},
+    "pv.md": {"| key | meaning |"},
 }  # fmt: skip
 ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
 

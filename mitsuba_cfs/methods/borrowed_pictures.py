@@ -10,8 +10,8 @@ from scipy import sparse
 
 from mitsuba_cfs.glare.annual import PictureMatrix, Pictures, add_seen
 from mitsuba_cfs.glare.sun_disc import SunDisc
-from mitsuba_cfs.trace.borrowed_picture import RoomShown
-from mitsuba_cfs.trace.borrowed_view import RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent_view import RoomBehind
+from mitsuba_cfs.trace.pictures.adjacent import RoomShown
 
 
 class BorrowedPictures:

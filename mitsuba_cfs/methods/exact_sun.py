@@ -11,10 +11,10 @@ from mitsuba_cfs.methods.optics import States, in_state
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.scene import kept_scene
-from mitsuba_cfs.trace.sun_ways import shining
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
+from mitsuba_cfs.trace.sun.specular_paths import shining
 
 SUN_BATCHES = 4  # of C_ds
 

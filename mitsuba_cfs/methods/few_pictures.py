@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from mitsuba_cfs.glare.annual import Pictures
 from mitsuba_cfs.methods.optics import combinations
 from mitsuba_cfs.methods.phase_light import PhaseLight
-from mitsuba_cfs.trace.annual_pictures import FivePhasePictures
-from mitsuba_cfs.trace.patch_light import PatchLight
+from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.pictures.annual import FivePhasePictures
 
 
 def pictures_by_state(

@@ -13,7 +13,7 @@ from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.trace.direct_sun import patch_beams, through_beams
+from mitsuba_cfs.trace.kernels.scattering import patch_beams, through_beams
 
 
 @dataclass(frozen=True, slots=True)

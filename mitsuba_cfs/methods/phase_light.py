@@ -23,11 +23,11 @@ from mitsuba_cfs.methods.window_reflection import WindowReflection
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.annual_pictures import FivePhasePictures
-from mitsuba_cfs.trace.estimate import Estimate
-from mitsuba_cfs.trace.picture_beam import BeamLight, beam_light
-from mitsuba_cfs.trace.picture_outdoors import OutdoorCoefficients, outdoors
-from mitsuba_cfs.trace.picture_sun import PictureSun
+from mitsuba_cfs.trace.kernels.estimate import Estimate
+from mitsuba_cfs.trace.pictures.annual import FivePhasePictures
+from mitsuba_cfs.trace.pictures.outdoors import OutdoorCoefficients, outdoors
+from mitsuba_cfs.trace.sun.picture_beam import BeamLight, beam_light
+from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
 State = NDArray[np.int64]  # [G, L] state of each window group in each hour, or [L] of all groups
 

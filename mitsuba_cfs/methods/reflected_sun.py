@@ -8,8 +8,9 @@ place, and of a window's paths few meet the patch of the sun after a reflection.
     (V - V_d) diag(tau) D_d s_d    the sun's beam that the room reflects
 
 five phases take the same light from places that stand for the surfaces
-(`mitsuba_cfs.trace.reflected_sun`) and from cells of the room (`mitsuba_cfs.trace.room_beam`).  All
-of it is found in independent batches, of which its standard error is.
+(`mitsuba_cfs.trace.sun.reflected`) and from cells of the room
+(`mitsuba_cfs.trace.sun.room_beam`).  All of it is found in independent batches, of which its
+standard error is.
 """
 
 from __future__ import annotations
@@ -26,21 +27,21 @@ from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.reflected_sun import (
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
+from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.sun.reflected import (
     SunShares,
     outdoor_light,
     view_shares,
     window_shares,
 )
-from mitsuba_cfs.trace.room_beam import (
+from mitsuba_cfs.trace.sun.room_beam import (
     ReflectingCells,
     RoomCells,
     room_cells,
     room_light,
     room_shares,
 )
-from mitsuba_cfs.trace.scene import TracedScene, kept_scene
 
 BATCHES = 4  # each with its own paths, places and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces

@@ -12,9 +12,9 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.klems_peak import held_beams
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_scene import OUTDOOR_DEPTH, PhaseScene
-from mitsuba_cfs.trace.direct_sun import patch_beams
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.straight_view import straight_view_matrix
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.scattering import patch_beams
+from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
 BATCHES = 4
 HELD = 0.98  # share of a beam that T's diagonal has at the least

@@ -40,10 +40,10 @@ from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.systems import States
 from scenes.head import Head, unused_notes
 from scenes.inputs import building_of, first_states, inputs_of
-from scenes.room.equal_rooms import corner
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation, skies_for
-from scenes.run.rooms import RoomSeries
+from scenes.room.room import RoomSimulation
+from scenes.room.series import RoomSeries, corner
+from scenes.room.skies import skies_for
 
 # the parts of a room's light, as the dossier's last line names their seconds
 PARTS = TRACING, SUMS, GLARE, HEAT = (

@@ -21,16 +21,17 @@ from scenes.fenestration.systems import States
 from scenes.head import Head
 from scenes.heat.box import box_building
 from scenes.heat.design_days import design_loads
+from scenes.heat.energy import energy_by_month, energy_summary, room_powers
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.inputs import Inputs, building_of, every_state, inputs_of
-from scenes.room.energy import energy_by_month, energy_summary, room_powers
-from scenes.room.humidity import felt_by, room_humidity
+from scenes.room.heat import felt_by, room_humidity
+from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
-from scenes.room.room import RoomSimulation, skies_for
-from scenes.room.stated_use import stated_note, with_stated_uses
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
 from scenes.room.zone import RoomZone, balances, coupled
 from thermal.balance import ZoneResult
 from thermal.moisture import Humidity

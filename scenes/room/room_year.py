@@ -1,7 +1,7 @@
 """The year of one room from Python objects; no file is read or written.
 
 weather = read_weather(Path("city.epw"))
-system = read_system(Path("blind.xml"))                 # scenes.run.inputs
+system = read_system(Path("blind.xml"))                 # scenes.input_files
 building = read_ifc("house.ifc")                        # or bim.shoebox.shoebox(...)
 space = building.spaces[0]
 result = compute_room(building, space, in_all_windows(space, system), weather, RoomOptions())
@@ -28,7 +28,7 @@ from scenes.fenestration.systems import States
 from scenes.results import GlareResults, RoomYear
 from scenes.room.daylight import HeldSensors
 from scenes.room.glare import rating_of
-from scenes.room.heated import DaylitRoom, heat_alone
+from scenes.room.heat import DaylitRoom, heat_alone
 from scenes.room.inner_glass import borrowed_share
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions

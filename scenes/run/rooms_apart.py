@@ -19,7 +19,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.source_code import code_version
 from scenes.input_files import sha256
 from scenes.inputs import Inputs, read_inputs
-from scenes.room.room import skies_for
+from scenes.room.skies import skies_for
 from scenes.run.options import JobOptions
 from scenes.workers import Tasks
 

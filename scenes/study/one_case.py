@@ -32,12 +32,11 @@ from scenes.head import tree_notes
 from scenes.heat.box import box_building
 from scenes.input_files import read_weather
 from scenes.results import RoomYear
-from scenes.room.drawn_shades import traced_building
-from scenes.room.operation import Operation, check_states, read_operation
+from scenes.room.operation import Operation, check_states, read_operation, used_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room import skies_for
 from scenes.room.room_year import RoomChoices, compute_room
-from scenes.room.stated_use import used_operation
+from scenes.room.skies import skies_for
+from scenes.room.windows import traced_building
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.store import CaseResult
 from scenes.study.straight_view import straight_view

@@ -19,8 +19,9 @@ from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import WEATHER
 from scenes.head import model_notes, unused_notes
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
 from scenes.room.room_year import lit_room
+from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, HOURS, SMALL
