@@ -7,7 +7,7 @@ that is no IFC lies in its `Window.states`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from bim.fenestration import ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
 from bim.model import Building, Window
+from bim.standing import Standing, selected
 from mitsuba_cfs.errors import DataError
 
 Progress = Callable[[str, float], None]
@@ -63,6 +64,57 @@ def read_building_file(
             raise DataError(f"not for {kind.name} files", file=path, field=f"--{FLAGS[field]}")
     building = kind.read(path, options, progress or (lambda stage, fraction: None))
     return surrounded(building, options.surroundings, options.surroundings_offset)
+
+
+def read_standing_file(
+    path: Path,
+    select: Sequence[str],
+    *,
+    options: ReadOptions | None = None,
+    leave_out: Sequence[str] = (),
+    reflectance: float | None = None,
+    selected_in: str | Path = "",
+    progress: Progress | None = None,
+) -> Standing:
+    """All elements of a file of any format, and those that selectors choose.
+
+    Args:
+        select: selectors, in an IFC file those of ifcopenshell, else those of `selected`.
+        options: of the reader; leave_out: selectors of elements that are not there.
+        reflectance: of all opaque elements instead of the file's.
+        selected_in: the file that has the selectors, for messages.
+
+    Raises: `DataError` for a file that cannot be used, or a text that is no selector.
+    """
+    if is_ifc(path):
+        from bim.ifc.corrections import corrections_beside
+        from bim.ifc.standing import read_standing
+
+        beside = corrections_beside(path)
+        corrections = replace(
+            beside,
+            leave_out=(*beside.leave_out, *leave_out),
+            surroundings=beside.surroundings if reflectance is None else reflectance,
+        )
+        return read_standing(
+            path, select, corrections=corrections, selected_in=selected_in, progress=progress
+        )
+    options = options or ReadOptions()
+    if _format(path) is RADIANCE:
+        from bim.radiance.building import read_radiance_elements
+
+        elements, problems = read_radiance_elements(path, options.facade_panes)
+        name = path.stem
+    else:
+        building = read_building_file(path, options, progress)
+        elements, problems, name = building.elements, building.problems, building.name
+    gone = frozenset().union(*(selected(elements, one, selected_in) for one in leave_out))
+    elements = tuple(element for element in elements if element.guid not in gone)
+    chosen = tuple(selected(elements, one, selected_in) for one in select)
+    if reflectance is not None:
+        both = {"reflectance_visible": reflectance, "reflectance_solar": reflectance}
+        elements = tuple(replace(element, **both) for element in elements)
+    return Standing(elements, chosen, tuple(problems), name)
 
 
 def surrounded(

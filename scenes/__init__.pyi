@@ -1,6 +1,6 @@
 """The names of `import scenes`, and the modules that they come from."""
 
-from .inputs import read_building as read_building
+from .input_files import read_building as read_building
 from .fenestration.systems import (
     FenestrationSystem as FenestrationSystem,
     read_system as read_system,

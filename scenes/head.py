@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bim.account import NOT_USABLE
-from bim.model import JOINED, NOT_USED, TREES, Building, Space
+from bim.model import JOINED, NOT_USED, TREES, Building, Problem, Space
 from bim.ranking import ranked
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.sky.weather import Weather
@@ -57,6 +57,15 @@ class Head:
 NO_HEAD = Head(())
 
 
+def joined(heads: Iterable[Head]) -> Head:
+    """One head of several results, each line once."""
+    heads = list(heads)
+    parts = ("model", "left_out", "assumed")
+    return Head(
+        *(tuple(dict.fromkeys(x for head in heads for x in getattr(head, name))) for name in parts)
+    )
+
+
 def head_of(
     building: Building,
     spaces: Sequence[Space] = (),
@@ -82,7 +91,7 @@ def head_of(
         *system_notes(used, light_only=light_only),
         *([] if weather is None else [*weather.notes, *site_notes(building, weather)]),
     ]
-    return Head(model_lines(building), losses(building), tuple(dict.fromkeys(assumed)))
+    return Head(model_lines(building), losses(building.problems), tuple(dict.fromkeys(assumed)))
 
 
 def model_lines(building: Building) -> tuple[str, ...]:
@@ -96,9 +105,9 @@ def model_lines(building: Building) -> tuple[str, ...]:
     )
 
 
-def losses(building: Building) -> tuple[str, ...]:
+def losses(problems: Iterable[Problem]) -> tuple[str, ...]:
     """The parts of the model that no result has, those with the largest glass area first."""
-    lost = ranked([problem for problem in building.problems if problem.lost or problem.glass])
+    lost = ranked([problem for problem in problems if problem.lost or problem.glass])
     texts = [_text(one.what, one.first.consequence, one.glass) for one in lost[:SHOWN]]
     if len(lost) > SHOWN:
         more = sum(one.count for one in lost[SHOWN:])

@@ -1,4 +1,4 @@
-"""The small files of a command, read and checked before its building is.
+"""The files of a command: the small ones are read and checked before its building is.
 
 No tracer and no IFC reader is loaded for that: a mistake is reported within a second or two.
 """
@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
-from bim.building_file import check_building_file
+from bim.building_file import STAGES, ReadOptions, check_building_file, read_building_file
+from bim.model import Building
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.progress import Progress, silent, summed
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
@@ -107,6 +109,43 @@ def overrides_of(
     states = () if operation is None else operation.systems
     states = states if system is None else (system,)
     return WindowOverrides(states, options.u_value, options.g_value, light_only=light_only)
+
+
+def read_building(
+    path: str | PathLike[str],
+    *,
+    join: Sequence[str] = (),
+    furniture: bool = False,
+    apertures: Sequence[str] = (),
+    surroundings: Sequence[str | PathLike[str]] = (),
+    surroundings_offset: tuple[float, float, float] | None = None,
+    facade_panes: Sequence[str] = (),
+    progress: Progress = silent,
+) -> Building:
+    """The building of an IFC file, with the corrections kept beside it, or of another format.
+
+    Args:
+        join: rooms to make one, as "Hall + Living".
+        furniture: whether furniture is in the light and the views of its room.
+        apertures: materials of a Radiance scene's surfaces that are windows.
+        surroundings: files of what stands around, see `bim.with_surroundings`.
+        surroundings_offset: added to their coordinates [m] in place of any georeference.
+        facade_panes: materials of a Radiance scene's panes before dark rooms; they mirror.
+
+    Raises: `DataError` for a file that cannot be used; faults of the model are the building's
+        `problems`.
+    """
+    read = ReadOptions(
+        tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
+        surroundings_offset, tuple(facade_panes),
+    )  # fmt: skip
+    return read_building_file(path, read, summed(progress, "inputs", STAGES))
+
+
+def building_of(options: InputOptions, progress: Progress = silent) -> Building:
+    """The building of a command's options; raises as `read_building`."""
+    steps = summed(progress, "inputs", STAGES)
+    return read_building_file(options.building, options.read, steps)
 
 
 def sha256(path: Path) -> str:

@@ -9,20 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from bim.building_file import STAGES, ReadOptions, read_building_file
 from bim.model import Building, Space
-from mitsuba_cfs.progress import Progress, part, silent, summed
+from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.chosen_rooms import chosen_spaces, named_spaces
 from scenes.fenestration.resolver import fill_windows, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_file import files_beside
 from scenes.head import Head, head_of
-from scenes.input_files import InputFiles, read_files
+from scenes.input_files import InputFiles, building_of, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
 from scenes.room.inner_glass import lending_rooms, opened
 from scenes.room.operation import Operation, check_states, stated_note, used_operation
@@ -81,43 +79,6 @@ class Inputs:
             files["operation"] = self.operation.file
             files |= {f"state_{i}": path for i, path in enumerate(self.operation.files)}
         return files | {f"surroundings_{i}": path for i, path in enumerate(options.surroundings)}
-
-
-def read_building(
-    path: str | PathLike[str],
-    *,
-    join: Sequence[str] = (),
-    furniture: bool = False,
-    apertures: Sequence[str] = (),
-    surroundings: Sequence[str | PathLike[str]] = (),
-    surroundings_offset: tuple[float, float, float] | None = None,
-    facade_panes: Sequence[str] = (),
-    progress: Progress = silent,
-) -> Building:
-    """The building of an IFC file, with the corrections kept beside it, or of another format.
-
-    Args:
-        join: rooms to make one, as "Hall + Living".
-        furniture: whether furniture is in the light and the views of its room.
-        apertures: materials of a Radiance scene's surfaces that are windows.
-        surroundings: files of what stands around, see `bim.with_surroundings`.
-        surroundings_offset: added to their coordinates [m] in place of any georeference.
-        facade_panes: materials of a Radiance scene's panes before dark rooms; they mirror.
-
-    Raises: `DataError` for a file that cannot be used; faults of the model are the building's
-        `problems`.
-    """
-    read = ReadOptions(
-        tuple(join), furniture, tuple(apertures), tuple(map(Path, surroundings)),
-        surroundings_offset, tuple(facade_panes),
-    )  # fmt: skip
-    return read_building_file(path, read, summed(progress, "inputs", STAGES))
-
-
-def building_of(options: InputOptions, progress: Progress = silent) -> Building:
-    """The building of a command's options; raises as `read_building`."""
-    steps = summed(progress, "inputs", STAGES)
-    return read_building_file(options.building, options.read, steps)
 
 
 def read_inputs(

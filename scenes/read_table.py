@@ -14,10 +14,21 @@ class ReadTable(TomlTable):
     furniture: bool = False  # whether furniture is in the light and the views of its room
     apertures: tuple[str, ...] = ()  # materials of a Radiance scene's windows
     facade_panes: tuple[str, ...] = ()  # materials of a Radiance scene's panes before dark rooms
-    surroundings: tuple[Path, ...] = ()  # files of buildings, terrain, trees and horizons outdoors
+
+
+class OutdoorTable(TomlTable):
+    """Files of what stands around a building."""
+
+    surroundings: tuple[Path, ...] = ()  # of buildings, terrain, trees and horizons outdoors
     surroundings_offset: tuple[float, float, float] | None = None  # of these files [m]
 
-    @property
-    def read_options(self) -> dict[str, object]:
-        """The keys as options of `InputOptions`."""
-        return {name: getattr(self, name) for name in ReadTable.model_fields}
+
+def read_options(*tables: TomlTable) -> dict[str, object]:
+    """The keys of these tables as options of `InputOptions`."""
+    names = (*ReadTable.model_fields, *OutdoorTable.model_fields)
+    return {
+        name: getattr(table, name)
+        for table in tables
+        for name in names
+        if name in type(table).model_fields
+    }

@@ -62,6 +62,22 @@ def read_radiance_building(
     return Building(path.stem, (space,), elements, found, file=path)
 
 
+def read_radiance_elements(
+    path: Path, facades: Sequence[str] = ()
+) -> tuple[tuple[Element, ...], tuple[Problem, ...]]:
+    """Every opaque surface of a Radiance scene file, by its name in the file.
+
+    Args: facades: as of `read_radiance_building`.
+    """
+    scene = read_radiance(path)
+    objects = opaque_objects(scene, facades)
+    names = numbered([thing.name for thing in objects])
+    elements = tuple(
+        _element(name, thing, thing.triangles) for name, thing in zip(names, objects, strict=True)
+    )
+    return elements, scene.problems
+
+
 def _clear(scene: RadianceScene, path: Path, facades: Sequence[str]) -> list[str]:
     kinds = ("glass", *SYSTEMS)
     dark = {id(thing) for thing in scene.of_modifiers(facades)} if facades else set()

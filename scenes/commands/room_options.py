@@ -179,7 +179,7 @@ def input_options(
     """The argument and the options of every command, named as in `InputOptions`.
 
     Args:
-        spaces: what `--space` chooses by default; several: whether it may be repeated.
+        spaces: what `--space` chooses by default, "" without rooms; several: may be repeated.
         weather: "needed", "demo" (with the demo's building where there is none) or "" (none).
         system: whether `--cfs` is one of them.
     """
@@ -192,13 +192,12 @@ def input_options(
         ),
         *weathers[weather],
         *([system_option] if system else []),
-        space_option("spaces", f"default: {spaces}", several=several),
-        join_option,
-        furniture_option,
+        *([] if not spaces else [
+            space_option("spaces", f"default: {spaces}", several=several), join_option,
+            furniture_option, surroundings_option, surroundings_offset_option,
+        ]),
         aperture_option,
         facade_pane_option,
-        surroundings_option,
-        surroundings_offset_option,
     )  # fmt: skip
 
 

@@ -39,7 +39,8 @@ from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.systems import States
 from scenes.head import Head, unused_notes
-from scenes.inputs import building_of, first_states, inputs_of
+from scenes.input_files import building_of
+from scenes.inputs import first_states, inputs_of
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomSimulation
 from scenes.room.series import RoomSeries, corner

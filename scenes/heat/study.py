@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.building_file import surrounded
 from bim.model import Building
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
@@ -19,14 +18,14 @@ from mitsuba_cfs.progress import Progress, item, silent
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import States
 from scenes.head import Head
-from scenes.heat.box import box_building
+from scenes.heat.box import building_or_box
 from scenes.heat.design_days import design_loads
 from scenes.heat.energy import energy_by_month, energy_summary, room_powers
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
-from scenes.inputs import Inputs, building_of, every_state, inputs_of
+from scenes.inputs import Inputs, every_state, inputs_of
 from scenes.room.heat import felt_by, room_humidity
 from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
@@ -239,11 +238,7 @@ def study_inputs(
 ) -> Inputs:
     """The inputs of a study: its rooms with all states of their windows."""
     files, options = files or read_files(study), study.inputs
-    if study.box is None:
-        building = building_of(options, progress)
-    else:
-        read = options.read
-        building = surrounded(box_building(study.box), read.surroundings, read.surroundings_offset)
+    building = building_or_box(study.box, options, progress)
     rooms = "all" if study.couple or study.box is not None else "glazed"
     inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state)
     inputs = replace(inputs, notes=stated_note(building, "the study"))

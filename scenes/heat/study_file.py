@@ -18,7 +18,7 @@ from scenes.fenestration.tables import StateTable
 from scenes.heat.measured_weather import MeasuredTable
 from scenes.input_options import InputOptions
 from scenes.quick import HEAT, picks
-from scenes.read_table import ReadTable
+from scenes.read_table import OutdoorTable, ReadTable, read_options
 from scenes.room.operation import schedules_there
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
@@ -119,7 +119,7 @@ class WindowStateTable(StateTable):
     windows: tuple[str, ...] = ()  # names or GUIDs
 
 
-class StudyFile(OperationTables, ReadTable):
+class StudyFile(OperationTables, ReadTable, OutdoorTable):
     """A whole study; paths are relative to the file."""
 
     weather: Path  # an EPW file, or with `measured` a CSV file
@@ -137,7 +137,7 @@ class StudyFile(OperationTables, ReadTable):
     @property
     def inputs(self) -> InputOptions:
         """The options of its building and rooms."""
-        return InputOptions(self.building, self.weather, spaces=self.spaces, **self.read_options)
+        return InputOptions(self.building, self.weather, spaces=self.spaces, **read_options(self))
 
     @property
     def options(self) -> RoomOptions:

@@ -28,8 +28,7 @@ from scenes.comply.rules import read_rule
 from scenes.comply.tables import beside_limit, shown
 from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, WEATHER
-from scenes.input_files import InputFiles, read_weather
-from scenes.inputs import read_building
+from scenes.input_files import InputFiles, read_building, read_weather
 from scenes.page_options import PageOptions
 from scenes.result_folder import ResultFolder
 

@@ -18,7 +18,7 @@ from scenes.input_files import InputFiles
 from scenes.input_options import NO_OPTIONS
 from scenes.inputs import inputs_of
 from scenes.room.operation import read_operation
-from scenes.study.one_case import CaseRoom
+from scenes.study.one_case import case_inputs
 from scenes.study.plan import plan_of
 from scenes.study.study_file import read_study
 
@@ -56,7 +56,7 @@ def test_rooms_of_a_run_stand_in_the_street(weather, street, blind, operation):
 def test_a_case_of_a_study_and_a_study_of_heat_have_the_same_air(street, operation, tmp_path):
     head = f'operation = "{operation.name}"\nmethods = ["three-phase"]\norientations_deg = [90]\n'
     (case,) = plan_of(read_study(study_file(tmp_path, head))).cases
-    held = CaseRoom.of(case).weather
+    held = case_inputs(case).weather
     np.testing.assert_allclose(held.dry_bulb_c, street.dry_bulb_c)
     table = {
         "weather": WEATHER, "system": [{"bsdf": VENETIAN_BLIND}],

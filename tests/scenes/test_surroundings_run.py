@@ -106,7 +106,7 @@ def test_study_files_name_them(tmp_path):
     assert [file.name for file in heat.surroundings] == ["wall.obj", QUARTER.name]
     grid = grid_file.read_study(study_of(tmp_path, "study"))
     plan = plan_of(grid)
-    building, _ = one_case._room(plan.cases[0])
+    building = one_case._building(plan.cases[0])
     (wall,) = (element for element in building.elements if element.guid == "wall-0")
     assert wall.triangles[..., 1] == pytest.approx(-4.0)
     assert [file.path for file in plan.cases[0].surroundings] == list(grid.surroundings)

@@ -36,7 +36,7 @@ from bim.to_tracer import exterior_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.glare.annual import full_picture
 from scenes.chosen_rooms import chosen_spaces
 from scenes.cost import room as box
-from scenes.inputs import read_building
+from scenes.input_files import read_building
 from tests.validation import geneva_scene as geneva
 
 LIMIT = 1.5  # times the brightest of the neighbourhood
