@@ -103,18 +103,18 @@ def read_standing_file(
     if _format(path) is RADIANCE:
         from bim.radiance.building import read_radiance_elements
 
-        elements, problems = read_radiance_elements(path, options.facade_panes)
+        elements, issues = read_radiance_elements(path, options.facade_panes)
         name = path.stem
     else:
         building = read_building_file(path, options, progress)
-        elements, problems, name = building.elements, building.problems, building.name
+        elements, issues, name = building.elements, building.issues, building.name
     gone = frozenset().union(*(selected(elements, one, selected_in) for one in leave_out))
     elements = tuple(element for element in elements if element.guid not in gone)
     chosen = tuple(selected(elements, one, selected_in) for one in select)
     if reflectance is not None:
         both = {"reflectance_visible": reflectance, "reflectance_solar": reflectance}
         elements = tuple(replace(element, **both) for element in elements)
-    return Standing(elements, chosen, tuple(problems), name)
+    return Standing(elements, chosen, tuple(issues), name)
 
 
 def surrounded(

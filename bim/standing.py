@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from bim.model import Element, Problem
+from bim.model import Element
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 
 # Properties of an element that a selector names, by its keys
@@ -24,7 +25,7 @@ class Standing:
 
     elements: tuple[Element, ...]
     chosen: tuple[frozenset[str], ...]  # GUIDs that each selector chose, in their order
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
     name: str
 
 

@@ -1,6 +1,6 @@
 """The head of every result: what was left out, what was assumed, and how much it matters.
 
-The terminal, `run.json` and the pages of every command show the same lines.
+The terminal, the JSON record and the pages of every command show the same lines.
 """
 
 from __future__ import annotations
@@ -9,49 +9,73 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bim.account import NOT_USABLE
-from bim.model import JOINED, NOT_USED, TREES, Building, Problem, Space
-from bim.ranking import ranked
+from bim.model import Building, Space
+from bim.report.issue import Audience, Issue, issue_text
+from bim.report.ranking import Ranked, ranked
 from mitsuba_cfs.bsdf.klems_peak import through_peak
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
 
-NOTED = (JOINED, NOT_USED, TREES)  # kinds of problems that are notes of a result
+# Labels of the issues in a head, by severity, the gravest first; "info" changes nothing
+LABELS = {
+    "loss": "left out", "warning": "warning", "unused": "not used", "assumption": "assumed",
+}  # fmt: skip
+TREES = "trees-by-month"
+NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
+SHOWN = 8  # kinds of issues of a severity that a head lists
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
-SHOWN = 8  # kinds of losses that the head lists
 LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
 
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """The first lines of a result."""
+    """What was left out of the inputs of a result, and what was assumed."""
 
-    model: tuple[str, ...]  # rooms and glass of the model that were read, and a verdict
-    left_out: tuple[str, ...] = ()  # losses of the model, the largest glass area first
-    assumed: tuple[str, ...] = ()  # sentences: of the model, the systems, the weather, the site
+    model: tuple[str, ...]  # rooms and glass that were read, and a verdict
+    issues: tuple[Issue, ...] = ()  # of the building model
+    assumed: tuple[str, ...] = ()  # sentences: of use, systems, weather and site
+    noted: tuple[str, ...] = ()  # sentences of the model for pages that list its issues apart
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The head as the terminal shows it."""
-        return (
-            *self.model,
-            *(f"left out: {text}" for text in self.left_out),
-            *(f"assumed: {text}" for text in self.assumed),
+        """The head as the terminal and the pages show it."""
+        return self.text("command")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The assumptions as sentences, for a page that has account and issues elsewhere."""
+        return (*self.noted, *self.assumed)
+
+    def text(self, audience: Audience) -> tuple[str, ...]:
+        """The lines of the head; audience: whom the fixes are for."""
+        of_model = (
+            f"{label}: {text}"
+            for severity, label in LABELS.items()
+            for text in _issue_lines(self.issues, severity, audience)
         )
+        return (*self.model, *of_model, *(f"assumed: {text}" for text in self.assumed))
 
     def with_assumptions(self, sentences: Iterable[str]) -> Head:
         """The head with further assumptions."""
         return replace(self, assumed=tuple(dict.fromkeys([*self.assumed, *sentences])))
 
     @property
-    def record(self) -> dict[str, list[str]]:
-        """The head as `run.json` has it."""
+    def record(self) -> dict[str, list]:
+        """The head as data for a JSON file: issues by kind, the largest glass area first."""
         return {
             "model": list(self.model),
-            "left_out": list(self.left_out),
+            "issues": [
+                {
+                    "code": one.first.code, "severity": one.first.severity, "count": one.count,
+                    "glass_m2": round(one.glass, 3), "where": one.first.where,
+                    "text": one.text("command").line,
+                }
+                for one in ranked(self.issues)
+            ],
             "assumed": list(self.assumed),
-        }
+        }  # fmt: skip
 
 
 NO_HEAD = Head(())
@@ -60,9 +84,12 @@ NO_HEAD = Head(())
 def joined(heads: Iterable[Head]) -> Head:
     """One head of several results, each line once."""
     heads = list(heads)
-    parts = ("model", "left_out", "assumed")
+    issues = {(one.code, one.where, str(one.values)): one for head in heads for one in head.issues}
     return Head(
-        *(tuple(dict.fromkeys(x for head in heads for x in getattr(head, name))) for name in parts)
+        _once(line for head in heads for line in head.model),
+        tuple(issues.values()),
+        _once(line for head in heads for line in head.assumed),
+        _once(line for head in heads for line in head.noted),
     )
 
 
@@ -85,13 +112,12 @@ def head_of(
     windows = [w for space in spaces for w in space.windows if w.guid in systems]
     used = {id(one): one for states in systems.values() for one in states}.values()
     assumed = [
-        *model_notes(building),
         *notes,
         *source_notes(window_sources(windows, systems)),
         *system_notes(used, light_only=light_only),
         *([] if weather is None else [*weather.notes, *site_notes(building, weather)]),
     ]
-    return Head(model_lines(building), losses(building.problems), tuple(dict.fromkeys(assumed)))
+    return Head(model_lines(building), building.issues, _once(assumed), model_notes(building))
 
 
 def model_lines(building: Building) -> tuple[str, ...]:
@@ -105,25 +131,27 @@ def model_lines(building: Building) -> tuple[str, ...]:
     )
 
 
-def losses(problems: Iterable[Problem]) -> tuple[str, ...]:
-    """The parts of the model that no result has, those with the largest glass area first."""
-    lost = ranked([problem for problem in problems if problem.lost or problem.glass])
-    texts = [_text(one.what, one.first.consequence, one.glass) for one in lost[:SHOWN]]
-    if len(lost) > SHOWN:
-        more = sum(one.count for one in lost[SHOWN:])
-        texts.append(f"{more} more of {len(lost) - SHOWN} kinds: cfs check lists all")
-    return tuple(texts)
+def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> list[str]:
+    """The issues of a severity by kind, the largest glass area first."""
+    kinds = ranked([issue for issue in issues if issue.severity == severity])
+    lines = [_issue_line(one, audience) for one in kinds[:SHOWN]]
+    if len(kinds) > SHOWN:
+        count = sum(one.count for one in kinds[SHOWN:])
+        lines.append(f"{count} more of {len(kinds) - SHOWN} other kinds; cfs check lists all")
+    return lines
 
 
-def _text(what: str, consequence: str, glass: float) -> str:
-    area = f" ({glass:.2f} m2 of glass)" if glass else ""
-    return f"{what}: {consequence}{area}"
+def _issue_line(one: Ranked, audience: Audience) -> str:
+    area = f" ({one.glass:.2f} m2 of glass)" if one.glass else ""
+    return f"{one.text(audience).line}{area}"
 
 
 def model_notes(building: Building) -> tuple[str, ...]:
-    """Whether the model will do, what of it was joined, and what of it no result depends on."""
-    told = (p for p in building.problems if p.kind in NOTED)
-    return (*_account_notes(building), *(f"{p.what}: {p.consequence}." for p in told))
+    """Why the model cannot be used, what was joined, and what no result depends on."""
+    account = building.account
+    verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
+    issues = (one for one in building.issues if one.severity == "unused" or one.code in NOTED)
+    return (*verdict, *map(_note, issues))
 
 
 def unused_notes(building: Building) -> tuple[str, ...]:
@@ -139,8 +167,15 @@ def unused_notes(building: Building) -> tuple[str, ...]:
 
 def tree_notes(building: Building) -> tuple[str, ...]:
     """How much light the trees outdoors let pass."""
-    told = (p for p in building.problems if p.kind == TREES)
-    return tuple(f"{p.what}: {p.consequence}." for p in told)
+    return tuple(_note(issue) for issue in building.issues if issue.code == TREES)
+
+
+def _note(issue: Issue) -> str:
+    return f"{issue_text(issue, 'command').line}."
+
+
+def _once(lines: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(lines))
 
 
 def system_notes(
@@ -166,12 +201,6 @@ def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
         f"{system.name}: direct sun and view pass straight on by a see-through peak of the Klems "
         f"patches, transmittance {peak:.2f} at normal incidence.",
     )
-
-
-def _account_notes(building: Building) -> tuple[str, ...]:
-    """Why the model will not do, where that is so."""
-    account = building.account
-    return account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
 
 
 def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:

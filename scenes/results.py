@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.picture_year.year import PictureYear
@@ -157,7 +158,7 @@ class RoomYear:
     operation: OperationResult | None = None  # None: one state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours asked for
-    problems: tuple[Problem, ...] = ()  # that tracing found
+    issues: tuple[Issue, ...] = ()  # that tracing found
     explored: ExploredRoom | None = None  # where the explorer was asked for
     template: str = ""  # name of the equal room that was computed; "": this one
     borrowed: str = ""  # how much of its daylight comes through glass of other rooms; "": none does
@@ -188,7 +189,7 @@ class RunResult:
     times: pd.DatetimeIndex  # [H] middle of each interval, local standard time
     sun: NDArray[np.float64]  # [H, 3] direction to the sun
     spaces: Sequence[RoomYear]
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
     manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
     notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS

@@ -16,6 +16,7 @@ from scenes import plots
 from scenes import quick as quick_run
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import checked_system
+from scenes.head import NO_HEAD, Head
 from scenes.input_files import InputFiles, overrides_of
 from scenes.inputs import inputs_of
 from scenes.report import write_report
@@ -39,6 +40,7 @@ class SimulatedYear(RoomYear):
     """A room's year that can write its files and show itself."""
 
     run: RunResult  # that it is the one room of; without it
+    head: Head = NO_HEAD  # what was left out of the model, what was assumed
 
     def write(
         self, folder: str | PathLike[str], *, report: bool = True, netcdf: bool = False
@@ -58,12 +60,6 @@ class SimulatedYear(RoomYear):
         Raises: `DataError` where xarray is not installed.
         """
         return year_dataset(self._whole_run())
-
-    @property
-    def head(self) -> tuple[str, ...]:
-        """What was left out of the model, what was assumed, and how much it matters."""
-        record = self.run.manifest["head"]
-        return (*record["model"], *record["left_out"], *record["assumed"])
 
     def plot_illuminance(self, axes: Axes | None = None) -> Axes:
         """The work plane's mean illuminance by day and hour."""
@@ -140,7 +136,8 @@ def simulate(
     )
     overrides = overrides_of(chosen, system, operation)
     files = InputFiles(weather, overrides, operation)
-    run = run_inputs(inputs_of(building, chosen, files), chosen, progress)
+    inputs = inputs_of(building, chosen, files)
+    run = run_inputs(inputs, chosen, progress)
     (year,) = run.spaces
     own = {name: getattr(year, name) for name in RoomYear.__dataclass_fields__}
-    return SimulatedYear(**own, run=replace(run, spaces=()))
+    return SimulatedYear(**own, run=replace(run, spaces=()), head=inputs.head)

@@ -34,4 +34,4 @@ def read_standing(
         frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in))
         for query in select
     )
-    return Standing(tuple(elements), found, source.problems, source.name)
+    return Standing(tuple(elements), found, source.issues, source.name)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from bim.report.issue import issue_text
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE, check_is_ifc
 from scenes.commands.printed_head import PrintedHead
@@ -106,8 +107,8 @@ def command(
     head.notes((*result.assumptions, *result.notes))
     click.echo(f"dossier: {out / 'dossier.html'}")
     if write_ifc is not None:
-        for problem in write_into_ifc(result, write_ifc):
-            click.echo(f"note: {problem.where}: {problem.what}")
+        for issue in write_into_ifc(result, write_ifc):
+            click.echo(f"note: {issue.where}: {issue_text(issue, 'command').what}")
         click.echo(f"building with results: {write_ifc}")
 
 

@@ -17,7 +17,7 @@ class PrintedHead:
     def __init__(self) -> None:
         """Nothing is printed yet."""
         self._lines: dict[str, None] = {}
-        self.record: dict[str, list[str]] = {}  # of the head
+        self.record: dict[str, list] = {}  # of the head
 
     def __call__(self, head: Head) -> None:
         """Print the lines of a head that were not printed yet."""
@@ -25,7 +25,7 @@ class PrintedHead:
             if line not in self._lines:
                 click.echo(line)
         self.record = head.record
-        self._lines |= dict.fromkeys((*head.lines, *head.assumed))
+        self._lines |= dict.fromkeys((*head.lines, *head.notes))
 
     def notes(self, notes: Iterable[str]) -> None:
         """Print the notes of a result that are not in the head."""

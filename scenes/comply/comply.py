@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.building_file import is_ifc
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Effect, Issue
 from bim.seasons import in_month
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -94,9 +95,9 @@ def check_rooms(
     dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
     if not glazed:
         raise no_window(building, check.file)
-    views, view_problems = check.views(glazed)
+    views, view_issues = check.views(glazed)
     check.asked = {s.guid: asked_of(files.rules, s, uses[s.guid]) for s in glazed}
-    lights, problems, notes = check.lights(glazed)
+    lights, issues, notes = check.lights(glazed)
     rooms = []
     for space in spaces:
         if space.guid in lights and space.guid in views:
@@ -112,7 +113,7 @@ def check_rooms(
         check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
         check.day, tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
         check.head, tuple(dict.fromkeys(notes)),
-        (*building.problems, *view_problems, *problems), check.seconds,
+        (*building.issues, *view_issues, *issues), check.seconds,
     )  # fmt: skip
 
 
@@ -183,9 +184,9 @@ class Check:
 
     def views(
         self, spaces: list[Space]
-    ) -> tuple[dict[str, tuple[ViewOut, SunExposure]], list[Problem]]:
+    ) -> tuple[dict[str, tuple[ViewOut, SunExposure]], list[Issue]]:
         """View and sunlight of each room by GUID, by rays against the whole building."""
-        start, found, problems = time.monotonic(), {}, []
+        start, found, issues = time.monotonic(), {}, []
         for number, space in enumerate(spaces):
             self.progress("view and sunlight", number / len(spaces))
             try:
@@ -196,14 +197,15 @@ class Check:
                     hidden=self.hidden,
                 )
             except RoomError as error:
-                problems.append(Problem(space.guid, str(error), "the room was left out"))
+                values = {"room": space.label, "reason": str(error)}
+                issues.append(Issue("room-not-simulated", space.guid, values, Effect("room")))
                 continue
             found[space.guid] = view, sun_exposure(space, self.outdoors, self.day)
         self.progress("view and sunlight", 1.0)
         self._took({"view and sunlight": time.monotonic() - start})
-        return found, problems
+        return found, issues
 
-    def lights(self, spaces: list[Space]) -> tuple[dict[str, RoomLights], list[Problem], list[str]]:
+    def lights(self, spaces: list[Space]) -> tuple[dict[str, RoomLights], list[Issue], list[str]]:
         """The light of each room by GUID, equal rooms computed once."""
         if not self.lit:
             rules = self.files.rules.items()
@@ -219,14 +221,14 @@ class Check:
         def compute(space: Space, steps: Progress) -> RoomLights:
             return self._light(space, skies, cache, steps)
 
-        results, problems, notes = RoomSeries(
+        results, issues, notes = RoomSeries(
             self.building, spaces, self.systems, options.room.sampling, cache, compute,
             moved_lights, options.building,
             alike=lambda one, other: self._costly(one) == self._costly(other),
         ).results(self.progress)  # fmt: skip
         left = time.monotonic() - start - sum(self.seconds.get(name, 0.0) for name in PARTS)
         self._took({"what else light takes": max(left, 0.0)})
-        return {result.space.guid: result for result in results}, problems, notes
+        return {result.space.guid: result for result in results}, issues, notes
 
     def _costly(self, space: Space) -> frozenset[str]:
         """What of glare and heat a rule looks at in a room."""

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import Building
+from bim.report.issue import issue_text
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -92,7 +93,7 @@ def run_study(
         check_schedules(study, weather, study.building)
     _check_states(study, in_windows)
     on_head(head)
-    notes = dict.fromkeys(head.assumed)
+    notes = dict.fromkeys(head.notes)
     variants.activate()
     options, trace = study.options, study.trace
     cache = MatrixCache.of_user()
@@ -105,7 +106,7 @@ def run_study(
             operation=study, skies=skies, cache=cache, progress=steps,
         )  # fmt: skip
         if space.windows:
-            notes |= dict.fromkeys(f"{one.what}: {one.consequence}" for one in room.holes())
+            notes |= dict.fromkeys(issue_text(one, "command").line for one in room.holes())
         zone, radiant = room.zone, None
         if trace.view_factors:
             radiant = radiant_room(

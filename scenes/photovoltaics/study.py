@@ -11,14 +11,14 @@ import numpy as np
 import pandas as pd
 
 from bim.building_file import read_standing_file
-from bim.model import Problem
+from bim.report.issue import Issue
 from bim.standing import Standing
 from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
-from scenes.head import NO_HEAD, Head, losses
+from scenes.head import NO_HEAD, Head
 from scenes.input_options import InputOptions
 from scenes.photovoltaics.energy import Subsystem, SubsystemYield, subsystem_yields
 from scenes.photovoltaics.irradiance import CellIrradiance, cell_irradiance
@@ -39,7 +39,7 @@ class PvResult:
     irradiance: CellIrradiance
     yields: tuple[SubsystemYield, ...]
     weather: Weather
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
     head: Head = NO_HEAD  # what was left out, what was assumed
 
     def module_table(self) -> pd.DataFrame:
@@ -123,11 +123,10 @@ def run_pv(
         message = f"chooses no element with a shape in {options.building}"
         raise DataError(message, file=file, field=f"module.select = {study.module.select!r}")
     cell = fitted_cell(study.module.datasheet())
-    subsystems, problems = _subsystems(study, standing, modules, file)
-    head = Head(
-        (f"Elements read: {len(standing.elements)}", f"Modules: {len(modules)}"),
-        losses((*standing.problems, *problems)), weather.notes,
-    )  # fmt: skip
+    subsystems, issues = _subsystems(study, standing, modules, file)
+    issues = [*standing.issues, *issues]
+    model = (f"Elements read: {len(standing.elements)}", f"Modules: {len(modules)}")
+    head = Head(model, tuple(issues), weather.notes)
     on_head(head)
     irradiance = cell_irradiance(
         standing.elements, modules, weather, samples=samples, seed=seed, progress=progress,
@@ -140,21 +139,21 @@ def run_pv(
     )  # fmt: skip
     return PvResult(
         standing, tuple(modules), subsystems, irradiance, tuple(yields), weather,
-        (*standing.problems, *problems), head,
+        tuple(issues), head,
     )  # fmt: skip
 
 
 def _subsystems(
     study: PvStudy, standing: Standing, modules: Sequence[PvModule], file: Path | None
-) -> tuple[tuple[Subsystem, ...], list[Problem]]:
+) -> tuple[tuple[Subsystem, ...], list[Issue]]:
     """Modules of each stated subsystem; without any, those of each orientation."""
-    problems = _unalike(modules)
+    issues = _unalike(modules)
     if not study.subsystem:
         names = [orientation(module) for module in modules]
         return tuple(
             Subsystem(name, tuple(np.flatnonzero(np.array(names) == name).tolist()), False)
             for name in dict.fromkeys(names)
-        ), problems
+        ), issues
     taken: dict[str, str] = {}
     result = []
     for table, guids in zip(study.subsystem, standing.chosen[1:], strict=True):
@@ -171,9 +170,9 @@ def _subsystems(
         result.append(Subsystem(table.name, own, table.in_series))
     for module in modules:
         if module.guid not in taken:
-            what = f"module {module.name}: in no subsystem"
-            problems.append(Problem(module.guid, what, "its yield is not counted"))
-    return tuple(result), problems
+            values = {"module": module.name}
+            issues.append(Issue("module-in-no-subsystem", module.guid, values))
+    return tuple(result), issues
 
 
 def orientation(module: PvModule) -> str:
@@ -183,15 +182,15 @@ def orientation(module: PvModule) -> str:
     return COMPASS[round(module.azimuth_deg / 45) % 8]
 
 
-def _unalike(modules: Sequence[PvModule]) -> list[Problem]:
+def _unalike(modules: Sequence[PvModule]) -> list[Issue]:
     """Modules of another size than most: one datasheet cannot be theirs."""
     sizes = [round(module.area, 2) for module in modules]
     usual = Counter(sizes).most_common(1)[0][0]
     return [
-        Problem(
+        Issue(
+            "module-of-other-size",
             module.guid,
-            f"module {module.name}: {module.area:.2f} m2, most have {usual:.2f} m2",
-            "the datasheet's power is used for it nevertheless",
+            {"module": module.name, "area": module.area, "usual": usual},
         )
         for module in modules
         if abs(module.area - usual) > 0.05 * usual

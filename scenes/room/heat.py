@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.progress import Progress, silent
@@ -235,7 +236,7 @@ class DaylitRoom:
     seconds: dict[str, float]  # by stage
     annual_glare: pd.DataFrame | None = None
     dgp: AnnualGlare | None = None
-    problems: tuple[Problem, ...] = ()
+    issues: tuple[Issue, ...] = ()
     explored: ExploredRoom | None = None
     template: str = ""
     borrowed: str = ""

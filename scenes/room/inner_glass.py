@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
 from bim.doorways import THINNEST, panes_between, reveals_between, wall_depth
-from bim.model import SHUT_ADVICE, Building, Element, Face, Space
+from bim.model import Building, Element, Face, Space
 from bim.to_tracer import (
     element_surfaces,
     exterior_surfaces,
@@ -34,7 +34,10 @@ from scenes.fenestration.systems import States
 from scenes.room.windows import room_windows
 
 CLEAR = 0.88  # visible transmittance of glass that states none: a float pane of 6 mm, EN 410
-PASSES = "daylight passes (--inner-glass)"
+OPENED = {  # codes of issues of a building whose inner glass and doorways daylight passes
+    "glass-between-rooms": "glass-between-rooms-open",
+    "rooms-open-to-each-other": "rooms-open-to-each-other-lit",
+}
 PANE = "glass between rooms"  # name of a pane as the room beyond has it: opaque
 
 
@@ -69,7 +72,7 @@ def opened(building: Building) -> Building:
     """The building with its doorways open: each reflects what comes back from the room beyond.
 
     rho f / (1 - rho (1 - f)), rho the mean reflectance of that room, f the doorway's share of its
-    surface.  Problems that asked for this say that it is so.
+    surface.  Issues that advised this say that it is so.
 
     Source: Sumpner 1892 (the integrating sphere), as for light wells and cavities.
     """
@@ -83,9 +86,10 @@ def opened(building: Building) -> Building:
         return replace(face, reflectance_visible=visible, reflectance_solar=solar)
 
     spaces = tuple(replace(space, faces=tuple(map(seen, space.faces))) for space in building.spaces)
-    told = [(one, one.consequence.replace(SHUT_ADVICE, PASSES)) for one in building.problems]
-    problems = tuple(replace(one, consequence=text) for one, text in told)
-    return replace(building, spaces=spaces, problems=problems)
+    issues = tuple(
+        replace(issue, code=OPENED.get(issue.code, issue.code)) for issue in building.issues
+    )
+    return replace(building, spaces=spaces, issues=issues)
 
 
 def _returned(room: Space, area: float, band: str) -> float:

@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
 from bim.outer_faces import OuterFaces, outer_faces
+from bim.report.issue import Issue
 from bim.seasons import in_month, season_of, seasons
 from bim.to_thermal import ThermalRoom
 from bim.to_tracer import exterior_surfaces, interior_surfaces
@@ -57,7 +58,7 @@ from scenes.room.glare import (
 )
 from scenes.room.heat import HeatInputs, fenestration_table, heat_alone
 from scenes.room.inner_glass import InnerGlass, inner_glass
-from scenes.room.leaks import hole_problems
+from scenes.room.leaks import hole_issues
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
@@ -224,9 +225,9 @@ class RoomSimulation:
         """The light that pictures are made of."""
         return paths_of(self.light) if self.options.method == "point-in-time" else self.light
 
-    def holes(self) -> tuple[Problem, ...]:
+    def holes(self) -> tuple[Issue, ...]:
         """What of the light leaves through no window."""
-        return hole_problems(self.space, self.scene, seed=self.sampling.seed, cache=self.cache)
+        return hole_issues(self.space, self.scene, seed=self.sampling.seed, cache=self.cache)
 
     def annual_glare(self) -> pd.DataFrame:
         """Glare of every hour."""

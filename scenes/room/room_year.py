@@ -137,6 +137,6 @@ def lit_room(
     explored = room.timed("explorer", room.explored) if explore else None
     heat = room.timed("thermal", room.heat_inputs)
     return DaylitRoom(
-        space, daylight, rated, heat, room.seconds, year, dgp=dgp, problems=holes,
+        space, daylight, rated, heat, room.seconds, year, dgp=dgp, issues=holes,
         explored=explored, borrowed=borrowed_share(space, room.light, room.inner),
     )  # fmt: skip

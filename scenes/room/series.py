@@ -12,7 +12,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Effect, Issue
 from bim.seasons import seasons
 from bim.templates import template_rooms
 from bim.to_tracer import exterior_surfaces, window_groups
@@ -26,7 +27,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
 from scenes.results import RoomYear
 from scenes.room.heat import DaylitRoom
-from scenes.room.leaks import moved_problem
+from scenes.room.leaks import moved_issue
 
 Moved = TypeVar("Moved", RoomYear, DaylitRoom)
 BANDS = ("visible", "solar")
@@ -117,7 +118,7 @@ def moved_result(result: Moved, space: Space) -> Moved:
         glare=replace(glare, view=replace(glare.view, position=place)),
         seconds={},
         explored=None,  # the template's serves both
-        problems=tuple(moved_problem(problem, space, name) for problem in result.problems),
+        issues=tuple(moved_issue(issue, space, name) for issue in result.issues),
         template=name,
     )
 
@@ -150,7 +151,7 @@ class RoomSeries(Generic[R]):
     beside: Beside[R] | None = None  # computes rooms beside each other in place of `compute`
     kept: Callable[[R], R] = lambda result: result  # what is held of each
 
-    def results(self, progress: Progress = silent) -> tuple[list[R], list[Problem], list[str]]:
+    def results(self, progress: Progress = silent) -> tuple[list[R], list[Issue], list[str]]:
         """The results in the rooms' order, what was left out, and what was given twice.
 
         Raises: `DataError` where the only room cannot be computed.
@@ -164,8 +165,8 @@ class RoomSeries(Generic[R]):
         templates: _Templates,
         ahead: Iterator[tuple[str, R | BaseException]],
         progress: Progress,
-    ) -> tuple[list[R], list[Problem], list[str]]:
-        found, problems, notes = [], [], []
+    ) -> tuple[list[R], list[Issue], list[str]]:
+        found, issues, notes = [], [], []
         computed: dict[str, R | BaseException] = {}
         for number, space in enumerate(self.spaces, 1):
             steps = item(progress, "room", number, len(self.spaces), space.label)
@@ -192,11 +193,12 @@ class RoomSeries(Generic[R]):
                 if len(self.spaces) == 1:
                     where = f"space {space.label}"
                     raise DataError(str(error), file=self.file, element=where) from error
-                problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+                values = {"room": space.label, "reason": str(error)}
+                issues.append(Issue("room-not-simulated", space.guid, values, Effect("room")))
                 continue
             found.append(result)
             self.on_room(result)
-        return found, problems, notes
+        return found, issues, notes
 
     def _ahead(
         self, templates: _Templates, progress: Progress

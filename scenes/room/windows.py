@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bim.drawn_shades import without_drawn_shades
 from bim.model import Building, Space
+from bim.report.issue import issue_text
 from bim.to_tracer import window_groups
 from mitsuba_cfs.surfaces import WindowGroup
 from scenes.fenestration.systems import FenestrationSystem, States
@@ -109,9 +110,9 @@ def traced_building(building: Building, systems: Mapping[str, States]) -> Buildi
     shaded = {
         guid for guid, states in systems.items() if any(held[id(system)] for system in states)
     }
-    building, problems = without_drawn_shades(building, shaded)
-    for problem in problems:
-        _log.warning("%s: %s", problem.what, problem.consequence)
+    building, issues = without_drawn_shades(building, shaded)
+    for issue in issues:
+        _log.warning("%s", issue_text(issue).line)
     return building
 
 

@@ -11,7 +11,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import TypeVar
 
-from bim.model import Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue, issue_text
 from bim.sensors import held_grids
 from bim.templates import same_hues
 from bim.to_thermal import same_surfaces
@@ -101,25 +102,25 @@ def run_inputs(
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     progress("sky", 1.0)
     heard = {"on_room": on_room, "on_light": on_light, "workers": workers}
-    results, problems, notes = _rooms(inputs, skies, options, progress, **heard)
+    results, issues, notes = _rooms(inputs, skies, options, progress, **heard)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
-    holes = [problem for result in results for problem in result.problems]
+    holes = [issue for result in results for issue in result.issues]
     manifest = _manifest(options, variant, inputs, results) | {"head": head.record}
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
         *([NOTE] if options.quick else []),
-        *head.assumed,
+        *head.notes,
         *notes,
         *(result.borrowed for result in results if result.borrowed),
-        *(f"{hole.what}: {hole.consequence}." for hole in holes),
+        *(f"{issue_text(hole, 'command').line}." for hole in holes),
     ]
     return RunResult(
         building,
         weather.midpoints,
         sun,
         results,
-        (*building.problems, *problems, *holes),
+        (*building.issues, *issues, *holes),
         manifest,
         tuple(dict.fromkeys(notes)),
         room.method,
@@ -135,7 +136,7 @@ def _rooms(
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
     workers: Workers | None = None,
-) -> tuple[Sequence[RoomYear], list[Problem], list[str]]:
+) -> tuple[Sequence[RoomYear], list[Issue], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
     spaces = run_spaces(inputs, options)
     store = StoredArrays() if len(spaces) > 1 else None
@@ -143,8 +144,8 @@ def _rooms(
         alone = RoomWork(compute_room, inputs, spaces, skies, options)
         series = _series(alone, workers, alone, moved_result, store)
         series = replace(series, on_room=on_room or (lambda room: None))
-        found, problems, notes = series.results(progress)
-        return _passed(found, store), problems, notes
+        found, issues, notes = series.results(progress)
+        return _passed(found, store), issues, notes
 
     def compute_light(space: Space, steps: Progress) -> DaylitRoom:
         found = light(space, steps)
@@ -155,12 +156,12 @@ def _rooms(
     together = _series(light, workers, compute_light, moved_light, store, same_surfaces)
     heard = on_light or (lambda room: None)
     together = replace(together, on_room=heard, given="daylight, glare and sun are")
-    lit, problems, notes = together.results(progress)
+    lit, issues, notes = together.results(progress)
     years, said = _coupled(lit, inputs, options, progress, store)
     found = _passed(years, store)
     for room in found if on_room is not None else ():
         on_room(room)
-    return found, problems, [*notes, *said]
+    return found, issues, [*notes, *said]
 
 
 def _passed(rooms: list[RoomYear], store: StoredArrays | None) -> Sequence[RoomYear]:

@@ -85,7 +85,7 @@ def plan_head(plan: StudyPlan) -> Head:
         try:
             heads.append(case_inputs(case, building, spaces).head)
         except DataError as error:  # of these cases alone, which then fail
-            heads.append(Head(model_lines(building), (str(error),)))
+            heads.append(Head(model_lines(building), building.issues, (str(error),)))
     return joined(heads)
 
 

@@ -125,7 +125,7 @@ def write_summary(year: GlareYear, rows: list[dict[str, object]], folder: Path) 
         "glare_rule": rating_of(options).rule,
         "fenestration": list(year.fenestration),
         "head": year.head.record,
-        "notes": [*year.head.assumed, *year.notes],
+        "notes": [*year.head.notes, *year.notes],
         "hours_with_sun": len(year.sky.lit),
         "version": metadata.version("mitsuba-cfs"),
     }

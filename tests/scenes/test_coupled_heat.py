@@ -156,13 +156,13 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     options = JobOptions(OFFICE, WEATHER, cache=False, room=room)
     heard: list[str] = []
-    found, problems, notes = run._rooms(
+    found, issues, notes = run._rooms(
         inputs, skies, options, silent,
         on_light=lambda room: heard.append(f"light of {room.space.name}"),
         on_room=lambda room: heard.append(room.space.name),
     )  # fmt: skip
     names = [space.name for space in building.spaces]
-    assert heard == [f"light of {name}" for name in names] + names and not problems
+    assert heard == [f"light of {name}" for name in names] + names and not issues
     assert "flows between them through 18.0 m2" in notes[-1]
     for year, theirs in zip(found, expected, strict=True):
         np.testing.assert_allclose(year.heat.air_c, theirs.hours["air_c"], atol=1e-3)

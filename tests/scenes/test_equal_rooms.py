@@ -84,8 +84,8 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
     )  # fmt: skip
     options = JobOptions(Path(), Path(), cache=False, room=room)
     inputs = run.Inputs(building, spaces, weather, systems, None)
-    results, problems, notes = run._rooms(inputs, skies, options, silent)
-    assert computed == ["room", "other"] and not problems
+    results, issues, notes = run._rooms(inputs, skies, options, silent)
+    assert computed == ["room", "other"] and not issues
     assert [r.space.name for r in results] == ["room", "other", "twin"]
     assert [r.template for r in results] == ["", "", "room"]
     assert len(notes) == 2 and "twin" in notes[0] and "sun are those" in notes[0]

@@ -67,11 +67,12 @@ def rooms_of(inputs: job.Inputs):
 
 def test_a_room_too_low_for_its_sensors_is_left_out(variant, monkeypatch, no_pictures) -> None:
     only_high_rooms_are_made_up(monkeypatch)
-    found, problems, _ = rooms_of(inputs_of(box("low", 0.7), box("high", 2.8)))
+    found, issues, _ = rooms_of(inputs_of(box("low", 0.7), box("high", 2.8)))
     assert [room.name for room in found] == ["high"]
-    (problem,) = problems
-    assert problem.where == "low" and "no room at 0.8 m above the floor" in problem.what
-    assert problem.consequence == "the room was left out of the run"
+    (issue,) = issues
+    assert (issue.where, issue.code) == ("low", "room-not-simulated")
+    assert "no room at 0.8 m above the floor" in issue.values["reason"]
+    assert issue.effect.lost == "room"
 
 
 def test_the_only_room_names_itself_and_its_file(variant) -> None:
