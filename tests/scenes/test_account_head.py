@@ -20,4 +20,4 @@ def test_a_head_begins_with_the_account_of_a_model_that_will_not_do(tmp_path, ca
     verdict = "Model: not usable: only 15 % of the glass that looks out is used"
     assert printed.splitlines()[0].startswith(verdict)
     assert "Rooms read: 1 of 1 spaces" in printed and "Glass: " in printed
-    assert head.assumed[0].startswith(verdict)
+    assert head.notes[0].startswith(verdict)
