@@ -22,7 +22,7 @@ from scenes.fenestration.thermal_file import files_beside
 from scenes.head import Head, head_of
 from scenes.input_files import InputFiles, building_of, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
-from scenes.room.inner_glass import lending_rooms, opened
+from scenes.room.inner_glass import opened, source_rooms
 from scenes.room.operation import Operation, check_states, stated_note, used_operation
 from scenes.room.operation_hours import check_schedules
 from scenes.room.windows import traced_building
@@ -123,7 +123,7 @@ def inputs_of(
     beyond: dict[str, list[Space]] = {}
     if inner:
         building = opened(building)
-        beyond = {space.guid: lending_rooms(building, space) for space in building.spaces}
+        beyond = {space.guid: source_rooms(building, space) for space in building.spaces}
     file = options.building or building.file or Path(building.name)
     if rooms == "all":
         spaces = named_spaces(building, options.spaces, file)

@@ -13,7 +13,7 @@ from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.scene import DaylightScene
 from scenes.inputs import Inputs
 from scenes.room.glare import band_scenes
-from scenes.room.leaks import hole_notes
+from scenes.room.leaks import leak_notes
 from scenes.room.windows import room_windows
 
 
@@ -34,7 +34,7 @@ class ViewedRoom:
 
     def leaks(self) -> list[str]:
         """Light that is lost through leaks of the model; traces a little."""
-        return hole_notes(self.space, cache=MatrixCache.of_user())
+        return leak_notes(self.space, cache=MatrixCache.of_user())
 
 
 def viewed_room(

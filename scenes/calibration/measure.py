@@ -19,7 +19,7 @@ from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
 from scenes.input_files import read_weather
 from scenes.room.options import RoomOptions
-from scenes.room.room_year import compute_room
+from scenes.room.room import compute_room
 from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 

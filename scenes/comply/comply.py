@@ -26,7 +26,7 @@ from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
+from scenes.comply.findings import Findings, GridLight, calendar_of
 from scenes.comply.glare import seat_glare
 from scenes.comply.glass import windows_without_view
 from scenes.comply.heat import room_heat
@@ -42,8 +42,10 @@ from scenes.fenestration.systems import States
 from scenes.head import Head, unused_notes
 from scenes.input_files import building_of
 from scenes.inputs import first_states, inputs_of
+from scenes.room.inputs import room_inputs
+from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation
+from scenes.room.room import StageTimes
 from scenes.room.series import RoomSeries, corner
 from scenes.room.skies import skies_for
 
@@ -241,33 +243,44 @@ class Check:
         rules = self.files.rules
         grids = {name: sensor_grid_of(space, rule.grid) for name, rule in rules.items()}
         distinct = list(dict.fromkeys(grids.values()))
-        room = RoomSimulation(
+        room = room_inputs(
             self.building, space, self.systems, self.files.weather, self.options.room,
-            skies=skies, cache=cache, grids=distinct, progress=progress,
+            skies=skies, cache=cache, grids=distinct,
         )  # fmt: skip
         operated = {
             distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts
         }
         if self.moving and self.shaded:
             operated = operated or {0}
-        room.timed(TRACING, lambda: room.traced.trace("sDGP"))
-        found = room.timed(SUMS, lambda: lights_of(room, operated))
+        times = StageTimes()
+        with times.stage(TRACING):
+            light = room_light(room, progress=progress)
+            light.traced.trace("sDGP")
+        with times.stage(SUMS):
+            found = lights_of(room, light, operated)
         closed = next((one.closed for one in found if one.closed is not None), None)
         closed = closed if self.shaded else None
         glare = heat = None
         if self.glaring and "glare" in self._costly(space):
-            glare = room.timed(GLARE, lambda: self._glare(room, closed))
+            state = None if closed is None else closed[skies.lit].T.astype(np.int64)
+            with times.stage(GLARE):
+                glare = seat_glare(
+                    room, light, state, grid=self.options.grid,
+                    directions=self.options.directions, eye_height=self.options.eye_height,
+                    progress=progress,
+                )  # fmt: skip
         if "heat" in self._costly(space):
-            heat = room.timed(HEAT, lambda: room_heat(room, closed))
-        self._took(room.seconds)
+            with times.stage(HEAT):
+                heat = room_heat(room, light, closed, progress=progress)
+        self._took(times.seconds)
         of_room = Findings(self.calendar, glare=glare, heat=heat)
         lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
         values = {
-            name: values_of(rules[name], replace(of_room, light=light), LIGHT)
-            for name, light in lights.items()
+            name: values_of(rules[name], replace(of_room, light=grid), LIGHT)
+            for name, grid in lights.items()
         }
-        summaries = {id(light): self._summary(light) for light in found}
-        by_rule = {name: summaries[id(light)] for name, light in lights.items()}
+        summaries = {id(grid): self._summary(grid) for grid in found}
+        by_rule = {name: summaries[id(grid)] for name, grid in lights.items()}
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
 
@@ -275,15 +288,6 @@ class Check:
         """Add what parts of the check took."""
         for name, value in seconds.items():
             self.seconds[name] = round(self.seconds.get(name, 0.0) + value, 1)
-
-    def _glare(self, room: RoomSimulation, closed: NDArray[np.bool_] | None) -> SeatGlare:
-        """Glare of a room's seats with its blinds closed [H, G]; None: open all year."""
-        state = None if closed is None else closed[room.skies.lit].T.astype(np.int64)
-        options = self.options
-        return seat_glare(
-            room, state, grid=options.grid, directions=options.directions,
-            eye_height=options.eye_height,
-        )  # fmt: skip
 
     def _summary(self, light: GridLight) -> GridSummary:
         ten = self.calendar.ten

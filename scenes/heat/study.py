@@ -28,9 +28,12 @@ from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.inputs import Inputs, every_state, inputs_of
 from scenes.room.heat import felt_by, room_humidity
+from scenes.room.inputs import room_inputs
+from scenes.room.leaks import leak_issues
+from scenes.room.light import visible_scene
 from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
-from scenes.room.room import RoomSimulation
+from scenes.room.room import operated_zone
 from scenes.room.skies import skies_for
 from scenes.room.zone import RoomZone, balances, coupled
 from thermal.balance import ZoneResult
@@ -101,13 +104,14 @@ def run_study(
     rooms, radiants = [], []
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)
-        room = RoomSimulation(
+        room = room_inputs(
             building, space, in_windows, weather, options,
-            operation=study, skies=skies, cache=cache, progress=steps,
+            operation=study, skies=skies, cache=cache,
         )  # fmt: skip
         if space.windows:
-            notes |= dict.fromkeys(issue_text(one, "command").line for one in room.holes())
-        zone, radiant = room.zone, None
+            leaks = leak_issues(space, visible_scene(room), seed=options.sampling.seed, cache=cache)
+            notes |= dict.fromkeys(issue_text(one, "command").line for one in leaks)
+        zone, radiant = operated_zone(room, progress=steps), None
         if trace.view_factors:
             radiant = radiant_room(
                 space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache

@@ -16,12 +16,12 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.matrices.escape import SIDES, Escape, escaped_view
 
-SPACING, WORK_PLANE = 1.0, 0.8  # of the sensors that are looked from [m]
-EYE_PIXELS = 64  # of the eye's view, of which only place and direction count
-MOST_LOST = 0.01  # of a sensor's view, before it is a problem
+SPACING, WORK_PLANE = 1.0, 0.8  # of the sensors [m]
+EYE_PIXELS = 64  # of the eye's view; only its position and direction count
+MOST_LOST = 0.01  # greatest share of a sensor's view that is no issue
 
 
-def hole_issues(
+def leak_issues(
     space: Space,
     scene: DaylightScene,
     *,
@@ -29,25 +29,25 @@ def hole_issues(
     cache: MatrixCache | None = None,
     progress: Progress = silent,
 ) -> tuple[Issue, ...]:
-    """A problem where a sensor loses more than 1 % of its view, direct and reflected.
+    """An issue if a sensor loses more than 1 % of its view, direct and reflected.
 
-    Args: scene: the room with its sensors and an eye.
+    Args: scene: of the room, with its sensors and the eye.
     """
     points, directions = scene.sensors()
-    found = escaped_view(
+    escape = escaped_view(
         scene.interior, scene.groups, points, directions,
         seed=seed, progress=progress, cache=cache,
     )  # fmt: skip
-    if not (found.share - 2 * found.error > MOST_LOST).any():
+    if not (escape.share - 2 * escape.error > MOST_LOST).any():
         return ()
-    return (_issue(space, points, found),)
+    return (_issue(space, points, escape),)
 
 
-def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None) -> list[str]:
-    """The problems of a room's holes as sentences, where no scene with sensors is at hand."""
+def leak_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None) -> list[str]:
+    """Sentences on the leaks of a room, seen from sensors of their own."""
     try:
         points, _ = sensor_grid(space, spacing=SPACING, height=WORK_PLANE, margin=SPACING / 2)
-    except RoomError:  # too low for a work plane: the eye alone
+    except RoomError:  # too low for a work plane: from the eye alone
         points = np.empty((0, 3))
     scene = DaylightScene(
         furnished_surfaces(space, "visible"),
@@ -57,26 +57,26 @@ def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None)
         np.tile([0.0, 0.0, 1.0], (len(points), 1)),
         fisheye(*view_point(space), EYE_PIXELS),
     )
-    found = hole_issues(space, scene, seed=seed, cache=cache)
-    return [issue_text(issue).line for issue in found]
+    issues = leak_issues(space, scene, seed=seed, cache=cache)
+    return [issue_text(issue).line for issue in issues]
 
 
-def _issue(space: Space, points: np.ndarray, found: Escape) -> Issue:
-    """How many sensors lose how much, and where most of it leaves."""
-    worst, sensors = int(np.argmax(found.share)), len(points) - 1
-    count = int(np.count_nonzero(found.share[:sensors] > MOST_LOST))
+def _issue(space: Space, points: np.ndarray, escape: Escape) -> Issue:
+    """The number of sensors that lose light, the largest loss, and where most of it leaves."""
+    worst, sensors = int(np.argmax(escape.share)), len(points) - 1
+    count = int(np.count_nonzero(escape.share[:sensors] > MOST_LOST))
     at_sensor = worst < sensors
-    side = int(np.argmax(found.by_side.sum(axis=0)))
+    side = int(np.argmax(escape.by_side.sum(axis=0)))
     values = {
         "room": space.label,
-        "percent": 100 * float(found.share[worst]),
+        "percent": 100 * float(escape.share[worst]),
         "sensor": Phrase("sensor", {"number": worst}) if at_sensor else Phrase("view-point"),
         "position": _position(points[worst]),
         "count": count,
         "sensors": sensors,
         "limit_percent": 100 * MOST_LOST,
         "side": Phrase(f"side-{SIDES[side]}"),
-        "exit": _position(found.place[side]),
+        "exit": _position(escape.place[side]),
     }
     return Issue("room-leaks-light", space.guid, values)
 
@@ -86,6 +86,6 @@ def _position(point: np.ndarray) -> str:
 
 
 def moved_issue(issue: Issue, space: Space, template: str) -> Issue:
-    """The issue of a template room as that of one equal to it."""
+    """The issue of a template room as the issue of an equal room."""
     values = {**issue.values, "room": space.label, "template": template}
     return Issue("equal-room-leaks-light", space.guid, values)

@@ -29,9 +29,9 @@ from scenes.inputs import Inputs, read_inputs
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.heat import DaylitRoom, coupled_years
-from scenes.room.inner_glass import lending_rooms
+from scenes.room.inner_glass import source_rooms
 from scenes.room.operation_tables import OperationTables
-from scenes.room.room_year import compute_room, lit_room
+from scenes.room.room import compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
 from scenes.room.skies import skies_for
 from scenes.run.options import JobOptions
@@ -155,7 +155,7 @@ def _rooms(
     light = RoomWork(lit_room, inputs, spaces, skies, options)
     together = _series(light, workers, compute_light, moved_light, store, same_surfaces)
     heard = on_light or (lambda room: None)
-    together = replace(together, on_room=heard, given="daylight, glare and sun are")
+    together = replace(together, on_room=heard, shared="daylight, glare and sun are")
     lit, issues, notes = together.results(progress)
     years, said = _coupled(lit, inputs, options, progress, store)
     found = _passed(years, store)
@@ -202,9 +202,7 @@ def _series(
 
     def borrows(*spaces: Space) -> bool:
         """Whether what a room gets depends on a neighbour: then none stands for another."""
-        return options.inner_glass and any(
-            lending_rooms(inputs.building, space) for space in spaces
-        )
+        return options.inner_glass and any(source_rooms(inputs.building, space) for space in spaces)
 
     return RoomSeries(
         inputs.building,
@@ -222,8 +220,8 @@ def _series(
             and (not options.colour or same_hues(one, other))
             and alike(one, other)
         ),
-        beside=None if workers is None else partial(work.beside, workers=workers),
-        kept=(lambda result: result) if store is None else store.kept,
+        parallel=None if workers is None else partial(work.parallel, workers=workers),
+        stored=(lambda result: result) if store is None else store.kept,
     )
 
 

@@ -35,7 +35,7 @@ from scenes.inputs import Inputs, inputs_of
 from scenes.results import RoomYear
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room_year import RoomChoices, compute_room
+from scenes.room.room import RoomChoices, compute_room
 from scenes.room.skies import skies_for
 from scenes.study.case import Case, InputFile, program_version
 from scenes.study.plan import StudyPlan

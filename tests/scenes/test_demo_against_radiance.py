@@ -22,7 +22,7 @@ def our_year(name: str) -> Year:
     from scenes.fenestration.systems import read_system
     from scenes.input_files import read_weather
     from scenes.room.options import RoomOptions
-    from scenes.room.room_year import compute_room
+    from scenes.room.room import compute_room
     from scenes.room.windows import in_all_windows
 
     building = read_ifc(OFFICE)

@@ -11,7 +11,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.inputs import read_inputs
-from scenes.room.windows import holds_shade
+from scenes.room.windows import has_shade
 from scenes.run.options import JobOptions
 from tests.bim.small_ifc import OPENING, WALL, WIDTH, SmallIfc, box_room
 from tests.issues import of_code
@@ -106,9 +106,9 @@ def test_the_corrections_keep_what_they_name(model, tmp_path):
 
 
 def test_a_shade_is_known_by_the_light_that_it_scatters():
-    assert holds_shade(read_system(VENETIAN_BLIND))
+    assert has_shade(read_system(VENETIAN_BLIND))
     straight = np.diag(0.7 / KLEMS_FULL.projected_solid_angles())
     none = np.zeros_like(straight)
     clear = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, straight, straight, none, none)
-    assert not holds_shade(FenestrationSystem("clear", clear, clear))
-    assert holds_shade(FenestrationSystem("clear", clear, clear, shading_position="internal"))
+    assert not has_shade(FenestrationSystem("clear", clear, clear))
+    assert has_shade(FenestrationSystem("clear", clear, clear, shading_position="internal"))

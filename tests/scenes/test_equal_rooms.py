@@ -13,7 +13,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.progress import silent
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room_year import compute_room, lit_room
+from scenes.room.room import compute_room, lit_room
 from scenes.room.series import OutdoorLight, moved_result, same_systems
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions

@@ -12,8 +12,8 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.demo import OFFICE
 from scenes.fenestration.systems import read_system
-from scenes.room.daylight import room_scene
-from scenes.room.leaks import hole_issues, moved_issue
+from scenes.room.leaks import leak_issues, moved_issue
+from scenes.room.light import room_scene
 from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 
@@ -36,7 +36,7 @@ def problems_of(cache=None, *, missing: str = ""):
         keep = room.surface != [face.name for face in space.faces].index(missing)
         parts = (part[keep] for part in (room.triangles, room.reflectance, room.surface))
         scene = replace(scene, interior=Surfaces(*parts))
-    return space, hole_issues(space, scene, cache=cache, progress=quiet)
+    return space, leak_issues(space, scene, cache=cache, progress=quiet)
 
 
 def test_a_closed_room_has_no_issue():

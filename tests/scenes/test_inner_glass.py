@@ -12,7 +12,7 @@ from bim import read_ifc
 from bim.model import Building
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
-from scenes.room.inner_glass import CLEAR, inner_glass, lending_rooms, opened
+from scenes.room.inner_glass import CLEAR, inner_glass, opened, source_rooms
 from scenes.room.windows import in_all_windows, room_windows
 from tests.bim import test_passages as passages
 from tests.bim.small_ifc import DEPTH, FRAME, HEIGHT, WIDTH, SmallIfc, box_model
@@ -82,8 +82,8 @@ def building(two_rooms: Path) -> Building:
 
 def test_the_pane_is_a_face_of_both_rooms(building: Building) -> None:
     dark, lit = building.space("dark"), building.space("lit")
-    assert lending_rooms(building, dark) == [lit]
-    assert lending_rooms(building, lit) == []
+    assert source_rooms(building, dark) == [lit]
+    assert source_rooms(building, lit) == []
     for room in (dark, lit):
         area = sum(face.area for face in room.faces if face.pane is not None)
         assert area == pytest.approx(GLASS_AREA, rel=1e-3)
@@ -104,9 +104,9 @@ def test_the_dark_room_looks_into_the_lit_one_through_a_closed_reveal(building: 
 
 def test_light_goes_through_a_dark_room_to_the_one_behind_it(three_rooms: Building) -> None:
     lit, dark, last = (three_rooms.space(name) for name in ("lit", "dark", "last"))
-    assert lending_rooms(three_rooms, last) == [dark, lit]
-    assert lending_rooms(three_rooms, dark) == [lit]
-    assert lending_rooms(three_rooms, lit) == []
+    assert source_rooms(three_rooms, last) == [dark, lit]
+    assert source_rooms(three_rooms, dark) == [lit]
+    assert source_rooms(three_rooms, lit) == []
     systems = in_all_windows(lit, read_system(VENETIAN_BLIND))
     found = inner_glass(three_rooms, last, systems)
     (beyond,) = found.beyond
@@ -134,7 +134,7 @@ def doorway(tmp_path_factory) -> Path:
 def test_a_doorway_passes_everything_into_the_dark_room(doorway: Path) -> None:
     building = read_ifc(doorway)
     dark, lit = building.space("dark"), building.space("lit")
-    assert lending_rooms(building, dark) == [lit]
+    assert source_rooms(building, dark) == [lit]
     found = inner_glass(building, dark, in_all_windows(lit, read_system(VENETIAN_BLIND)))
     assert found is not None and (found.area, found.open_area) == (0, pytest.approx(2.1))
     (group,), (room,), ((pane,),) = found.groups, found.beyond, found.optics

@@ -43,7 +43,7 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
     """Rooms whose result is their name, computed last room first, and which were asked for."""
     asked: list[list[str]] = []
 
-    def beside(rooms):
+    def parallel(rooms):
         asked.append([room.name for room in rooms])
         for room in reversed(rooms):
             yield room, RoomError("no floor") if room.name == fails else room.name
@@ -55,7 +55,7 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
     return RoomSeries(
         replace(BOX, spaces=tuple(spaces)), spaces, {}, SMALL.sampling, None, here,
         lambda result, space: f"{space.name} like {result}",
-        alike=lambda one, other: alike, beside=beside,
+        alike=lambda one, other: alike, parallel=parallel,
     ), asked  # fmt: skip
 
 
@@ -88,7 +88,7 @@ def test_what_is_no_fault_of_a_room_ends_the_run():
     rooms, _ = named([ROOM, box("deep", 6.0)])
     ended = []
 
-    def beside(some):
+    def parallel(some):
         try:
             yield some[0], DataError("file is gone")
             raise AssertionError("asked for another")
@@ -96,7 +96,7 @@ def test_what_is_no_fault_of_a_room_ends_the_run():
             ended.append("the processes")
 
     with pytest.raises(DataError, match="file is gone"):
-        replace(rooms, beside=beside).results()
+        replace(rooms, parallel=parallel).results()
     assert ended
 
 
