@@ -108,7 +108,7 @@ class Account:
     @property
     def lines(self) -> tuple[str, ...]:
         """`facts` as lines of text."""
-        return tuple(f"{title}: {text}" for title, text in self.facts)
+        return tuple(Note("{title}: {text}", title=title, text=text) for title, text in self.facts)
 
     def _stops(self) -> list[Note]:
         found = []

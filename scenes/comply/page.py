@@ -67,7 +67,10 @@ def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
         page=page,
         title=page.title or result.building.name or gettext("Building"),
         facts=summary(result) + page.facts,
-        notes=[gettext(NOTE)] * quick + [translated(note) for note in result.notes],
+        notes=[
+            *([gettext(NOTE)] if quick else []),
+            *map(translated, (*result.head.lines, *result.notes)),
+        ],
         assumptions=[translated(text) for text in result.assumptions],
         rules=[dossier_rule(result, name) for name in result.rules],
         rooms=rooms,

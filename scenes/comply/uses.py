@@ -15,6 +15,7 @@ from pydantic import Field
 
 from bim.model import Space
 from mitsuba_cfs.notes import Note
+from scenes.language.catalogue import N_
 from scenes.toml_file import TomlTable, read_table, validated
 
 UNKNOWN = "unknown"
@@ -101,7 +102,9 @@ class RoomUses:
     @staticmethod
     def _texts(space: Space, texts: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         yield from texts
-        names = (("type", space.type_name), ("long name", space.long_name), ("name", space.name))
+        names = (
+            (N_("type"), space.type_name), (N_("long name"), space.long_name), (N_("name"), space.name),
+        )  # fmt: skip
         yield from ((where, text) for where, text in names if text)
 
 

@@ -46,7 +46,7 @@ def write_page(
                 year=year,
                 page=page,
                 title=page.title or year.room,
-                notes=[translated(note) for note in year.notes],
+                notes=[translated(note) for note in (*year.head.lines, *year.notes)],
                 facts=(*_facts(year, table), *page.facts),
                 plan=_plan(year, table),
                 limits=[rounded(limit, 2) for limit in LIMITS],

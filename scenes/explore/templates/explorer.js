@@ -140,7 +140,8 @@
     byId("sun").textContent = text;
     byId("time").textContent = lit ? gettext("Computing time: picture {picture} ms, glare {glare} ms, with decompression {whole} ms.", { picture: fixed(lit.milliseconds, 0), glare: fixed(lit.glareMilliseconds, 0), whole: fixed(lit.wholeMilliseconds, 0) }) : "";
     const check = found.room.facts.checks[found.state];
-    byId("error").textContent = check ? gettext("In {count} random hours the DGP shown differs from that of the uncompressed pictures by at most {most}, on average {mean}.", { count: check.hours.length, most: fixed(check.largest, 4), mean: check.mean < 0.0001 ? `< ${fixed(0.0001, 4)}` : fixed(check.mean, 4) }) : "";
+    const mean = check && (check.mean < 0.0001 ? `< ${fixed(0.0001, 4)}` : fixed(check.mean, 4));
+    byId("error").textContent = check ? gettext("In {count} random hours the DGP shown differs from that of the uncompressed pictures by at most {most}, on average {mean}.", { count: check.hours.length, most: fixed(check.largest, 4), mean }) : "";
   }
 
   function paintCarpet(found, day, clock) {

@@ -1,0 +1,246 @@
+"""The head of every result: what was left out, what was assumed, and how much it matters.
+
+The terminal, the JSON record and the pages of every command show the same lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from bim.account import NOT_USABLE
+from bim.model import Building, Space
+from bim.report.issue import Audience, Issue, issue_note
+from bim.report.ranking import Ranked, ranked
+from mitsuba_cfs.bsdf.klems_peak import through_peak
+from mitsuba_cfs.notes import Note
+from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.resolver import source_notes, window_sources
+from scenes.fenestration.systems import FenestrationSystem, States
+from scenes.fenestration.thermal_system import thermal_system
+
+# Labels of the issues in a head, by severity, the gravest first; "info" changes nothing
+LABELS = {
+    "loss": Note("left out"), "warning": Note("warning"), "unused": Note("not used"),
+    "assumption": Note("assumed"),
+}  # fmt: skip
+TREES = "trees-by-month"
+NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
+SHOWN = 8  # kinds of issues of a severity that a head lists
+FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What was left out of the inputs of a result, and what was assumed."""
+
+    model: tuple[str, ...]  # rooms and glass that were read, and a verdict
+    issues: tuple[Issue, ...] = ()  # of the building model
+    assumed: tuple[str, ...] = ()  # sentences: of use, systems, weather and site
+    noted: tuple[str, ...] = ()  # sentences of the model for pages that list its issues apart
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The head as the terminal and the pages show it."""
+        return self.text("command")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The assumptions as sentences, for a page that has account and issues elsewhere."""
+        return (*self.noted, *self.assumed)
+
+    def text(self, audience: Audience) -> tuple[str, ...]:
+        """The lines of the head; audience: whom the fixes are for."""
+        of_model = (
+            Note("{label}: {text}", label=label, text=text)
+            for severity, label in LABELS.items()
+            for text in _issue_lines(self.issues, severity, audience)
+        )
+        assumed = (Note("assumed: {text}", text=text) for text in self.assumed)
+        return (*self.model, *of_model, *assumed)
+
+    def with_assumptions(self, sentences: Iterable[str]) -> Head:
+        """The head with further assumptions."""
+        return replace(self, assumed=tuple(dict.fromkeys([*self.assumed, *sentences])))
+
+    @property
+    def record(self) -> dict[str, list]:
+        """The head as data for a JSON file: issues by kind, the largest glass area first."""
+        return {
+            "model": list(self.model),
+            "issues": [
+                {
+                    "code": one.first.code, "severity": one.first.severity, "count": one.count,
+                    "glass_m2": round(one.glass, 3), "where": one.first.where,
+                    "text": one.text("command").line,
+                }
+                for one in ranked(self.issues)
+            ],
+            "assumed": list(self.assumed),
+        }  # fmt: skip
+
+
+NO_HEAD = Head(())
+
+
+def joined(heads: Iterable[Head]) -> Head:
+    """One head of several results, each line once."""
+    heads = list(heads)
+    issues = {(one.code, one.where, str(one.values)): one for head in heads for one in head.issues}
+    return Head(
+        _once(line for head in heads for line in head.model),
+        tuple(issues.values()),
+        _once(line for head in heads for line in head.assumed),
+        _once(line for head in heads for line in head.noted),
+    )
+
+
+def head_of(
+    building: Building,
+    spaces: Sequence[Space] = (),
+    systems: Mapping[str, States] | None = None,
+    weather: Weather | None = None,
+    *,
+    notes: Iterable[str] = (),
+    light_only: bool = False,
+) -> Head:
+    """The head of what is computed of a building.
+
+    Args:
+        spaces: the rooms that are computed; systems: of their windows, by GUID.
+        notes: further assumptions; light_only: neither U nor g of the systems is used.
+    """
+    systems = systems or {}
+    windows = [w for space in spaces for w in space.windows if w.guid in systems]
+    used = {id(one): one for states in systems.values() for one in states}.values()
+    assumed = [
+        *notes,
+        *source_notes(window_sources(windows, systems)),
+        *system_notes(used, light_only=light_only),
+        *([] if weather is None else [*weather.notes, *site_notes(building, weather)]),
+    ]
+    return Head(model_lines(building), building.issues, _once(assumed), model_notes(building))
+
+
+def model_lines(building: Building) -> tuple[str, ...]:
+    """Rooms and glass that were read; with the verdict where the reader gives an account."""
+    if building.account is not None:
+        return building.account.lines
+    glass = sum(window.area for window in building.windows)
+    return (
+        Note("Rooms read: {count}", count=len(building.spaces)),
+        Note("Glass: {area:.1f} m2 in {count} windows", area=glass, count=len(building.windows)),
+    )
+
+
+def _issue_lines(issues: Iterable[Issue], severity: str, audience: Audience) -> list[str]:
+    """The issues of a severity by kind, the largest glass area first."""
+    kinds = ranked([issue for issue in issues if issue.severity == severity])
+    lines = [_issue_line(one, audience) for one in kinds[:SHOWN]]
+    if len(kinds) > SHOWN:
+        count = sum(one.count for one in kinds[SHOWN:])
+        lines.append(
+            Note(
+                "{count} more of {kinds} other kinds; cfs check lists all",
+                count=count,
+                kinds=len(kinds) - SHOWN,
+            )
+        )
+    return lines
+
+
+def _issue_line(one: Ranked, audience: Audience) -> str:
+    text = one.text(audience, Note)
+    parts = {"what": text.what, "effect": text.effect}
+    if text.fix:
+        line = Note("{what}: {effect}; {fix}", fix=text.fix, **parts)
+    else:
+        line = Note("{what}: {effect}", **parts)
+    if not one.glass:
+        return line
+    return Note("{line} ({area:.2f} m2 of glass)", line=line, area=one.glass)
+
+
+def model_notes(building: Building) -> tuple[str, ...]:
+    """Why the model cannot be used, what was joined, and what no result depends on."""
+    account = building.account
+    verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
+    issues = (one for one in building.issues if one.severity == "unused" or one.code in NOTED)
+    return (*verdict, *map(issue_note, issues))
+
+
+def unused_notes(building: Building) -> tuple[str, ...]:
+    """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
+    parts = (building.uses, building.grids, building.views)
+    if not any(map(len, parts)) or building.file is None:
+        return ()
+    note = Note(
+        "{file} contains {uses} uses of rooms, {grids} sensor grids and {views} views; they are "
+        "not "
+        "used here.",
+        file=building.file.name,
+        uses=len(building.uses),
+        grids=len(building.grids),
+        views=len(building.views),
+    )
+    return (note,)
+
+
+def tree_notes(building: Building) -> tuple[str, ...]:
+    """How much light the trees outdoors let pass."""
+    return tuple(issue_note(issue) for issue in building.issues if issue.code == TREES)
+
+
+def _once(lines: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(lines))
+
+
+def system_notes(
+    systems: Iterable[FenestrationSystem], *, light_only: bool = False
+) -> tuple[str, ...]:
+    """What was assumed of fenestration systems: bands, see-through peaks, U, g and window model."""
+    systems = list(systems)
+    notes = [note for system in systems for note in (*system.notes, *_peak_note(system))]
+    for heat in [] if light_only else map(thermal_system, systems):
+        notes += [*heat.notes, heat.named_model]
+    return tuple(dict.fromkeys(notes))
+
+
+def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
+    """A sentence where the light that passes straight on is taken from the Klems patches."""
+    if system.angular is not None or system.tree is not None:
+        return ()
+    bsdf = system.visible.filled()
+    peak = float(through_peak(bsdf.transmission_front, bsdf.basis_in).transmittance[0])
+    if peak < LEAST_PEAK:
+        return ()
+    note = Note(
+        "{system}: direct sun and view out use the specular peak of the Klems patches, "
+        "transmittance "
+        "{peak:.2f} at normal incidence.",
+        system=system.name,
+        peak=peak,
+    )
+    return (note,)
+
+
+def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
+    """A sentence where building and weather lie far apart."""
+    if building.latitude_deg is None or building.longitude_deg is None:
+        return ()
+    north = building.latitude_deg - weather.latitude_deg
+    east = (building.longitude_deg - weather.longitude_deg + 180) % 360 - 180
+    if max(abs(north), abs(east)) <= FAR_SITE_DEG:
+        return ()
+    note = Note(
+        "The site of the building ({north:.1f} N, {east:.1f} E) is far from the weather station "
+        "{station} ({station_north:.1f} N, {station_east:.1f} E); the solar positions are those of "
+        "the weather station.",
+        north=building.latitude_deg,
+        east=building.longitude_deg,
+        station=weather.site,
+        station_north=weather.latitude_deg,
+        station_east=weather.longitude_deg,
+    )
+    return (note,)
