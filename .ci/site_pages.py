@@ -20,7 +20,7 @@ from mkdocs.structure.pages import Page
 
 REPOSITORY = Path(__file__).parent.parent
 PACKAGES = ("scenes", "bim", "mitsuba_cfs", "thermal")
-NOT_PUBLIC = ("scenes/evidence", "scenes/commands")  # not in the wheel; said by `cfs --help`
+NOT_PUBLIC = ("scenes/commands",)  # described by `cfs --help`
 PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "CONTRIBUTING.md",
          "CHANGELOG.md": "CHANGELOG.md"}  # fmt: skip
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#|/)([^)#\s]+)")  # relative: no scheme, no anchor alone

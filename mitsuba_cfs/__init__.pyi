@@ -71,6 +71,6 @@ from .surfaces import (
     WindowGroup as WindowGroup,
     WindowSurface as WindowSurface,
 )
-from .trace.daylight_matrix import daylight_matrix as daylight_matrix
-from .trace.estimate import Estimate as Estimate, Stopping as Stopping
-from .trace.view_matrix import view_matrix as view_matrix
+from .trace.matrices.daylight import daylight_matrix as daylight_matrix
+from .trace.kernels.estimate import Estimate as Estimate, Stopping as Stopping
+from .trace.matrices.view import view_matrix as view_matrix

@@ -91,7 +91,7 @@ def sun_beams(
     Args:
         beams: for each group what of its T goes straight on, T_b [K, K],
             `mitsuba_cfs.bsdf.klems_peak.held_beams`.
-        through_sun: [G, H] tau(sun), `mitsuba_cfs.trace.direct_sun.through_beams`.
+        through_sun: [G, H] tau(sun), `mitsuba_cfs.trace.sun.direct.through_beams`.
         direct_daylight: D_d [G, K, P].
         sun: s_d [P, H], the sun alone on the sky's patches.
     """

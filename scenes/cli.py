@@ -8,13 +8,12 @@ import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module, metadata
-from importlib.util import find_spec
 
 import click
 
 from scenes.streams import open_streams
 
-# name: help in one line. The module <name> of one of PLACES defines `command`.
+# name: help in one line. The module scenes.commands.<name> defines `command`.
 COMMANDS = {
     "run": "IFC, weather and fenestration to daylight, glare, heat and comfort.",
     "comply": "Rooms against EN 17037, LM-83, LEED, BREEAM: a dossier that prints.",
@@ -31,9 +30,7 @@ COMMANDS = {
     "study": "Many variants from one study file.",
     "pv": "Yield of the photovoltaic modules of a building.",
     "calibrate": "What each method costs on this machine.",
-    "bench": "Accuracy and speed against other programs, on this machine.",
 }
-PLACES = ("scenes.commands", "scenes.evidence")  # the second comes with the repository only
 USAGE, FAILED, INTERRUPTED = 2, 1, 130
 SIGNALLED = 128  # and the signal's number
 # OpenBLAS reads it when NumPy is loaded: its threads wait for work in 2^4 turns of a loop, not in
@@ -51,23 +48,17 @@ class Terminated(BaseException):
         super().__init__(number)
 
 
-def _module(name: str) -> str | None:
-    """The module that defines a subcommand; None where this installation has none."""
-    modules = (f"{place}.{name}" for place in PLACES if find_spec(place))
-    return next((module for module in modules if find_spec(module)), None)
-
-
 class LazyGroup(click.Group):
     """A group that imports a subcommand's module only when that subcommand is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """The subcommands whose module is there, in the order of the table."""
-        return [name for name in COMMANDS if _module(name)]
+        """The subcommands, in the order of the table."""
+        return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The subcommand, imported now; None if there is no such one."""
-        module = _module(cmd_name) if cmd_name in self.list_commands(ctx) else None
-        return None if module is None else import_module(module).command
+        known = cmd_name in COMMANDS
+        return import_module(f"scenes.commands.{cmd_name}").command if known else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the subcommands by the table, without importing them."""

@@ -8,7 +8,6 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).parent.parent
 PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
-EVIDENCE = "scenes/evidence/"  # imports the product, never the other way
 MODULES = sorted(path for package in PACKAGES for path in (REPOSITORY / package).rglob("*.py"))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenes.evidence.benchmarks.radiance import (
+from tests.benchmarks.radiance import (
     environment,
     polygon,
     read_float_matrix,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.modules import EVIDENCE, MODULES, PACKAGES, REPOSITORY, dotted, file_name, imports
+from tests.modules import MODULES, PACKAGES, REPOSITORY, dotted, file_name, imports
 
 MAY_IMPORT = {
     "mitsuba_cfs": {"mitsuba_cfs"},
@@ -28,8 +28,6 @@ TRACING = (
     "mitsuba_cfs/bsdf/generate.py",
     "mitsuba_cfs/bsdf/tensor_plugin.py",
     "mitsuba_cfs/bsdf/traced_",
-    "scenes/evidence/benchmarks/",
-    "scenes/evidence/validation/",
     "scenes/commands/self_test.py",
 )
 # Solvers: they call the tracers, and so start Dr.Jit where they are imported.
@@ -44,7 +42,7 @@ SOLVERS = tuple(
         "window_reflection",
     )
 )  # fmt: skip
-IFC = ("bim/ifc/", "scenes/demo/", "scenes/evidence/")
+IFC = ("bim/ifc/", "scenes/demo/")
 PLOTTING = ("scenes/",)
 LIMITED = {
     "mitsuba": TRACING,
@@ -52,7 +50,7 @@ LIMITED = {
     "ifcopenshell": IFC,
     "matplotlib": PLOTTING,
 }
-LONGEST_MODULE = 400
+LONGEST_MODULE = 600  # advice: a concept that needs more says why
 CATCH_ALL_NAMES = {"utils.py", "util.py", "common.py", "helpers.py", "misc.py"}
 
 
@@ -68,8 +66,8 @@ def _faults(name: str, source: str) -> list[str]:
             faults.append(f"{name}:{line}: {package} must not import {imported}")
         if imported in LIMITED and not name.startswith(LIMITED[imported]):
             faults.append(f"{name}:{line}: {imported} only in {', '.join(LIMITED[imported])}")
-        if not name.startswith(EVIDENCE) and f"{whole}.".startswith("scenes.evidence."):
-            faults.append(f"{name}:{line}: {EVIDENCE} is no part of it")
+        if imported == "tests":
+            faults.append(f"{name}:{line}: the product does not import its tests")
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and any(alias.name == "*" for alias in node.names):
             faults.append(f"{name}:{node.lineno}: import *")
@@ -102,10 +100,10 @@ def test_module_keeps_to_the_rules(path: Path) -> None:
         ("bim/x.py", "import matplotlib.pyplot as plt"),
         ("bim/x.py", "from bim.model import *"),
         ("bim/x.py", "from . import model"),
-        ("scenes/x.py", "from scenes import evidence"),
-        ("scenes/room/x.py", "def f():\n    from scenes.evidence.benchmarks import harness"),
+        ("scenes/x.py", "from tests import validation"),
+        ("scenes/room/x.py", "def f():\n    from tests.benchmarks import harness"),
         ("bim/utils.py", ""),
-        ("bim/x.py", "x = 1\n" * 401),
+        ("bim/x.py", "x = 1\n" * 601),
         ("bim/x.py", "def f():\n    print(1)\n"),
     ],
 )
@@ -122,7 +120,7 @@ def test_the_wheel_holds_exactly_the_four_packages() -> None:
     expected = {pattern for package in PACKAGES for pattern in (package, f"{package}.*")}
     found = settings["packages"]["find"]
     assert set(found["include"]) == expected
-    assert set(found["exclude"]) == {"scenes.evidence", "scenes.evidence.*"}
+    assert "exclude" not in found
 
 
 def test_every_folder_of_modules_is_a_package() -> None:

@@ -55,7 +55,7 @@ def given(page: str) -> dict:
     from mitsuba_cfs.bsdf.xml import read_bsdf_xml
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.sky.patches import ReinhartSky
-    from mitsuba_cfs.trace.systems import sun_scattering
+    from mitsuba_cfs.trace.kernels.scattering import sun_scattering
     from scenes.cost import room
 
     P, K, H = ReinhartSky(4).size, KLEMS_FULL.size, 4

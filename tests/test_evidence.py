@@ -10,7 +10,7 @@ DOCS = REPOSITORY / "docs"
 SAID = ("- Judge:", "- Shared:", "- Cannot show:")
 # Heads of tables that claim nothing: what there is, what is asked for, what is written
 NO_EVIDENCE = {
-    "bim.md": "all", "formats.md": "all", "glossary.md": "all", "quickstart.md": "all",
+    "architecture.md": "all", "bim.md": "all", "formats.md": "all", "glossary.md": "all", "quickstart.md": "all",
     "validation.md": {"| subject | judged by | page |"},
     "daylight.md": {"| function | gives |"},
     "glare.md": {

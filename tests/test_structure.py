@@ -10,7 +10,7 @@ from graphlib import CycleError, TopologicalSorter
 
 import pytest
 
-from tests.modules import EVIDENCE, MODULES, dotted, file_name, imports
+from tests.modules import MODULES, dotted, file_name, imports
 
 # The ranks of what lies directly in a package, lowest first: who imports must stand higher than
 # what it imports.  What shares a rank knows nothing of the others there.
@@ -24,6 +24,7 @@ RANKS = {
         {"picture_year", "trace"},
         {"methods"},
     ),
+    "mitsuba_cfs.trace": ({"kernels"}, {"matrices"}, {"sun"}, {"paths"}, {"pictures"}),
     "scenes": (
         {"language"},
         {"demo", "figures", "plausible", "quick", "result_folder", "results", "streams",
@@ -39,7 +40,6 @@ RANKS = {
         {"study_report"},
         {"commands"},
         {"cli"},
-        {"evidence"},
     ),
 }  # fmt: skip
 MOST_POSITIONAL = 6
@@ -55,25 +55,30 @@ def _tree(source: str) -> ast.Module:
     return ast.parse(source)
 
 
-def _part(module: str) -> str:
-    """What lies directly in a package and holds a module; nothing for the package's face."""
-    return module.partition(".")[2].partition(".")[0]
+def _part(module: str, package: str) -> str:
+    """The part directly in a package that a module belongs to; empty for the package itself."""
+    return module.removeprefix(package).removeprefix(".").partition(".")[0]
 
 
 def _rank_faults(name: str, source: str) -> list[str]:
-    """Imports of a module from parts of its package that stand no lower than its own."""
-    package, module = name.partition("/")[0], dotted(name)
-    levels = RANKS.get(package, ())
-    rank = {part: level for level, parts in enumerate(levels) for part in parts}
-    rank[""] = len(levels)  # the face
-    faults = []
+    """Imports of a module from parts of its packages that do not rank lower than its own part."""
+    module = dotted(name)
+    packages = [package for package in RANKS if f"{module}.".startswith(f"{package}.")]
+    faults = [fault for package in packages for fault in _upward(package, module, source)]
+    return [f"{name}:{line}: {words}" for line, words in dict.fromkeys(faults)]
+
+
+def _upward(package: str, module: str, source: str) -> Iterator[tuple[int, str]]:
+    """Line and message of each import that goes up within one package."""
+    rank = {part: level for level, parts in enumerate(RANKS[package]) for part in parts}
+    rank[""] = len(RANKS[package])  # the package's face
+    importer = _part(module, package)
     for imported, line in imports(_tree(source)):
-        mine, other = _part(module), _part(imported)
-        if imported.partition(".")[0] != package or not levels or mine == other:
+        other = _part(imported, package)
+        if not f"{imported}.".startswith(f"{package}.") or importer == other:
             continue
-        if rank.get(mine, -1) <= rank.get(other, rank[""]):
-            faults.append(f"{name}:{line}: {package}.{other} does not stand below {package}.{mine}")
-    return list(dict.fromkeys(faults))
+        if rank.get(importer, -1) <= rank.get(other, rank[""]):
+            yield line, f"{package}.{other} does not stand below {package}.{importer}"
 
 
 def _circle(sources: Mapping[str, str]) -> list[str]:
@@ -95,8 +100,6 @@ def _repeated_classes(sources: Mapping[str, str]) -> dict[str, list[str]]:
     """Public class names that several modules of the product have, with these."""
     found: dict[str, list[str]] = defaultdict(list)
     for name, source in sources.items():
-        if name.startswith(EVIDENCE):  # scripts beside the product, not in the wheel
-            continue
         for node in ast.walk(_tree(source)):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found[node.name].append(name)
@@ -133,7 +136,7 @@ def _system_words(name: str, source: str) -> Iterator[str]:
 
 def test_errors_of_the_system_are_said_in_words() -> None:
     apart = ("bim/bonsai/",)  # has nothing of this program
-    sources = {n: s for n, s in SOURCES.items() if not n.startswith((*apart, EVIDENCE))}
+    sources = {n: s for n, s in SOURCES.items() if not n.startswith(apart)}
     assert not [fault for module in sources.items() for fault in _system_words(*module)]
 
 
@@ -145,7 +148,7 @@ def test_modules_import_only_from_below() -> None:
 @pytest.mark.parametrize("package", RANKS)
 def test_the_ranks_hold_each_part_once(package: str) -> None:
     modules = (dotted(name) for name in SOURCES)
-    parts = {_part(m) for m in modules if m.startswith(f"{package}.")}
+    parts = {_part(m, package) for m in modules if m.startswith(f"{package}.")}
     assert sorted(part for level in RANKS[package] for part in level) == sorted(parts)
 
 
@@ -165,17 +168,22 @@ def test_no_function_takes_many_positional_parameters() -> None:
 @pytest.mark.parametrize(
     ("name", "source"),
     [
-        ("mitsuba_cfs/files.py", "from mitsuba_cfs.trace import scene"),  # upwards
+        ("mitsuba_cfs/files.py", "from mitsuba_cfs.trace.kernels import scene"),  # upwards
         ("mitsuba_cfs/sky/x.py", "import mitsuba_cfs.bsdf.klems"),  # aside
         ("mitsuba_cfs/sky/x.py", "import mitsuba_cfs.new"),  # to what has no rank
         ("mitsuba_cfs/new.py", "from mitsuba_cfs.errors import DataError"),  # from what has none
         ("mitsuba_cfs/methods/x.py", "import mitsuba_cfs as cfs"),  # the face
-        ("mitsuba_cfs/trace/x.py", "from mitsuba_cfs import methods"),
-        ("mitsuba_cfs/trace/x.py", "def f():\n    from mitsuba_cfs.methods.glare import pictures"),
+        ("mitsuba_cfs/trace/kernels/x.py", "from mitsuba_cfs import methods"),
+        ("mitsuba_cfs/trace/kernels/x.py", "import mitsuba_cfs.trace.matrices.view"),
+        ("mitsuba_cfs/trace/sun/x.py", "from mitsuba_cfs.trace import paths"),
+        (
+            "mitsuba_cfs/trace/sun/x.py",
+            "def f():\n    from mitsuba_cfs.methods.glare import pictures",
+        ),
         ("scenes/results.py", "if TYPE_CHECKING:\n    from scenes.report.page import write_report"),
         ("scenes/heat/x.py", "from importlib import import_module\nimport_module('scenes.study')"),
         ("scenes/study/x.py", "from scenes.commands.parameters import seed_option"),
-        ("scenes/commands/x.py", "from scenes.evidence import bench"),
+        ("scenes/commands/x.py", "from scenes.cli import run"),
     ],
 )
 def test_planted_rank_is_found(name: str, source: str) -> None:
@@ -203,7 +211,6 @@ def test_planted_class_name_is_found() -> None:
     assert not _repeated_classes(one | {"bim/y.py": "class Windows: ...\nclass _Part: ..."})
     again = "@dataclass\nclass Window: ..."
     assert _repeated_classes(one | {"bim/y.py": again}) == {"Window": ["bim/x.py", "bim/y.py"]}
-    assert not _repeated_classes(one | {f"{EVIDENCE}y.py": again})
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Matrices kept on disk by the hash of everything they depend on, finished or half done.
 
-A file holds the state of `mitsuba_cfs.trace.estimate.accumulate`: a finished matrix is read back, a
-killed run goes on after the last batch that was saved.
+A file holds the state of `mitsuba_cfs.trace.kernels.estimate.accumulate`: a finished matrix is read
+back, a killed run goes on after the last batch that was saved.
 """
 
 from __future__ import annotations

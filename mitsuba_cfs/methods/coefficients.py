@@ -3,10 +3,10 @@
     V T D + B - V_d diag(tau) D
 
 B is the outdoors that the sensors see straight through the direct transmittance tau of a window
-group.  It replaces V_d and D there: patches of 10 to 15 degrees blur the sky that a sensor sees (11 %
-of a sensor's light beside a small opening), and means over a group blur edges that only some of its
-points see, and the lobe of a glossy facade.  The three-phase method takes B for groups in parts, for
-glass to another room, and where the outdoors is glossy; elsewhere it is the sum over patches alone.
+group.  It replaces V_d and D there: patches of 10 to 15 degrees blur the sky that a sensor sees
+(11 % of a sensor's light beside a small opening), and means over a group blur edges that only some
+of its points see, and the lobe of a glossy facade.  The three-phase method takes B for groups in
+parts, for glass to another room, and where the outdoors is glossy; elsewhere the sum over patches.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from mitsuba_cfs.methods.window_reflection import (
     through,
     with_exchange_of,
 )
-from mitsuba_cfs.trace.borrowed_view import borrowed_view
-from mitsuba_cfs.trace.direct_sun import patch_beams
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.straight_view import straight_view_matrix
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.scattering import patch_beams
+from mitsuba_cfs.trace.matrices.adjacent_view import borrowed_view
+from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
 BATCHES = 4
 HELD = 0.98  # share of a direct transmittance that T's diagonal has at the least
@@ -78,7 +78,7 @@ def group_coefficients(
 
 
 def _of_group(matrices: PhaseMatrices, optics: SystemOptics, g: int) -> GroupCoefficients:
-    view, direct_view = sensor_matrices(matrices)
+    view, _ = sensor_matrices(matrices)
     daylight, beam = matrices.daylight.values, direct_transmittance(matrices, optics, g)
     straight = _straight_view(matrices, optics, g, beam)
     whole = np.zeros((len(view.values), daylight.shape[-1]))

@@ -21,8 +21,8 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.lit_room import Sky
-from mitsuba_cfs.trace.picture_paths import colour_picture
+from mitsuba_cfs.trace.paths.path_scene import Sky
+from mitsuba_cfs.trace.pictures.point_in_time import colour_picture
 
 FEWER = 8  # paths of the luminance for one of a band: colour varies less than light
 OVERCAST_K = 6514.0  # correlated colour temperature of an overcast sky
@@ -111,7 +111,7 @@ def _rgb(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
 def has_colour(bands: Sequence[DaylightScene], sky: AnnualSky, hour: int) -> bool:
     """Whether a picture of the scenes by red, green and blue in one of the hours L is not grey.
 
-    It is grey where all surfaces reflect the bands equally and all of the hour's daylight is neutral.
+    It is grey where all surfaces reflect the bands equally and the hour's daylight is neutral.
     """
     first, *others = bands
     for other in others:

@@ -230,7 +230,9 @@ def group_shares(light: PhaseLight | SeasonalLight) -> Array:
 def with_view(light: PhaseLight | SeasonalLight, view: View) -> PhaseLight | SeasonalLight:
     """The same light for another eye: what depends on the windows alone is not computed again."""
     if isinstance(light, SeasonalLight):
-        return replace(light, lights=tuple(with_view(_by_phases(one), view) for one in light.lights))
+        return replace(
+            light, lights=tuple(with_view(_by_phases(one), view) for one in light.lights)
+        )
     return replace(light, matrices=with_eye(light.matrices, view), sensors=None)
 
 

@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from mitsuba_cfs.trace.lit_room import AngularBeam, PathOptics
-from mitsuba_cfs.trace.sun_discs import Scattering
-from mitsuba_cfs.trace.systems import (
+from mitsuba_cfs.trace.kernels.scattering import (
+    AngularBeam,
     AngularScattering,
-    lit_system,
+    Scattering,
     sun_scattering,
-    without_peaks,
 )
+from mitsuba_cfs.trace.paths.path_scene import PathOptics
+from mitsuba_cfs.trace.paths.systems import lit_system, without_peaks
 
 PATCH_ANGLES = 32  # of incidence in each patch, for its mean
 OVER = 1e-3  # by which shares may be more than 1, for rounding

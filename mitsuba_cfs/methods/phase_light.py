@@ -57,10 +57,11 @@ from mitsuba_cfs.methods.window_reflection import reflects_outdoors, with_exchan
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.scene import kept_scene
-from mitsuba_cfs.trace.sun_ways import shining
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.scattering import patch_beams, through_beams
+from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
+from mitsuba_cfs.trace.sun.specular_paths import shining
 
 SUN_BATCHES = 4  # of C_ds
 State = NDArray[np.int64]  # [G, L] state of each window group in each hour, or [L] of all groups
@@ -171,7 +172,9 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
     light = with_reflected_sun(light)
     coefficients = group_coefficients(light.matrices, light.systems)
     if not light.matrices.five_phase:
-        return replace(light, sensors=tuple(tuple(map(SensorLight, group)) for group in coefficients))
+        return replace(
+            light, sensors=tuple(tuple(map(SensorLight, group)) for group in coefficients)
+        )
     hours = _shining_hours(light)
     suns = _direct_sun(light, hours, progress)
     beams = [[bool(beam_matrix(one.optics).any()) for one in group] for group in coefficients]

@@ -27,19 +27,19 @@ from mitsuba_cfs.methods.view_cache import cached_view, view_is_cached
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.trace.annual_pictures import ViewMatrices, view_matrices
-from mitsuba_cfs.trace.borrowed_daylight import borrowed_daylight
-from mitsuba_cfs.trace.borrowed_picture import RoomShown, borrowed_picture
-from mitsuba_cfs.trace.borrowed_view import LendingRoom, RoomBehind
-from mitsuba_cfs.trace.cell_daylight import BATCHES as CELL_BATCHES
-from mitsuba_cfs.trace.cell_daylight import cell_daylight
-from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-from mitsuba_cfs.trace.estimate import Estimate, Stopping, joined
-from mitsuba_cfs.trace.patch_light import PatchLight
-from mitsuba_cfs.trace.room_sun import SunElements, window_elements
-from mitsuba_cfs.trace.scene import kept_scene
-from mitsuba_cfs.trace.view_matrix import view_matrix
-from mitsuba_cfs.trace.window_exchange import outdoor_exchange, window_exchange
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
+from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.matrices.adjacent_daylight import borrowed_daylight
+from mitsuba_cfs.trace.matrices.adjacent_view import LendingRoom, RoomBehind
+from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
+from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
+from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchange
+from mitsuba_cfs.trace.matrices.view import view_matrix
+from mitsuba_cfs.trace.pictures.adjacent import RoomShown, borrowed_picture
+from mitsuba_cfs.trace.pictures.annual import ViewMatrices, view_matrices
+from mitsuba_cfs.trace.sun.room_sun import SunElements, window_elements
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
 
 BATCHES = 8  # independent repetitions that the standard errors come from
@@ -112,7 +112,9 @@ def phase_matrices(
         raise UnknownMethodError(f"needs {sorted(unknown)}: expected some of {', '.join(METRICS)}")
     sampling = sampling or Sampling()
     parts = _parts(scene, sampling, cache)
-    matrices = _outdoors(scene, sampling, parts, five_phase=five_phase, cache=cache, progress=progress)
+    matrices = _outdoors(
+        scene, sampling, parts, five_phase=five_phase, cache=cache, progress=progress
+    )
     return with_needs(matrices, needs, progress=progress)
 
 

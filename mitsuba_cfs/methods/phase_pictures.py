@@ -1,7 +1,7 @@
 """Luminance pictures of a scene's view by the phase methods, in some hours of a sky.
 
-    three-phase    L = V T D s
-    five-phase     L = V T D s - V_d T D_d s_d + the sun at its own angle, its disc in each pixel
+three-phase    L = V T D s
+five-phase     L = V T D s - V_d T D_d s_d + the sun at its own angle, its disc in each pixel
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from mitsuba_cfs.methods.window_reflection import (
     with_exchange_of,
 )
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.trace.annual_pictures import FivePhasePictures, ViewMatrices
-from mitsuba_cfs.trace.borrowed_picture import RoomShown
-from mitsuba_cfs.trace.borrowed_view import RoomBehind
-from mitsuba_cfs.trace.patch_light import PatchLight
-from mitsuba_cfs.trace.picture_beam import BeamLight, beam_light
-from mitsuba_cfs.trace.picture_outdoors import outdoors
-from mitsuba_cfs.trace.picture_sun import PictureSun
+from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.matrices.adjacent_view import RoomBehind
+from mitsuba_cfs.trace.pictures.adjacent import RoomShown
+from mitsuba_cfs.trace.pictures.annual import FivePhasePictures, ViewMatrices
+from mitsuba_cfs.trace.pictures.outdoors import outdoors
+from mitsuba_cfs.trace.sun.picture_beam import BeamLight, beam_light
+from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
 T = TypeVar("T")
 

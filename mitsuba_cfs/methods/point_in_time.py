@@ -15,11 +15,11 @@ from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.lit_room import LitRoom, Sky
-from mitsuba_cfs.trace.path_disc import disc_seen, with_disc
-from mitsuba_cfs.trace.picture_paths import point_in_time_picture
-from mitsuba_cfs.trace.point_in_time import point_in_time
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
+from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
 BATCHES = 4
 Array = NDArray[np.float64]

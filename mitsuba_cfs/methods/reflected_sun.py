@@ -28,10 +28,10 @@ from mitsuba_cfs.methods.coefficients import (
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.trace.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.reflected_sun import outdoor_light, view_shares, window_shares
-from mitsuba_cfs.trace.room_beam import RoomCells, room_cells, room_light, room_shares
-from mitsuba_cfs.trace.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
+from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.sun.reflected import outdoor_light, view_shares, window_shares
+from mitsuba_cfs.trace.sun.room_beam import RoomCells, room_cells, room_light, room_shares
 
 BATCHES = 4  # each with its own paths and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces

@@ -17,10 +17,10 @@ from mitsuba_cfs.files import opened_arrays, replacing
 from mitsuba_cfs.glare.annual import PictureMatrix
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
-from mitsuba_cfs.trace.annual_pictures import ViewMatrices, ViewNoise, view_matrices
-from mitsuba_cfs.trace.patch_light import PatchLight
-from mitsuba_cfs.trace.room_sun import EdgePlaces, SunElements, SunlitRows
-from mitsuba_cfs.trace.sun_paths import Places
+from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
+from mitsuba_cfs.trace.sun.lit_points import Places
+from mitsuba_cfs.trace.sun.room_sun import EdgePlaces, SunElements, SunlitRows
 
 SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
 LARGEST = 256 << 20  # [bytes] of a file; larger ones would push out all the others

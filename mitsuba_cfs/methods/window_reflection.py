@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, with_exchange
-from mitsuba_cfs.trace.estimate import Estimate
+from mitsuba_cfs.trace.kernels.estimate import Estimate
 
 # of reflection in the windows: a fifth is below 0.001 in a bright room with a front of glass
 ORDERS = 4

@@ -37,14 +37,14 @@ from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import States
-from scenes.room.drawn_shades import traced_building
-from scenes.room.equal_rooms import corner
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
+from scenes.room.series import RoomSeries, corner
+from scenes.room.skies import skies_for
+from scenes.room.windows import traced_building
 from scenes.run.building import building_of
 from scenes.run.inputs import named_spaces, no_window
 from scenes.run.notes import unused_notes
-from scenes.run.rooms import RoomSeries
 
 # the parts of a room's light, as the dossier's last line names their seconds
 PARTS = TRACING, SUMS, GLARE, HEAT = (

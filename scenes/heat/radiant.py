@@ -12,8 +12,8 @@ from bim.sensors import view_point
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.matrices.cache import MatrixCache, kept_or_found
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.estimate import cache_entry
-from mitsuba_cfs.trace.view_factors import person_view_factors, view_factors
+from mitsuba_cfs.trace.kernels.estimate import cache_entry
+from mitsuba_cfs.trace.matrices.view_factors import person_view_factors, view_factors
 from thermal.balance import ZoneResult
 from thermal.comfort import mean_radiant_temperature, operative_temperature, room_centre_mrt
 

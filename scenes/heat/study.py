@@ -22,16 +22,17 @@ from scenes.fenestration.systems import States
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.design_days import design_loads
+from scenes.heat.energy import energy_by_month, energy_summary, room_powers
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
-from scenes.room.drawn_shades import traced_building
-from scenes.room.energy import energy_by_month, energy_summary, room_powers
-from scenes.room.humidity import felt_by, room_humidity
+from scenes.room.heat import felt_by, room_humidity
+from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
-from scenes.room.room import RoomSimulation, skies_for
-from scenes.room.stated_use import stated_note, with_stated_uses
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
+from scenes.room.windows import traced_building
 from scenes.room.zone import RoomZone, balances, coupled
 from scenes.run.inputs import chosen_spaces, named_spaces
 from scenes.run.notes import model_notes

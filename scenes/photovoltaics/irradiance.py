@@ -16,8 +16,8 @@ from mitsuba_cfs.progress import Progress, item, silent
 from mitsuba_cfs.sky.matrix import series_matrix, sky_series
 from mitsuba_cfs.sky.three_part import three_part
 from mitsuba_cfs.sky.weather import Weather
-from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
-from mitsuba_cfs.trace.sun_shade import sunlit_shares
+from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
+from mitsuba_cfs.trace.sun.shade import sunlit_shares
 from scenes.photovoltaics.modules import PvModule
 
 WHOLE_DEGREES = np.arange(91.0)

@@ -12,9 +12,8 @@ from bim.model import Building, Face, Space, Window
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.room.envelope_tables import GroundTable, NeighbourTable
 from scenes.room.operation_hours import OperationHours
-from scenes.room.operation_tables import OperationTables
+from scenes.room.operation_tables import GroundTable, NeighbourTable, OperationTables
 from thermal.errors import ThermalInputError
 from thermal.ground import (
     SOILS,

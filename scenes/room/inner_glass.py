@@ -28,7 +28,7 @@ from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
 from mitsuba_cfs.methods.seasonal_light import SeasonalLight
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.trace.systems import AngularScattering
+from mitsuba_cfs.trace.kernels.scattering import AngularScattering
 from scenes.fenestration.stated import StatedValues, glazing_system
 from scenes.fenestration.systems import States
 from scenes.room.windows import room_windows

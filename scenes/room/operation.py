@@ -1,19 +1,23 @@
-"""An operation file: shading states and their control, gains, outdoor air, set points."""
+"""An operation file with its systems, and the use of rooms that a building's file states."""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from bim.model import Building, Space
+from bim.use import ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.pane_system import system_of_panes
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.tables import StateTable
 from scenes.fenestration.thermal_system import checked_system
-from scenes.room.operation_tables import OperationTables
+from scenes.room.operation_tables import PARTS, OperationTables, RoomsTable
+from scenes.room.schedules import ScheduleTable
 from scenes.toml_file import read_table, validated
 
 Tables = TypeVar("Tables", bound=OperationTables)
@@ -114,3 +118,132 @@ def check_states(operation: Operation, states: int) -> None:
             continue
         field, message = fault
         raise DataError(message, file=operation.file, field=f"control.{field}")
+
+
+Tables = TypeVar("Tables", bound=OperationTables)
+PREFIX = "of the building's file: "  # of its schedules' names, which an operation file has not
+
+
+def used_operation(operation: Operation | None, building: Building) -> Operation | None:
+    """The operation with what the building's file states of its rooms; None where none says any."""
+    if not building.uses or building.file is None:
+        return operation
+    tables = OperationTables() if operation is None else operation.tables
+    file = building.file if operation is None else operation.file
+    systems = () if operation is None else operation.systems
+    return Operation(file, with_stated_uses(tables, building), systems)
+
+
+def with_stated_uses(tables: Tables, building: Building) -> Tables:
+    """The tables with an entry for each room of which the building's file states a use.
+
+    Raises: `DataError` for a value that cannot be, naming the building's file.
+    """
+    if not building.uses:
+        return tables
+    file = building.file or Path(building.name)
+    stated = _Schedules()
+    entries = []
+    for space in building.spaces:
+        use = building.uses.get(space.guid)
+        if use is None:
+            continue
+        own = stated_fields(use, space, stated)
+        entries.append(validated(RoomsTable, _entry(tables, building, space, own), file))
+    update = {"rooms": (*entries, *tables.rooms), "schedules": stated.tables | tables.schedules}
+    return tables.model_copy(update=update)
+
+
+def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
+    """A sentence that rooms are used as the building's file says, where they are.
+
+    Args: before: the name of what goes before it.
+    """
+    count = sum(space.guid in building.uses for space in building.spaces)
+    if not count or building.file is None:
+        return ()
+    first = f"; what {before} says goes before" if before else ""
+    return (
+        f"Gains, air and set points of {count} of {len(building.spaces)} room(s) are those that "
+        f"{building.file.name} states{first}.",
+    )
+
+
+def _entry(
+    tables: OperationTables, building: Building, space: Space, own: dict[str, dict[str, Any]]
+) -> dict[str, Any]:
+    """The tables of one room: the building's, then the operation's own, then its `[[rooms]]`."""
+    chosen = tables.entry_of(building, space)
+    found: dict[str, Any] = {"spaces": (space.guid,)}
+    for part in PARTS:
+        said = getattr(tables, part).model_fields_set
+        fields = {key: value for key, value in own.get(part, {}).items() if key not in said}
+        if chosen is not None:
+            entry = getattr(chosen, part)
+            fields |= {key: getattr(entry, key) for key in entry.model_fields_set}
+        found[part] = fields
+    return found
+
+
+class _Schedules:
+    """Schedules of a file as tables, each once, by a name that no other has."""
+
+    def __init__(self) -> None:
+        self.tables: dict[str, ScheduleTable] = {}
+        self._names: dict[tuple[int, float], str] = {}
+        self._held: list[YearSchedule] = []  # so that no other gets the same id
+        self._counts: Counter[str] = Counter()
+
+    def name(self, schedule: YearSchedule, factor: float = 1.0) -> str:
+        """The name of a schedule times a number."""
+        key = (id(schedule), factor)
+        if key not in self._names:
+            self._held.append(schedule)
+            self._counts[schedule.name] += 1
+            count = self._counts[schedule.name]
+            name = f"{PREFIX}{schedule.name}{f' {count}' if count > 1 else ''}"
+            self._names[key] = name
+            self.tables[name] = ScheduleTable.held(schedule, factor)
+        return self._names[key]
+
+    def value(self, value: ScheduledValue, per: float) -> str | float:
+        """The name of the schedule of a quantity, divided by a number; or that alone."""
+        amount = value.peak / per
+        return self.name(value.share, amount) if amount and value.share is not None else amount
+
+
+def stated_fields(use: StatedUse, space: Space, schedules: _Schedules) -> dict[str, dict[str, Any]]:
+    """The fields of a room's tables by part, of what its use states."""
+    gains, air, loads = {}, {}, {}
+    area, changes = space.floor_area, space.volume / 3600.0
+    if use.persons is not None:
+        gains["persons"] = use.persons.peak
+        if use.persons.share is not None:
+            gains["occupied"] = schedules.name(use.persons.share)
+    for key, value in (("equipment_w_m2", use.equipment_w), ("lighting_w_m2", use.lighting_w)):
+        if value is not None:
+            gains[key] = schedules.value(value, area)
+    if use.lighting_w is not None and use.lighting_target_lx is None:
+        gains["lighting_dimmed"] = False
+    for key, value in (
+        ("infiltration_ach", use.infiltration_m3_s), ("ventilation_ach", use.ventilation_m3_s),
+    ):  # fmt: skip
+        if value is not None:
+            air[key] = schedules.value(value, changes)
+    for key, schedule in (("heating_c", use.heating_c), ("cooling_c", use.cooling_c)):
+        if schedule is not None:
+            loads[key] = schedules.name(schedule)
+    single = {
+        "gains": (gains, {"person_w": use.person_w, "person_vapour_g_h": use.person_vapour_g_h,
+                          "lighting_target_lx": use.lighting_target_lx,
+                          "radiant_share": use.radiant_share}),
+        "air": (air, {"infiltration_factors": use.infiltration_factors,
+                      "heat_recovery": use.heat_recovery}),
+        "loads": (loads, {"heating_limit_w": use.heating_limit_w,
+                          "cooling_limit_w": use.cooling_limit_w,
+                          "humidify_to": use.humidify_to, "dehumidify_to": use.dehumidify_to}),
+    }  # fmt: skip
+    return {
+        part: named | {key: value for key, value in plain.items() if value is not None}
+        for part, (named, plain) in single.items()
+    }

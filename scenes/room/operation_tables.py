@@ -1,23 +1,24 @@
-"""The tables of a TOML file that say how rooms are operated: states, control, gains, air, loads."""
+"""The tables of an operation file: states, control, gains, air, loads, envelope, comfort, plant."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.sky.heat_island import in_city
+from mitsuba_cfs.sky.weather import Weather
 from scenes import plausible
 from scenes.fenestration.tables import StateTable
-from scenes.room.air_tables import AirTable
-from scenes.room.envelope_tables import EnvelopeTable
-from scenes.room.heat_island import HeatIslandTable
-from scenes.room.load_tables import LoadsTable, PlantTable
 from scenes.room.schedules import (
     CLOCK,
     CalendarTable,
+    Hours,
     OrSchedule,
     ScheduleTable,
     clock_or_name,
@@ -27,6 +28,284 @@ from scenes.room.schedules import (
     unknown_name,
 )
 from scenes.toml_file import Positive, Share, TomlTable
+from thermal.ground import SHIELDS, SOILS
+from thermal.ventilation import BLAST, DOE2, DOOR_DISCHARGE, Leakage, aim2, sherman_grimsrud
+from thermal.zone import OUTSIDE_ABSORPTANCE, ROUGHNESS
+
+
+class HeatIslandTable(TomlTable):
+    """The street that the outdoor air is in, as of `mitsuba_cfs.sky.heat_island`."""
+
+    sky_view: Share
+    vegetation: Share
+    hourly_shares: Annotated[tuple[Share, ...], Field(min_length=24, max_length=24)]
+
+    def warmed(self, weather: Weather, file: Path | None) -> Weather:
+        """The weather with the air of the street; its notes say by how much.
+
+        Args: file: that states the table.
+
+        Raises: `DataError` out of the range of the equation.
+        """
+        try:
+            return in_city(weather, self.sky_view, self.vegetation, self.hourly_shares)
+        except ValueError as error:
+            raise DataError(str(error), file=file, field="heat_island") from error
+
+
+NAMED = {"constant": (1.0, 0.0, 0.0, 0.0), "doe-2": DOE2, "blast": BLAST}
+
+
+def _factors(value: Any) -> Any:
+    if isinstance(value, str) and value not in NAMED:
+        raise ValueError(f"expected four numbers or one of {', '.join(NAMED)}, got {value!r}")
+    return NAMED.get(value, value) if isinstance(value, str) else value
+
+
+Factor = Annotated[float, Field(ge=0)]
+
+
+class LeakageTable(TomlTable):
+    """Leaks found by a pressure test: an area at 4 Pa, or a coefficient with its exponent."""
+
+    area_cm2: Annotated[Positive, plausible.LEAK] | None = None
+    coefficient: Positive | None = None  # [m3/(s Pa^n)]
+    exponent: Annotated[float, Field(ge=0.5, le=1.0)] = 0.67
+    stack: Annotated[float, Field(ge=0, le=1)]
+    wind: Annotated[float, Field(ge=0, le=1)]
+    shelter: Annotated[float, Field(ge=0, le=1)] = 1.0  # of the wind, with `coefficient`
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> LeakageTable:
+        if (self.area_cm2 is None) == (self.coefficient is None):
+            raise ValueError("give either `area_cm2` or `coefficient`")
+        return self
+
+    def leakage(self) -> Leakage:
+        """The leaks as the balance takes them."""
+        if self.area_cm2 is not None:
+            return sherman_grimsrud(self.area_cm2, stack=self.stack, wind=self.wind)
+        return aim2(
+            self.coefficient, self.exponent,
+            stack=self.stack, wind=self.wind, shelter=self.shelter,
+        )  # fmt: skip
+
+
+class OpenedTable(TomlTable):
+    """Windows that are opened, EN 16798-7."""
+
+    # share of the glass that opens, while allowed; a schedule says its own hours
+    share: Annotated[float | str, OrSchedule(plausible.SHARE)] = 0.1
+    flow: Literal["single-sided", "cross"] = "single-sided"
+    when: Literal["always", "occupied"] = "occupied"  # a share that is a number
+    open_above_c: Annotated[float, plausible.TEMPERATURE] = 24.0
+    close_below_c: Annotated[float, plausible.TEMPERATURE] = 22.0
+    least_difference: Annotated[float, Field(ge=-20, le=20)] = 0.0  # above outdoors [K]
+    greatest_wind: Annotated[Positive, plausible.WIND] = 60.0  # [m/s]
+    least_outdoor_c: Annotated[float, plausible.OUTDOOR] = -30.0
+
+    @model_validator(mode="after")
+    def _do_not_cross(self) -> OpenedTable:
+        if self.close_below_c > self.open_above_c:
+            raise ValueError("close_below_c: lies above open_above_c")
+        return self
+
+
+class NeighbourAirTable(TomlTable):
+    """Air exchanged with a neighbour of known temperature, as much each way."""
+
+    temperature_c: Annotated[float | str, OrSchedule(plausible.TEMPERATURE)]
+    # of an opening through which warm air leaves above and cool air comes below: an open door
+    width: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    height: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    discharge: Annotated[Positive, Field(le=1)] = DOOR_DISCHARGE
+    open: Annotated[float | str, OrSchedule(plausible.SHARE)] = 1.0  # share of its width
+    m3_h: Annotated[float | str, OrSchedule(plausible.FLOW)] = 0.0  # whatever the temperatures
+
+    @model_validator(mode="after")
+    def _has_a_size_or_a_flow(self) -> NeighbourAirTable:
+        if (self.width is None) != (self.height is None):
+            raise ValueError("width and height belong together")
+        if self.width is None and self.m3_h == 0.0:
+            raise ValueError("give `width` and `height` of an opening, or `m3_h`")
+        return self
+
+
+class AirTable(TomlTable):
+    """Outdoor air."""
+
+    infiltration_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.5
+    # a, b, c, d: infiltration (a + b dT + c v + d v^2); "constant", "doe-2" or "blast"
+    infiltration_factors: Annotated[
+        tuple[Factor, Factor, Factor, Factor], BeforeValidator(_factors)
+    ] = NAMED["constant"]
+    leakage: LeakageTable | None = None  # besides the infiltration
+    windows: OpenedTable | None = None
+    night_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0  # by night
+    night: Hours = (0, 7)
+    # of a fan, while occupied; the name of a schedule says its own hours
+    ventilation_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0
+    heat_recovery: Share = 0.0  # of the fan's air
+    bypass_above_c: Annotated[float, plausible.TEMPERATURE] | None = None  # no recovery above
+    least_supply_c: Annotated[float, plausible.TEMPERATURE] | None = None  # heated to that
+    supply_c: Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)] = None
+    fan_w_m3_s: Annotated[float, plausible.FAN] = 0.0  # electricity of the fan
+    neighbour: tuple[NeighbourAirTable, ...] = ()  # rooms that are not simulated
+    # each way through every open door between coupled rooms [m3/s]; 0: the doors are shut
+    door_m3_s: Annotated[float, plausible.DOOR_FLOW] = 0.0
+
+    @model_validator(mode="after")
+    def _one_temperature(self) -> AirTable:
+        if self.supply_c is not None and (self.heat_recovery or self.least_supply_c is not None):
+            raise ValueError("supply_c: leaves nothing to recover or to heat")
+        return self
+
+
+SetPoint = Annotated[float | str | None, OrSchedule(plausible.TEMPERATURE)]
+Cop = Annotated[Positive, plausible.COP]
+
+
+class SlabTable(TomlTable):
+    """Pipes or wires in a construction of the room, in proportion to what its air lacks."""
+
+    faces: tuple[str, ...] = ("floor",)  # side of the box, or kind of faces; the biggest such one
+    depth: Annotated[Positive, plausible.LAYER] = 0.05  # below the inside face [m]
+    heating_c: SetPoint = None
+    cooling_c: SetPoint = None
+    heating_w_m2: Annotated[float, plausible.GAIN] = 60.0  # at full power
+    cooling_w_m2: Annotated[float, plausible.GAIN] = 40.0
+    band: Annotated[Positive, Field(le=20)] = 2.0  # from none to full power [K]
+
+
+class LoadsTable(TomlTable):
+    """Ideal heating and cooling; without set points the room floats."""
+
+    heating_c: SetPoint = None
+    cooling_c: SetPoint = None
+    heating_limit_w: Annotated[Positive, plausible.POWER] | None = None
+    cooling_limit_w: Annotated[Positive, plausible.POWER] | None = None
+    heating_radiant: Share = 0.0  # radiators 0.3, ceilings 0.6
+    cooling_radiant: Share = 0.0
+    slab: SlabTable | None = None
+    humidify_to: Annotated[float, plausible.PERCENT] | None = None  # relative humidity [%]
+    dehumidify_to: Annotated[float, plausible.PERCENT] | None = None
+
+    @model_validator(mode="after")
+    def _do_not_cross(self) -> LoadsTable:
+        if isinstance(self.heating_c, float) and isinstance(self.cooling_c, float):
+            if self.heating_c > self.cooling_c:
+                raise ValueError("the set points cross: heating_c lies above cooling_c")
+        low, high = self.humidify_to, self.dehumidify_to
+        if low is not None and high is not None and low > high:
+            raise ValueError("humidify_to: lies above dehumidify_to")
+        return self
+
+
+class PlantTable(TomlTable):
+    """What heat and cold cost: an ideal plant by its COP, and primary energy."""
+
+    # heat per final energy: a number, or pairs of outdoor temperature and COP between which it
+    # is linear
+    heating_cop: Cop | tuple[tuple[Annotated[float, plausible.OUTDOOR], Cop], ...] = 1.0
+    cooling_cop: Cop | tuple[tuple[Annotated[float, plausible.OUTDOOR], Cop], ...] = 3.0
+    heating_factor: Annotated[float, plausible.FACTOR] = 1.1  # primary per final energy
+    electricity_factor: Annotated[float, plausible.FACTOR] = 2.5  # of cooling, fans, lamps, plugs
+
+    @model_validator(mode="after")
+    def _rises(self) -> PlantTable:
+        for key in ("heating_cop", "cooling_cop"):
+            pairs = getattr(self, key)
+            if isinstance(pairs, tuple):
+                at = [temperature for temperature, _ in pairs]
+                if not at or any(b <= a for a, b in pairwise(at)):
+                    raise ValueError(f"{key}: expected pairs by rising outdoor temperature")
+        return self
+
+
+KINDS = ("slab", "suspended", "basement", "unheated basement")
+
+
+class BridgeTable(TomlTable):
+    """A thermal bridge to outdoors, along a line or at a point."""
+
+    name: str = ""
+    psi: Annotated[float, plausible.PSI] | None = None  # [W/(m K)]
+    length: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
+    chi: Annotated[float, plausible.CHI] | None = None  # [W/K]
+    number: Annotated[int, Field(ge=1)] = 1
+
+    @model_validator(mode="after")
+    def _line_or_point(self) -> BridgeTable:
+        if (self.psi is None) == (self.chi is None) or (self.psi is None) != (self.length is None):
+            raise ValueError("give either `psi` with its `length`, or `chi`")
+        return self
+
+    @property
+    def conductance(self) -> float:
+        """Its heat flow per kelvin [W/K]."""
+        each = self.chi if self.psi is None else self.psi * self.length
+        return self.number * each
+
+
+class GroundTable(TomlTable):
+    """The ground below a room by ISO 13370, of the whole building that it belongs to."""
+
+    kind: Literal[KINDS] = "slab"
+    area: Annotated[Positive, plausible.AREA] | None = None  # of the building's floor [m2]
+    perimeter: Annotated[Positive, plausible.PERIMETER]  # of it, exposed [m]
+    wall_thickness: Annotated[float, plausible.LAYER] = 0.3  # of the walls above [m]
+    soil: Literal[tuple(SOILS)] = "sand"  # ISO 13370: where nothing is known
+    conductivity: Annotated[Positive, plausible.CONDUCTIVITY] | None = None  # [W/(m K)]
+    heat_capacity: Annotated[Positive, plausible.SOIL_CAPACITY] | None = None  # [J/(m3 K)]
+    indoor_c: Annotated[float, plausible.TEMPERATURE] = 20.0  # the year's mean inside
+    # insulation at the edge of a slab: depth or width [m], resistance [m2 K/W]
+    edge: tuple[Positive, Annotated[float, plausible.RESISTANCE]] | None = None
+    edge_lies: Literal["vertical", "horizontal"] = "vertical"
+    depth: Annotated[Positive, plausible.DEPTH] | None = None  # of a basement's floor [m]
+    # above the ground outside: of the floor over a crawl space, of a cellar's walls [m]
+    height: Annotated[float, Field(ge=0), plausible.LENGTH] = 0.5
+    wall_u: Annotated[Positive, plausible.U_VALUE] = 1.0  # of those walls [W/(m2 K)]
+    vents: Annotated[float, Field(ge=0, le=0.5)] = 0.0015  # of a crawl space [m2/m]
+    shield: Literal[tuple(SHIELDS)] = "average"
+    # of what lies on the ground below a crawl space or cellar, and of a cellar's walls [m2 K/W]
+    below_resistance: Annotated[float, plausible.RESISTANCE] = 0.0
+    wall_resistance: Annotated[float, plausible.RESISTANCE] = 0.0
+
+    @model_validator(mode="after")
+    def _has_its_depth(self) -> GroundTable:
+        if (self.depth is not None) != self.kind.endswith("basement"):
+            raise ValueError("depth: goes with a basement, and a basement with it")
+        if self.edge is not None and self.kind != "slab":
+            raise ValueError("edge: belongs to a slab")
+        return self
+
+
+class NeighbourTable(TomlTable):
+    """What lies behind some of a room's faces, at a known temperature."""
+
+    faces: tuple[str, ...] = ()  # sides of the box, or kinds of faces: "wall", "floor", "ceiling"
+    spaces: tuple[str, ...] = ()  # rooms of the model, by name or GUID
+    temperature_c: Annotated[float | str, OrSchedule(plausible.TEMPERATURE)]
+    film: Annotated[float, plausible.RESISTANCE] = 0.13  # at the far side [m2 K/W]; 0: its face
+
+    @model_validator(mode="after")
+    def _names_some(self) -> NeighbourTable:
+        if not self.faces and not self.spaces:
+            raise ValueError("name `faces` or `spaces`")
+        return self
+
+
+class EnvelopeTable(TomlTable):
+    """What a model of rooms leaves open at their outside."""
+
+    ground: GroundTable | None = None  # without: undisturbed soil half a metre down
+    neighbour: tuple[NeighbourTable, ...] = ()
+    bridge: tuple[BridgeTable, ...] = ()
+    # of all that faces outdoors, frames apart
+    outside_absorptance: Share = OUTSIDE_ABSORPTANCE  # solar
+    outside_roughness: Literal[tuple(ROUGHNESS)] = "medium rough"  # DOE-2, for the outside film
+    frame_u: Annotated[Positive, plausible.FRAME_U] | None = None  # with films 0.13 and 0.04
+    frame_psi: Annotated[float, plausible.PSI] = 0.0  # along the edges of the glass [W/(m K)]
 
 
 class ControlTable(TomlTable):

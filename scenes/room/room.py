@@ -24,7 +24,6 @@ from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.path_light import PathLight
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.metrics.schedules import working_hours
@@ -40,24 +39,30 @@ from scenes.results import (
     GlareResults,
     ThermalResult,
 )
-from scenes.room.annual import glare_by_state, glare_of_year, worst_hours
-from scenes.room.colour import band_scenes, brightest_picture, with_colour
 from scenes.room.control import shading_states
 from scenes.room.daylight import NO_SENSORS, HeldSensors, room_daylight, room_scene
 from scenes.room.envelope import enveloped
-from scenes.room.explored import explored_room
-from scenes.room.glare import default_hours, rating_of, room_glare
-from scenes.room.heated import HeatInputs, heat_alone
-from scenes.room.holes import hole_problems
+from scenes.room.explorer import explored_room
+from scenes.room.glare import (
+    band_scenes,
+    brightest_picture,
+    default_hours,
+    glare_by_state,
+    glare_of_year,
+    kept_glare,
+    rating_of,
+    room_glare,
+    with_colour,
+    worst_hours,
+)
+from scenes.room.heat import HeatInputs, fenestration_table, heat_alone
 from scenes.room.inner_glass import InnerGlass, inner_glass
-from scenes.room.kept_glare import kept_glare
-from scenes.room.kept_sun import kept_sun
+from scenes.room.leaks import hole_problems
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.sky_seen import under_the_sky
+from scenes.room.skies import skies_for
 from scenes.room.solar import RoomSun, SeasonalOutdoors
-from scenes.room.thermal import fenestration_table
 from scenes.room.windows import room_windows
 from scenes.room.zone import (
     RoomZone,
@@ -65,6 +70,7 @@ from scenes.room.zone import (
     operated,
     plain_services,
     services_of,
+    under_the_sky,
     zone_surfaces,
 )
 
@@ -73,25 +79,6 @@ T = TypeVar("T")
 # of the daylight's stage, the sensors' matrices; those of the view are a stage of their own
 TRACED = {"daylight": 0.6}
 WORST = 4  # pictures of an annual glare without hours asked for
-
-
-def skies_for(
-    weather: Weather,
-    method: str,
-    sampling: Sampling,
-    cache: MatrixCache | None = None,
-    /,
-    **choices: str,
-) -> AnnualSky:
-    """The year's skies as a method needs them; the same for every room.
-
-    Args: cache: where the sun's directions are found and kept; choices: `RoomOptions.sky`.
-    """
-    with_sun = method != "three-phase"
-    towards = kept_sun(weather, choices.get("sun_model", "spa"), cache)
-    return annual_sky(
-        weather, sampling.subdivision, sun=with_sun, solar=True, towards=towards, **choices
-    )
 
 
 class RoomSimulation:

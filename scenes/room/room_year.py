@@ -28,7 +28,7 @@ from scenes.fenestration.systems import States
 from scenes.results import GlareResults, RoomYear
 from scenes.room.daylight import HeldSensors
 from scenes.room.glare import rating_of
-from scenes.room.heated import DaylitRoom, heat_alone
+from scenes.room.heat import DaylitRoom, heat_alone
 from scenes.room.inner_glass import borrowed_share
 from scenes.room.operation import Operation
 from scenes.room.options import RoomOptions

@@ -18,9 +18,9 @@ from mitsuba_cfs.methods.seasonal_light import hours_by_season, in_order_of_hour
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
-from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
-from mitsuba_cfs.trace.estimate import Stopping
+from mitsuba_cfs.trace.kernels.estimate import Stopping
+from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
+from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.room.windows import RoomWindows
 from thermal.climate import Solar

@@ -13,11 +13,10 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_file import files_beside
-from scenes.room.drawn_shades import traced_building
 from scenes.room.inner_glass import lending_rooms, opened
-from scenes.room.operation import Operation, check_states
+from scenes.room.operation import Operation, check_states, stated_note, used_operation
 from scenes.room.operation_hours import check_schedules
-from scenes.room.stated_use import stated_note, used_operation
+from scenes.room.windows import traced_building
 from scenes.run.building import building_of
 from scenes.run.files import JobFiles, read_files
 from scenes.run.inputs import chosen_spaces

@@ -16,7 +16,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.source_code import code_version
-from scenes.room.room import skies_for
+from scenes.room.skies import skies_for
 from scenes.run.inputs import sha256
 from scenes.run.job import JobInputs, input_files, read_inputs, run_spaces
 from scenes.run.options import JobOptions

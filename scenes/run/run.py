@@ -27,12 +27,12 @@ from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
-from scenes.room.equal_rooms import moved_light, moved_result
-from scenes.room.heated import DaylitRoom, coupled_years
+from scenes.room.heat import DaylitRoom, coupled_years
 from scenes.room.inner_glass import lending_rooms
 from scenes.room.operation_tables import OperationTables
-from scenes.room.room import skies_for
 from scenes.room.room_year import compute_room, lit_room
+from scenes.room.series import RoomSeries, moved_light, moved_result
+from scenes.room.skies import skies_for
 from scenes.run.files import JobFiles
 from scenes.run.inputs import sha256
 from scenes.run.job import (
@@ -46,7 +46,6 @@ from scenes.run.job import (
 )
 from scenes.run.notes import model_notes, site_notes
 from scenes.run.options import JobOptions
-from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import RoomWork, Workers
 
 R = TypeVar("R")

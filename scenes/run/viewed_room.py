@@ -15,10 +15,9 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, Given
-from scenes.room.colour import band_scenes
-from scenes.room.drawn_shades import traced_building
-from scenes.room.holes import hole_notes
-from scenes.room.windows import room_windows
+from scenes.room.glare import band_scenes
+from scenes.room.leaks import hole_notes
+from scenes.room.windows import room_windows, traced_building
 from scenes.run.building import read_building
 from scenes.run.inputs import chosen_spaces
 from scenes.run.notes import tree_notes

@@ -30,12 +30,11 @@ from scenes.fenestration.systems import Given, States, read_system
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.box import box_building
 from scenes.results import RoomYear
-from scenes.room.drawn_shades import traced_building
-from scenes.room.operation import Operation, check_states, read_operation
+from scenes.room.operation import Operation, check_states, read_operation, used_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room import skies_for
 from scenes.room.room_year import RoomChoices, compute_room
-from scenes.room.stated_use import used_operation
+from scenes.room.skies import skies_for
+from scenes.room.windows import traced_building
 from scenes.run.inputs import read_weather
 from scenes.run.notes import tree_notes
 from scenes.study.case import Case, InputFile, program_version

@@ -1,4 +1,4 @@
-"""`cfs bench`: the ratio's arithmetic, the registry, a peer that is not there, the JSON file."""
+"""The benchmarks: a ratio's arithmetic, the registry, a missing peer, the JSON file."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 
-from scenes import cli
-from scenes.evidence.benchmarks import harness
+from tests.benchmarks import harness
+from tests.benchmarks.__main__ import main
 
 
 def comparison(**changes) -> harness.Comparison:
@@ -65,7 +65,7 @@ def test_all_modules_take_part():
 
 def test_json_holds_every_figure_and_a_missing_peer_is_one_line(registry, tmp_path, capsys):
     file = tmp_path / "bench.json"
-    assert cli.run(["bench", "--json", str(file)]) == 0
+    assert main(["--json", str(file)]) == 0
     printed = capsys.readouterr().out
     assert "two: left out, Radiance is not installed" in printed and "ratio 80.0" in printed
     (record,) = json.loads(file.read_text())
@@ -74,18 +74,20 @@ def test_json_holds_every_figure_and_a_missing_peer_is_one_line(registry, tmp_pa
 
 
 def test_only_peers_missing_is_a_failure(registry, capsys):
-    assert cli.run(["bench", "--only", "two"]) == 1
+    assert main(["two"]) == 1
     assert "no benchmark could run" in capsys.readouterr().err
 
 
 def test_unknown_name_and_folder_are_usage_errors(registry, capsys, tmp_path):
-    assert cli.run(["bench", "--only", "three"]) == 2
+    with pytest.raises(SystemExit, match="2"):
+        main(["three"])
     assert "there are one, two" in capsys.readouterr().err
-    assert cli.run(["bench", "--json", str(tmp_path / "no" / "x.json")]) == 1
+    with pytest.raises(SystemExit, match="2"):
+        main(["--json", str(tmp_path / "no" / "x.json")])
 
 
 def test_without_pyradiance_the_peer_is_missing(monkeypatch):
-    from scenes.evidence.benchmarks import radiance
+    from tests.benchmarks import radiance
 
     monkeypatch.setattr(radiance, "find_spec", lambda name: None)
     with pytest.raises(harness.PeerMissing, match="pip install"):

@@ -7,8 +7,8 @@ import pytest
 from bim.ifc.building import read_ifc
 from bim.shell import open_edges
 from scenes.demo.make_office import HEIGHT
-from scenes.evidence.benchmarks import tower as benchmark
-from scenes.evidence.benchmarks.tower import NORTH, ROOMS, SOUTH, tower
+from tests.benchmarks import tower as benchmark
+from tests.benchmarks.tower import NORTH, ROOMS, SOUTH, tower
 
 
 @pytest.fixture(scope="module")

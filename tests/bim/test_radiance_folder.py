@@ -107,7 +107,7 @@ def test_only_what_a_window_may_see_stands_before_the_sun():
 def test_a_room_without_windows_has_no_light(tmp_path):
     """Its folder runs too, in either band; `getbbox` and `oconv` take every scene of it."""
     pytest.importorskip("pyradiance")
-    from scenes.evidence.benchmarks.radiance import environment, run
+    from tests.benchmarks.radiance import environment, run
 
     street = Element("street", "street", "IfcSite", WALL, 0.2, 0.2)
     building = shoebox(4, 5, 3, windows=(), elements=(street,))
@@ -132,7 +132,7 @@ def test_a_room_without_windows_has_no_light(tmp_path):
 def test_the_folder_gives_our_light(room, tmp_path):
     """Radiance's own programs and ours: under skies that weigh directions, and in hours of sun."""
     pytest.importorskip("pyradiance")
-    from scenes.evidence.validation import radiance_folder as folder
+    from tests.validation import radiance_folder as folder
 
     files, blind = exported(room, tmp_path)
     weather = folder.three_days(WEATHER, tmp_path)
@@ -144,7 +144,7 @@ def test_the_folder_gives_our_light(room, tmp_path):
 def test_the_folder_of_a_real_room_gives_our_light(real_data, tmp_path):
     """The FZK house's living room, 50 degrees from north, with a stair that reaches into it."""
     pytest.importorskip("pyradiance")
-    from scenes.evidence.validation import radiance_folder as folder
+    from tests.validation import radiance_folder as folder
 
     house = real_data / "ifc" / "buildings" / "AC20-FZK-Haus.ifc"
     room = folder.Room.exported(house, "5 Wohnen", tmp_path / "room", WEATHER)
@@ -153,7 +153,7 @@ def test_the_folder_of_a_real_room_gives_our_light(real_data, tmp_path):
 
 def held_to_ours(room, rays: int, runs: int) -> None:
     """Both sides' light under skies that weigh directions, and in hours of sun."""
-    from scenes.evidence.validation import radiance_folder as folder
+    from tests.validation import radiance_folder as folder
 
     theirs = [folder.theirs(room, rays, 400) for _ in range(runs)]
     ours = [folder.ours(room, seed) for seed in range(runs)]

@@ -13,8 +13,8 @@ from bim.context.crowns import _attenuations, crown_elements
 from bim.context.trees import tree_of
 from bim.rays import ray_mesh
 from bim.to_tracer import element_surfaces
-from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
-from mitsuba_cfs.trace.estimate import Stopping
+from mitsuba_cfs.trace.kernels.estimate import Stopping
+from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from tests.radiance import environment
 
 PLACES = np.array([[x, 0.0, z] for x in (-1.0, 0.0, 1.0) for z in (1.0, 2.0)])

@@ -1,11 +1,11 @@
-"""The BSDF benchmarks: their places in `cfs bench`, and which block's errors they report."""
+"""The BSDF benchmarks: their names, and which block's errors they report."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from scenes.evidence.benchmarks import bsdf_generate, bsdf_tree, harness
+from tests.benchmarks import bsdf_generate, bsdf_tree, harness
 
 
 def test_they_take_part():

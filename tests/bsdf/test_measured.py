@@ -11,7 +11,8 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf, square_to_disk
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from scenes import cli
-from scenes.evidence.validation.goniophotometer import (
+from tests.bim.bim_fuzz import mutations
+from tests.validation.goniophotometer import (
     by_radiance,
     cosine_power,
     even,
@@ -22,7 +23,6 @@ from scenes.evidence.validation.goniophotometer import (
     patch_means,
     unit_vectors,
 )
-from tests.bim.bim_fuzz import mutations
 
 WIDTH = 0.15  # of `gaussian`, on the disk of direction cosines
 INNER = np.radians(60)  # lobes of patches farther out reach behind the sample's plane

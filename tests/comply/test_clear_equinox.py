@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.evidence.validation.clear_equinox import ASE, NEED, ROOMS, Sides, compared
+from tests.validation.clear_equinox import ASE, NEED, ROOMS, Sides, compared
 
 
 @pytest.fixture(scope="module")

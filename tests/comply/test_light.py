@@ -21,7 +21,8 @@ from scenes.comply.view_out import view_out
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
 
 EVERY = 23  # hour with the sun up: all hours of the day and all seasons come
 # Sums over a window's directions in float32, added up in another order with other hours beside:

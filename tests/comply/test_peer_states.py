@@ -8,7 +8,7 @@ import pytest
 
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
-from scenes.evidence.validation.peer_states import STORED, figures, rooms
+from tests.validation.peer_states import STORED, figures, rooms
 
 POINTS = 0.1  # percentage points
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes.evidence.devtools import Page, chromium
 from scenes.explore.folder import write_explorer
+from tests.devtools import Page, chromium
 from tests.explore.synthetic import explored_run
 
 pytestmark = [

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.evidence.devtools import Page, chromium
-from scenes.evidence.validation.explorer import main, sizes, walked
 from scenes.explore.folder import write_explorer
+from tests.devtools import Page, chromium
 from tests.explore.synthetic import SIZE, explored_run
+from tests.validation.explorer import main, sizes, walked
 
 pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
 

@@ -105,8 +105,8 @@ def test_luminance_must_fit_the_matrix():
 
 @pytest.mark.usefixtures("variant")
 def test_pictures_have_the_illuminance_of_the_view_matrix():
-    from mitsuba_cfs.trace.annual_pictures import view_matrices
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
+    from mitsuba_cfs.trace.pictures.annual import view_matrices
 
     room, groups = rooms.test_room()
     luminance = RANDOM.uniform(0, 5000, (1, K, 4)).astype(np.float32)
@@ -120,7 +120,7 @@ def test_pictures_have_the_illuminance_of_the_view_matrix():
 
 @pytest.mark.usefixtures("variant")
 def test_a_small_budget_puts_the_matrix_on_disk(tmp_path):
-    from mitsuba_cfs.trace.annual_pictures import view_matrices
+    from mitsuba_cfs.trace.pictures.annual import view_matrices
 
     room, groups = rooms.test_room()
     view = fisheye(VIEW.position, VIEW.direction, 32)

@@ -14,7 +14,7 @@ from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.images.view import pixel_directions
 from scenes.cost import room as box
 from scenes.demo import WEATHER
-from scenes.evidence.validation import fireflies
+from tests.validation import fireflies
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -45,8 +45,8 @@ def by_patches() -> list:
 
 def test_paths_that_carry_luminance_sum_to_the_matrix_times_it() -> None:
     """Each part of V with the luminance that is its own, in the mean and in the halves."""
-    from mitsuba_cfs.trace.annual_pictures import view_matrices
-    from mitsuba_cfs.trace.patch_light import PatchLight
+    from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+    from mitsuba_cfs.trace.pictures.annual import view_matrices
 
     room, groups = rooms.test_room()
     parts = [groups[0], replace(groups[0])]
@@ -133,7 +133,7 @@ def traced(**kept: Any) -> Any:
 
 def luminance(number: int) -> Any:
     """Of the one window's patches in two hours."""
-    from mitsuba_cfs.trace.patch_light import PatchLight
+    from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 
     lit, later = np.random.default_rng(number).random((2, 145, 2)).astype(np.float32)
     return PatchLight(lit, later)
@@ -152,15 +152,15 @@ def arrays(value: Any) -> list[np.ndarray]:
 @pytest.fixture
 def elements_traced(monkeypatch) -> list[int]:
     """Grows by one each time that sunlit elements are traced."""
-    from mitsuba_cfs.trace import annual_pictures
+    from mitsuba_cfs.trace.pictures import annual
 
-    calls, trace = [], annual_pictures.sun_elements
+    calls, trace = [], annual.sun_elements
 
     def counted(*args, **options):
         calls.append(len(calls))
         return trace(*args, **options)
 
-    monkeypatch.setattr(annual_pictures, "sun_elements", counted)
+    monkeypatch.setattr(annual, "sun_elements", counted)
     return calls
 
 
@@ -252,8 +252,8 @@ def test_what_is_lost_or_too_large_is_traced_anew(tmp_path, elements_traced, mon
 def test_rooms_with_gloss_keep_the_patches() -> None:
     """What gloss shows of the windows is a matrix of patches for each pixel."""
     import mitsuba_cfs as cfs
-    from mitsuba_cfs.trace.annual_pictures import view_matrices
-    from mitsuba_cfs.trace.patch_light import PatchLight
+    from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+    from mitsuba_cfs.trace.pictures.annual import view_matrices
 
     groups = rooms.test_room()[1]
     room = black_room(cfs.Gloss((0.04, 0.04)))[1]

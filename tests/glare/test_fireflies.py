@@ -9,7 +9,7 @@ import pytest
 
 import mitsuba_cfs as cfs
 from scenes.demo import WEATHER
-from scenes.evidence.validation import fireflies
+from tests.validation import fireflies
 
 
 def test_a_pixel_is_held_against_the_brightest_around_it() -> None:

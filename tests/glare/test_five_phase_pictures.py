@@ -27,21 +27,21 @@ LUX = np.array([80_000.0])
 
 def clear(tau: float = 0.8):
     """Glass that lets all pass straight on."""
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     return KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
 
 
 def diffuser(tau: float = 0.5):
     """A window that spreads all evenly."""
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     return KlemsScattering(KLEMS_FULL, np.full((K, K), tau / np.pi), np.zeros(K))
 
 
 def sun_picture(system, sun, *, exterior=rooms.NOTHING, scale=1.0, view=VIEW):
     """Picture [ny, nx] of the sun alone, without interreflection."""
-    from mitsuba_cfs.trace.picture_sun import PictureSun
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     room, groups = rooms.test_room(scale)
     found = PictureSun(room, exterior, groups, [system], view)
@@ -80,7 +80,7 @@ def test_half_of_a_disc_behind_an_edge_is_missing():
 
 def source(system, *, exterior=rooms.NOTHING, size=200):
     """The disc apart from the picture, and the picture without it."""
-    from mitsuba_cfs.trace.picture_sun import PictureSun
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     room, groups = rooms.test_room(0.0)
     view = fisheye(EYE, (0.0, -1.0, 0.0), size)
@@ -126,7 +126,7 @@ def test_an_edge_cuts_the_source_and_leaves_its_luminance():
 @pytest.mark.parametrize(("beyond", "share"), [(-0.3, 1.0), (0.0, 0.5), (0.3, 0.0)])
 def test_the_disc_ends_where_the_eye_does(beyond, share):
     """A sun at the side of a fisheye, its middle so many degrees behind the eye."""
-    from mitsuba_cfs.trace.picture_sun import PictureSun
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     room, groups = rooms.test_room(0.0)
     turn = np.radians(90 + beyond)
@@ -138,9 +138,10 @@ def test_the_disc_ends_where_the_eye_does(beyond, share):
 
 
 def test_paths_see_the_same_disc():
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-    from mitsuba_cfs.trace.path_disc import disc_seen, with_disc
-    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+    from mitsuba_cfs.trace.kernels.scattering import AngularBeam
+    from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     room, groups = rooms.test_room()
     lit = LitRoom(room, rooms.NOTHING, groups, [PathOptics(None, AngularBeam(np.full(16, 0.8)))])
@@ -194,10 +195,10 @@ def test_a_diffuser_glows_where_the_sun_reaches_it():
 
 def five_phase(system, transmission, sky, sun, lux, *, view=VIEW, samples=32, obstacle=None):
     """Five-phase pictures of one hour, and the room they are of."""
-    from mitsuba_cfs.trace.annual_pictures import FivePhasePictures, view_matrices
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.picture_outdoors import outdoors
-    from mitsuba_cfs.trace.picture_sun import PictureSun
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+    from mitsuba_cfs.trace.pictures.annual import FivePhasePictures, view_matrices
+    from mitsuba_cfs.trace.pictures.outdoors import outdoors
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     room, groups = rooms.test_room()
     exterior: Surfaces = obstacle or rooms.NOTHING
@@ -231,7 +232,7 @@ def sun_on_patch(sun, lux):
 
 def test_an_hour_is_the_same_among_others():
     """Edges of shadows, that are looked at again for all hours of a batch together, too."""
-    from mitsuba_cfs.trace.picture_sun import PictureSun
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     suns = np.array([HIGH, SUN, [-0.45, -0.7, 0.8]])
     suns /= np.linalg.norm(suns, axis=1)[:, None]
@@ -259,9 +260,10 @@ def test_a_direct_part_that_exceeds_the_whole_is_refused():
 def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     import mitsuba as mi
 
-    from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+    from mitsuba_cfs.trace.kernels.scattering import AngularBeam
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
+    from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
     from tests.trace.test_point_in_time import diffuser as diffusing_system
     from tests.trace.test_point_in_time import klems
 

@@ -13,10 +13,11 @@ pytestmark = pytest.mark.usefixtures("variant")
 
 
 def test_what_stands_outdoors_is_lit_by_the_sky_and_not_by_the_sun_alone():
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
-    from mitsuba_cfs.trace.point_in_time import point_in_time
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.scattering import AngularBeam
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+    from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups = rooms.test_room()
     hidden = rooms.quad((-50, -4, -50), (50, -4, -50), (50, -4, 50), (-50, -4, 50))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mitsuba_cfs.images.view import fisheye
-from mitsuba_cfs.trace import picture_disc
+from mitsuba_cfs.trace.sun import picture_disc
 
 
 def test_rays_do_not_depend_on_how_many_are_tried_at_a_time(monkeypatch):

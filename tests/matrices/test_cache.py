@@ -18,7 +18,7 @@ from mitsuba_cfs.matrices import cache as cache_module
 from mitsuba_cfs.matrices.cache import BatchMean, MatrixCache, default_folder, digest
 from tests.trace import rooms
 
-BY = "mitsuba_cfs.trace.estimate"  # the module that computes what these tests keep
+BY = "mitsuba_cfs.trace.kernels.estimate"  # the module that computes what these tests keep
 STATE = BatchMean(3, np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.ones(2), 1.5, True)
 
 
@@ -50,7 +50,7 @@ def test_a_state_comes_back_as_it_was(cache):
 
 
 def test_a_finished_matrix_is_not_traced_again(cache):
-    from mitsuba_cfs.trace.estimate import accumulate
+    from mitsuba_cfs.trace.kernels.estimate import accumulate
 
     log: list[int] = []
     first, second = (accumulate(batches(log), entry=cache.entry("m", 1, by=BY)) for _ in range(2))
@@ -62,7 +62,7 @@ def test_a_finished_matrix_is_not_traced_again(cache):
 
 
 def test_a_stopped_run_goes_on_to_the_same_bits(cache):
-    from mitsuba_cfs.trace.estimate import accumulate
+    from mitsuba_cfs.trace.kernels.estimate import accumulate
 
     whole = accumulate(batches([]))
     log: list[int] = []
@@ -76,7 +76,7 @@ def test_a_stopped_run_goes_on_to_the_same_bits(cache):
 
 @pytest.mark.parametrize("damage", ["short", "empty", "bits", "text"])
 def test_a_damaged_file_is_ignored_and_written_anew(cache, damage):
-    from mitsuba_cfs.trace.estimate import accumulate
+    from mitsuba_cfs.trace.kernels.estimate import accumulate
 
     entry = cache.entry("m", 1, by=BY)
     whole = accumulate(batches([]), entry=entry)
@@ -93,7 +93,7 @@ def test_a_damaged_file_is_ignored_and_written_anew(cache, damage):
 
 
 def test_a_folder_that_cannot_be_written_costs_a_warning_only(tmp_path, caplog):
-    from mitsuba_cfs.trace.estimate import accumulate
+    from mitsuba_cfs.trace.kernels.estimate import accumulate
 
     (tmp_path / "file").write_text("in the way")
     entry = MatrixCache(tmp_path / "file").entry("m", 1, by=BY)
@@ -159,8 +159,8 @@ def test_the_environment_names_the_folder(monkeypatch, tmp_path):
 
 
 def test_view_and_daylight_matrices_come_from_the_cache(variant, cache):
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
 
@@ -181,33 +181,35 @@ def test_view_and_daylight_matrices_come_from_the_cache(variant, cache):
 
 def test_the_sun_and_what_is_absorbed_come_from_the_cache(variant, cache, monkeypatch):
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-    from mitsuba_cfs.trace import absorption_matrix, direct_sun
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels import scattering
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices import absorption
+    from mitsuba_cfs.trace.sun import direct
 
     room, groups = rooms.test_room()
     K, few = KLEMS_FULL.size, Stopping(batches=2)
 
     def both(tau: float, reflectance: float):
-        way = direct_sun.KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
-        sun = direct_sun.direct_sun_matrix(
+        way = scattering.KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
+        sun = direct.direct_sun_matrix(
             room, rooms.NOTHING, groups, [way], [[1.8, 1, 0.8]], [[0, 0, 1]], suns=[[0, -1, 0.6]],
             window_points=16, stopping=few, cache=cache,
         )  # fmt: skip
-        absorbed = absorption_matrix.absorption_matrix(
+        absorbed = absorption.absorption_matrix(
             room, groups, window_reflectance=[reflectance], samples=16, stopping=few, cache=cache
         )
         return sun.values, absorbed.values
 
     first = both(0.5, 0.1)
     with monkeypatch.context() as patch:
-        for module in (direct_sun, absorption_matrix):
+        for module in (direct, absorption):
             patch.setattr(module, "TracedScene", _must_not_trace(module.TracedScene))
         assert all(np.array_equal(*pair) for pair in zip(first, both(0.5, 0.1), strict=True))
     other = both(0.6, 0.2)
     assert other[0] == pytest.approx(first[0] * 1.2) and not np.array_equal(other[1], first[1])
     with pytest.raises(ValueError, match="needs a `key`"):
-        direct_sun.direct_sun_matrix(
-            room, rooms.NOTHING, groups, [direct_sun.PluginScattering(None)],
+        direct.direct_sun_matrix(
+            room, rooms.NOTHING, groups, [scattering.PluginScattering(None)],
             [[1.8, 1, 0.8]], [[0, 0, 1]], suns=[[0, -1, 0.6]], cache=cache,
         )  # fmt: skip
 
@@ -230,7 +232,7 @@ SLOW_RUN = """
     from mitsuba_cfs import variants
     variants.activate("llvm_ad_mono")
     from mitsuba_cfs.matrices.cache import MatrixCache
-    from mitsuba_cfs.trace import estimate
+    from mitsuba_cfs.trace.kernels import estimate
 
     estimate.SAVE_SECONDS = 0.0
     estimate.SAVE_SHARE = 0.0
@@ -242,13 +244,13 @@ SLOW_RUN = """
         return np.random.default_rng(number).random((4, 5))
 
     cache = MatrixCache(Path(sys.argv[1]))
-    estimate.accumulate(batch, entry=cache.entry("m", 1, by="mitsuba_cfs.trace.estimate"))
+    estimate.accumulate(batch, entry=cache.entry("m", 1, by="mitsuba_cfs.trace.kernels.estimate"))
 """
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 def test_a_killed_process_loses_the_batch_under_way_only(cache):
-    from mitsuba_cfs.trace.estimate import accumulate
+    from mitsuba_cfs.trace.kernels.estimate import accumulate
 
     program = [sys.executable, "-c", textwrap.dedent(SLOW_RUN), str(cache.folder)]
     here = cache.folder.parent / "batch6"

@@ -29,8 +29,8 @@ def test_fine_patches_divide_the_coarse_ones(basis):
 def test_the_sun_through_glass_is_nearer_the_two_phase_matrix_on_a_fine_basis(variant):
     """One sky patch that shines through a clear hole onto sensors in and beside its beam."""
     from mitsuba_cfs.sky.patches import ReinhartSky
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, sky_irradiance_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     points = np.array([[1.2, y, 0.8] for y in np.arange(0.2, 2.6, 0.4)])

@@ -7,7 +7,7 @@ import re
 import subprocess
 from pathlib import Path
 
-from scenes.evidence.devtools import chromium
+from tests.devtools import chromium
 
 LISTEN = """<script>
 window.faults = [];

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.evidence.devtools import Page
 from scenes.report.page import report_html
 from scenes.results import RunResult
+from tests.devtools import Page
 from tests.report.synthetic import moved, run_result
 
 ON_A_STOREY = 10

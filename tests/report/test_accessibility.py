@@ -15,12 +15,12 @@ from scenes.comply.comply import check_rooms
 from scenes.comply.options import ComplyOptions
 from scenes.comply.page import dossier_html
 from scenes.demo import WEATHER
-from scenes.evidence.devtools import Page, chromium
 from scenes.explore.folder import write_explorer
 from scenes.page_options import PageOptions
 from scenes.report.page import report_html
 from scenes.study_report.page import study_report_html
 from tests.comply.test_outputs import RULE, files_of
+from tests.devtools import Page, chromium
 from tests.explore.synthetic import explored_run
 from tests.report.building_page import building
 from tests.report.synthetic import run_result

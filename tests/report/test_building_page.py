@@ -9,8 +9,8 @@ import zlib
 
 import pytest
 
-from scenes.evidence.devtools import Page, chromium
 from scenes.report.page import report_html
+from tests.devtools import Page, chromium
 from tests.report.building_page import building
 
 pytestmark = [

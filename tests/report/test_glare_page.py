@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from scenes.evidence.devtools import Page, chromium
 from scenes.figures.plan import plan_frame
 from scenes.figures.rose import RoseWedge, roses
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.page import write_page
+from tests.devtools import Page, chromium
 from tests.report.synthetic import two_rooms
 
 DIRECTIONS = 4

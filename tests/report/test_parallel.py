@@ -10,11 +10,11 @@ import pytest
 
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
-from scenes.evidence.devtools import Page, chromium
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.study.straight_view import straight_view
 from scenes.study_report.page import study_report_html
 from scenes.study_report.parallel import parallel
+from tests.devtools import Page, chromium
 from tests.report.test_study_report import study
 
 WITH_CHROMIUM = pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")

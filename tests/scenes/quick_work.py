@@ -128,13 +128,6 @@ def _calibrated(size, **_options):
     return Calibration("m", "now", size, (Cost("five-phase", "DGP", 1.0, 1.0, 1.0),))
 
 
-def _benchmarks():
-    from scenes.evidence.benchmarks.harness import Comparison, Run
-
-    run = Run("cfs", 1.0, 1.0, 0.1)
-    return {"quick": lambda _progress: Comparison("quick", "nothing", run, run)}
-
-
 def _generated_file(**_options):
     from mitsuba_cfs.bsdf.xml import read_bsdf_xml
     from scenes.demo import VENETIAN_BLIND
@@ -163,7 +156,6 @@ WORK = {
     "scenes.year_of_glare.year.rate_views": _rate_views,
     "scenes.view_picture.room_picture": _room_picture,
     "scenes.calibration.measure.calibrated": _calibrated,
-    "scenes.evidence.benchmarks.harness.benchmarks": _benchmarks,
     "scenes.bsdf_generation.generated_file": _generated_file,
     "scenes.study.one_case.compute_case": _case,
     "scenes.study_report.write_study_report": _study_report,
@@ -179,7 +171,7 @@ def quick_work(give: Callable[[object, str, object], object] = setattr, among: s
         "run": "scenes.run", "demo": "scenes.study", "thermal": "scenes.heat.study",
         "pv": "photovol", "comply": "scenes.comply",
         "dgp": "year_of_glare", "picture": "view_picture", "calibrate": "calibration",
-        "bench": "benchmarks", "bsdf": "bsdf_generation", "study": "scenes.study",
+        "bsdf": "bsdf_generation", "study": "scenes.study",
     }  # fmt: skip
     for name, function in WORK.items():
         if among and needs.get(among, "none") not in name:

@@ -11,8 +11,8 @@ import pytest
 from pythermalcomfort.models import adaptive_ashrae
 
 from mitsuba_cfs.sky.epw import read_epw
-from scenes.evidence.studies import case_comfort_by_orientation as case
-from scenes.evidence.studies.systems import blind_before_glazing
+from tests.validation import case_comfort_by_orientation as case
+from tests.validation.systems import blind_before_glazing
 from thermal.comfort import running_mean
 
 

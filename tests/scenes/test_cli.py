@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import signal
 import subprocess
@@ -127,15 +126,6 @@ def test_help_lists_every_command_that_there_is() -> None:
     assert done.returncode == 0
     for name in cli.COMMANDS:
         assert any(line.split()[:1] == [name] for line in done.stdout.splitlines()), name
-
-
-def test_a_wheel_lists_no_command_of_the_repository(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = importlib.util.find_spec
-    monkeypatch.setattr(
-        cli, "find_spec", lambda name: None if name == "scenes.evidence" else found(name)
-    )
-    listed = cli.cfs.list_commands(click.Context(cli.cfs))
-    assert "run" in listed and "bench" not in listed
 
 
 def test_help_needs_no_heavy_imports() -> None:

@@ -17,10 +17,11 @@ from mitsuba_cfs.stored_arrays import StoredArrays
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
-from scenes.room.heated import DaylitRoom, coupled_years, heat_alone
+from scenes.room.heat import DaylitRoom, coupled_years, heat_alone
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import OperationTables
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.run import run
 from scenes.run.options import JobOptions

@@ -12,7 +12,7 @@ PNG = b"\x89PNG"
 
 @pytest.mark.usefixtures("variant")
 def test_the_classification_counts_each_class_by_itself():
-    from scenes.evidence.validation.daylight_methods import classified
+    from tests.validation.daylight_methods import classified
 
     reference = np.array([[100.0, 200, 400, 500], [350, 299, 300, 900]])
     found = np.array([[310.0, 200, 400, 200], [350, 299, 299, 900]])
@@ -29,7 +29,7 @@ def test_the_classification_counts_each_class_by_itself():
 
 @pytest.mark.usefixtures("variant")
 def test_the_series_are_drawn_with_the_measurement_in_them(tmp_path):
-    from scenes.evidence.validation import daylight_methods, glare_methods
+    from tests.validation import daylight_methods, glare_methods
 
     hours = [f"03-25 {hour:02d}:30" for hour in range(8, 18)]
     light = (np.arange(10) * 100.0).tolist()
@@ -58,9 +58,9 @@ def test_the_measurement_has_the_sun_as_a_source_whatever_the_pixels():
     from dataclasses import replace
 
     import mitsuba_cfs as cfs
-    from scenes.evidence.validation.blind_room import empty, glass_klems
-    from scenes.evidence.validation.glare_methods import GlareCase, measured
-    from scenes.evidence.validation.glare_room import glare_scene
+    from tests.validation.blind_room import empty, glass_klems
+    from tests.validation.glare_methods import GlareCase, measured
+    from tests.validation.glare_room import glare_scene
 
     scenes = [glare_scene(size) for size in (40, 80)]
     towards = np.add(scenes[0].view.direction, [0, 0, 0.25])[None]
@@ -81,7 +81,7 @@ def test_the_measurement_has_the_sun_as_a_source_whatever_the_pixels():
 @pytest.mark.usefixtures("variant")
 def test_the_scale_of_bars_does_not_change_their_bsdf():
     """Table 12's third series; two runs at one scale say what noise is."""
-    from scenes.evidence.validation.glare_theory import scale_series
+    from tests.validation.glare_theory import scale_series
 
     *scaled, again = scale_series()
     assert again["noise"] and [row["scale"] for row in scaled] == [1.0, 0.1, 10.0]

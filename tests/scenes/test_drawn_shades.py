@@ -10,7 +10,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.room.drawn_shades import holds_shade
+from scenes.room.windows import holds_shade
 from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
 from tests.bim.small_ifc import OPENING, WALL, WIDTH, SmallIfc, box_room

@@ -13,10 +13,9 @@ from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import WEATHER
 from scenes.heat.design_days import design_loads
-from scenes.room.energy import energy_by_month, energy_summary, room_powers
-from scenes.room.humidity import felt_by, outdoor_humidity, room_humidity
-from scenes.room.load_tables import PlantTable
-from scenes.room.operation_tables import ComfortTable
+from scenes.heat.energy import energy_by_month, energy_summary, room_powers
+from scenes.room.heat import felt_by, outdoor_humidity, room_humidity
+from scenes.room.operation_tables import ComfortTable, PlantTable
 from scenes.room.zone import RoomServices, RoomZone
 from tests.thermal.rooms import CONCRETE, PLASTER
 from thermal.climate import no_sun

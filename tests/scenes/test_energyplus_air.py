@@ -9,7 +9,7 @@ import pytest
 def test_a_year_of_leaks_and_recovered_heat_is_as_in_energyplus() -> None:
     """The bars are those of an office with set-back (`test_schedules`)."""
     pytest.importorskip("pyenergyplus")
-    from scenes.evidence.validation.energyplus_air import compare
+    from tests.validation.energyplus_air import compare
 
     found = compare("DOE-2", "N")
     assert found["air rmse K"] < 0.1

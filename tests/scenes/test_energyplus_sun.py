@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from scenes.evidence.benchmarks.coupled_zones import row_of_zones
-from scenes.evidence.validation.energyplus_twin import (
+from scenes.heat.study_file import read_study
+from scenes.room.zone import RoomZone
+from tests.benchmarks.coupled_zones import row_of_zones
+from tests.conftest import REPOSITORY
+from tests.validation.energyplus_twin import (
     ABSORBED,
     CONVECTED,
     INCIDENT,
@@ -21,9 +24,6 @@ from scenes.evidence.validation.energyplus_twin import (
     sky_seen,
     with_their_sun,
 )
-from scenes.heat.study_file import read_study
-from scenes.room.zone import RoomZone
-from tests.conftest import REPOSITORY
 from thermal.climate import Solar
 
 STUDIES = sorted((REPOSITORY / "docs" / "tutorials" / "energyplus_twin").glob("*.toml"))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from scenes.evidence.validation.energyplus_traced import compare, traced_system
-from scenes.evidence.validation.reference_systems import Optics
+from tests.validation.energyplus_traced import compare, traced_system
+from tests.validation.reference_systems import Optics
 
 OMEGA = KLEMS_FULL.projected_solid_angles()
 BACK = {"tau_back": 0.1, "rho_back": 0.25}

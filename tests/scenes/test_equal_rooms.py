@@ -11,10 +11,10 @@ import numpy as np
 from bim.model import Building, Element, Space
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.progress import silent
-from scenes.room.equal_rooms import OutdoorLight, moved_result, same_systems
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room_year import compute_room, lit_room
+from scenes.room.series import OutdoorLight, moved_result, same_systems
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions
 from tests.scenes.small_box import BOX, ROOM, SMALL

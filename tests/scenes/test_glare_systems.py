@@ -13,8 +13,8 @@ def closed_blind(variant):
     """The dissertation's blind at 70 degrees before its glazing, and both as Klems matrices."""
     from mitsuba_cfs.bsdf.generate import generate_klems
     from mitsuba_cfs.bsdf.layers import combine_layers
-    from scenes.evidence.validation.blind_room import blind_layer, glass_klems
-    from scenes.evidence.validation.glare_room import known_system
+    from tests.validation.blind_room import blind_layer, glass_klems
+    from tests.validation.glare_room import known_system
 
     layer = blind_layer(70.0)
     blind = generate_klems(layer, samples=4096, seed=1).bsdf[0]

@@ -12,7 +12,7 @@ from mitsuba_cfs.surfaces import Surfaces
 from scenes.demo import OFFICE
 from scenes.fenestration.systems import read_system
 from scenes.room.daylight import room_scene
-from scenes.room.holes import hole_problems, moved_problem
+from scenes.room.leaks import hole_problems, moved_problem
 from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 

@@ -7,7 +7,7 @@ import pytest
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.cli import run as main
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.room import daylight, holes
+from scenes.room import daylight, leaks
 
 pytestmark = pytest.mark.usefixtures("variant")
 FEW_RAYS = ["--quick", "--size", "64", "--method", "three-phase"]
@@ -24,7 +24,7 @@ def holed(monkeypatch) -> list[str]:
         parts = (part[keep] for part in (found.triangles, found.reflectance, found.surface))
         return Surfaces(*parts, found.names)
 
-    for module in (daylight, holes):
+    for module in (daylight, leaks):
         monkeypatch.setattr(module, "furnished_surfaces", without)
     return [str(OFFICE), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND), "--space", "A"]
 

@@ -11,12 +11,12 @@ from click.testing import CliRunner
 from bim import read_ifc
 from bim.model import Building
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.evidence.validation import inner_glass_ifc
 from scenes.fenestration.systems import read_system
 from scenes.room.inner_glass import CLEAR, inner_glass, lending_rooms, opened
 from scenes.room.windows import in_all_windows, room_windows
 from tests.bim import test_passages as passages
 from tests.bim.small_ifc import DEPTH, FRAME, HEIGHT, WIDTH, SmallIfc, box_model
+from tests.validation import inner_glass_ifc
 
 MIDDLE, THICK = 3.0, 0.2  # of a partition: where it begins and how thick it is [m]
 PLACE = (0.5, 0.3, 3.0, 2.2)  # x, sill, width, height of a partition's window [m]

@@ -17,7 +17,8 @@ from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
+from scenes.room.skies import skies_for
 
 EVERY = 211  # hour with the sun up
 OPTIONS = RoomOptions.of(

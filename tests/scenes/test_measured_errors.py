@@ -109,7 +109,7 @@ def test_a_table_that_cannot_be_read_is_one_clear_line(tmp_path):
 
 def test_the_table_that_ships_names_its_script_and_predicts_systems_held_out():
     """Each system left out in turn: what is promised of it is kept, and is no mere excess."""
-    from scenes.evidence.validation.method_errors import broken_promises, held_out
+    from tests.validation.method_errors import broken_promises, held_out
 
     table = measured_errors()
     assert table == MeasuredErrors.read(FILE) and "method_errors" in table.script

@@ -157,7 +157,7 @@ def test_matrices_on_a_full_disk_are_one_error_and_no_bus_error(tmp_path):
     code = (
         "import sys\nfrom pathlib import Path\nfrom mitsuba_cfs import variants\n"
         "variants.activate()\n"
-        "from mitsuba_cfs.trace.annual_pictures import _storage\n"
+        "from mitsuba_cfs.trace.pictures.annual import _storage\n"
         "_storage((4096, 1024), True, Path(sys.argv[1]))[:] = 1\n"
     )
     mounted = subprocess.run(

@@ -17,7 +17,7 @@ from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.sky.annual import annual_sky
 from scenes.result_folder import ResultFolder
 from scenes.results import GlareResults, LuminancePicture
-from scenes.room.colour import band_scenes, brightest_picture, with_colour
+from scenes.room.glare import band_scenes, brightest_picture, with_colour
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.run.outputs import write_results
 from tests.report.synthetic import run_result

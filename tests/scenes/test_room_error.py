@@ -16,8 +16,9 @@ from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
 from scenes.room.room_year import compute_room
+from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.run import run as job
 from scenes.run.options import JobOptions

@@ -20,11 +20,11 @@ from mitsuba_cfs.processes import BLAS_THREADS
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.room.options import RoomOptions
+from scenes.room.series import RoomSeries
 from scenes.run import outputs, rooms_apart
 from scenes.run import rooms as series
 from scenes.run.job import JobInputs, read_inputs
 from scenes.run.options import JobOptions
-from scenes.run.rooms import RoomSeries
 from scenes.run.rooms_apart import Workers
 from scenes.run.run import run_inputs, run_job
 from scenes.workers import Tasks

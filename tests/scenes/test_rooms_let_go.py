@@ -16,8 +16,8 @@ from mitsuba_cfs.methods.path_light import PathLight, PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
-from mitsuba_cfs.trace import scene as traced_scenes
-from mitsuba_cfs.trace.scene import TracedScene
+from mitsuba_cfs.trace.kernels import scene as traced_scenes
+from mitsuba_cfs.trace.kernels.scene import TracedScene
 from scenes.comply.light import lights_of
 from scenes.room.options import SensorGrid
 from scenes.room.room import RoomSimulation

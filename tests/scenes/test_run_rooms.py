@@ -16,8 +16,8 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.room.annual import worst_hours
 from scenes.room.control import shading_states
+from scenes.room.glare import worst_hours
 from scenes.room.operation import check_states, read_operation
 from scenes.room.room_year import compute_room
 from scenes.room.windows import in_all_windows, room_windows

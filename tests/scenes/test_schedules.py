@@ -207,7 +207,7 @@ def test_a_fault_names_file_table_and_key(tmp_path: Path, weather, words) -> Non
 def test_an_office_with_set_back_and_night_air_is_as_in_energyplus() -> None:
     """Air and loads of weeks with weekend and holiday; the bars are those of two coupled rooms."""
     pytest.importorskip("pyenergyplus")
-    from scenes.evidence.validation.energyplus_schedules import compare
+    from tests.validation.energyplus_schedules import compare
 
     north = compare("N").set_index("period")
     assert north["air rmse K"].max() < 0.1

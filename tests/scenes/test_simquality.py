@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.sky.sun import direction
-from scenes.evidence.validation import simquality
 from scenes.heat.study import rooms_of
 from scenes.heat.study_file import read_study
+from tests.validation import simquality
 
 FILES = sorted(simquality.STUDIES.glob("TF09.*.toml"))
 

@@ -7,11 +7,11 @@ import pytest
 
 from bim.model import Building
 from bim.shoebox import Plate, WindowRectangle, shoebox
-from scenes.evidence.validation.energyplus_twin import under_open_sky
 from scenes.room.room import RoomSimulation
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import RoomZone
 from tests.scenes.small_box import SMALL
+from tests.validation.energyplus_twin import under_open_sky
 
 SILL, RISE, ROOF, DEPTH = 0.5, 1.5, 2.8, 1.2
 

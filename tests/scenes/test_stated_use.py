@@ -17,11 +17,11 @@ from scenes.demo import WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from scenes.room.daylight import HeldSensors
+from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.room_year import compute_room
-from scenes.room.stated_use import stated_note, with_stated_uses
 from scenes.room_views import held_fisheyes, held_view
 from scenes.run.inputs import read_weather
 from scenes.run.notes import unused_notes

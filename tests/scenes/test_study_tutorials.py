@@ -12,14 +12,14 @@ import pytest
 
 from mitsuba_cfs.errors import DataError
 from scenes.cli import run as main
-from scenes.evidence.validation import ashrae140_studies, energyplus_study
-from scenes.evidence.validation.ashrae140 import RANGES
-from scenes.evidence.validation.ashrae140_sun import ANGLES, glass
 from scenes.fenestration.layer_tables import GlazingLayerTable
 from scenes.fenestration.pane_system import system_of_panes
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.study_file import StudyFile, read_study
 from scenes.room.operation import read_state
+from tests.validation import ashrae140_studies, energyplus_study
+from tests.validation.ashrae140 import RANGES
+from tests.validation.ashrae140_sun import ANGLES, glass
 
 REPOSITORY = Path(__file__).parents[2]
 TUTORIALS = REPOSITORY / "docs" / "tutorials"

@@ -18,8 +18,9 @@ from bim.seasons import seasons
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import WEATHER
-from scenes.room.room import RoomSimulation, skies_for
+from scenes.room.room import RoomSimulation
 from scenes.room.room_year import lit_room
+from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.run.notes import model_notes, unused_notes
 from tests.conftest import REPOSITORY

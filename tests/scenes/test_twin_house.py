@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes.evidence.validation import twin_house
 from scenes.heat.files import read_files
 from scenes.heat.study_file import read_study
 from scenes.room.operation_hours import OperationHours
+from tests.validation import twin_house
 
 
 @pytest.fixture(scope="module")

@@ -106,7 +106,7 @@ def test_what_layers_absorb_adds_up_and_panes_get_their_part(unit):
 
 def test_layers_absorb_as_windows_engine_has_it(reference_data):
     """The interior shade of the reference set: shares of each layer, from its tau and rho."""
-    from scenes.evidence.validation.reference_systems import layers, read_optics
+    from tests.validation.reference_systems import layers, read_optics
 
     folder = reference_data / "energyplus"
     import json

@@ -150,7 +150,6 @@ JOBS = {
         for kind in ("hdr", "exr", "png")
     },
     "calibrate": Job(lambda _, out: ["calibrate", "--out", out], "out.json"),
-    "bench": Job(lambda _, out: ["bench", "--json", out], "out.json"),
 }  # fmt: skip
 # they take ten seconds and more; the same code writes for the others, which stay quick
 HEAVY = ("study", "study --write-ifc", "demo", "pv", "ifc survey", "comply", "comply --write-ifc")

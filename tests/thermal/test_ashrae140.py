@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scenes.evidence.validation.ashrae140 import compare
+from tests.validation.ashrae140 import compare
 
 
 def outside(table) -> list[str]:
@@ -31,7 +31,7 @@ def test_all_cases_lie_in_the_range(reference_data):
 @pytest.mark.slow
 def test_traced_sun_by_its_parts_is_energyplus_own(variant, reference_data):
     pytest.importorskip("pyenergyplus")
-    from scenes.evidence.validation.ashrae140_components import compare as by_parts
+    from tests.validation.ashrae140_components import compare as by_parts
 
     table = by_parts(reference_data / "ashrae140", samples=2048).set_index(["case", "part"])
     on = table["on: traced"] / table["on: EnergyPlus"] - 1

@@ -231,7 +231,7 @@ def test_both_faces_of_a_wall_get_one_construction():
 @pytest.mark.slow
 def test_two_rooms_agree_with_energyplus():
     pytest.importorskip("pyenergyplus")
-    from scenes.evidence.validation.energyplus_two_rooms import compare
+    from tests.validation.energyplus_two_rooms import compare
 
     table = compare()
     assert len(table) == 8

@@ -12,29 +12,29 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.sky.epw import read_epw
-from scenes.evidence.benchmarks.thermal_year import EPW, glazing
-from scenes.evidence.validation.energyplus_cases import (
+from tests.benchmarks.thermal_year import EPW, glazing
+from tests.conftest import REPOSITORY
+from tests.validation.energyplus_cases import (
     EPW_FILES,
     FIRST_HOUR,
     Site,
     pairs,
     simulate_case,
 )
-from scenes.evidence.validation.energyplus_loads import annual_loads
-from scenes.evidence.validation.energyplus_reference import DEMO_FILE, DEMO_ORIENTATIONS
-from scenes.evidence.validation.energyplus_statistics import (
+from tests.validation.energyplus_loads import annual_loads
+from tests.validation.energyplus_reference import DEMO_FILE, DEMO_ORIENTATIONS
+from tests.validation.energyplus_statistics import (
     case_row,
     comfort_classification,
     pooled,
 )
-from scenes.evidence.validation.facade_sun import facade_sun, sun_steps
-from scenes.evidence.validation.reference_room import (
+from tests.validation.facade_sun import facade_sun, sun_steps
+from tests.validation.reference_room import (
     ORIENTATIONS,
     RoomLight,
     climate,
     facade_normal,
 )
-from tests.conftest import REPOSITORY
 
 BARS = {
     "dgu": (0.2, 0.3),
@@ -153,7 +153,7 @@ def test_comfort_agrees(real_data, reference_data):
 @pytest.mark.slow
 def test_energyplus_run_here_and_now_is_the_reference(real_data, reference_data, tmp_path):
     pytest.importorskip("pyenergyplus")
-    from scenes.evidence.validation.energyplus_model import room_model, run_energyplus
+    from tests.validation.energyplus_model import room_model, run_energyplus
 
     epw = real_data / "epw" / EPW_FILES["Frankfurt"]
     table = pd.read_parquet(reference_data / "energyplus" / "ep_Frankfurt.parquet")

@@ -65,7 +65,7 @@ def test_the_balance_compiles_once_in_seconds_and_is_found_again(tmp_path: Path)
 @pytest.mark.slow
 def test_clear_glazing_agrees_with_energyplus_and_is_faster():
     pytest.importorskip("pyenergyplus")
-    from scenes.evidence.benchmarks.thermal_year import one_year
+    from tests.benchmarks.thermal_year import one_year
 
     result = one_year(lambda stage, fraction: None)
     assert float(result.note.split(" by ")[1].split()[0]) < 0.2  # bar of issue 7 for glazing [K]

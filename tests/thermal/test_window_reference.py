@@ -10,8 +10,8 @@ import pytest
 
 pywincalc = pytest.importorskip("pywincalc")
 
-from scenes.evidence.validation.window_reference import write  # noqa: E402
 from tests.conftest import WINDOW_GLAZING  # noqa: E402
+from tests.validation.window_reference import write  # noqa: E402
 
 pytestmark = pytest.mark.peer
 

@@ -22,7 +22,7 @@ def glass_transmittance(cosine):
 def glass():
     """T and the sun's way of glass that a file knows at the middles of its patches."""
     from mitsuba_cfs.methods.optics import GivenOptics
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     tau = glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
     return GivenOptics(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
@@ -30,7 +30,7 @@ def glass():
 
 def diffuser(tau: float):
     from mitsuba_cfs.methods.optics import GivenOptics
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     block = np.full((K, K), tau / np.pi)
     return GivenOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))

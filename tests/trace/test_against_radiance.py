@@ -58,8 +58,8 @@ def check(ours, theirs: Repeated, name: str):
 
 def ours(matrix: str, name: str):
     """The same matrix by our tracer."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     surfaces, groups, outside = SCENES[name]()
     if matrix == "view":

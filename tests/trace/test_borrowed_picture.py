@@ -16,10 +16,10 @@ from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.trace.sampling import spread_rays
-from mitsuba_cfs.trace.systems import AngularScattering
-from scenes.evidence.validation import inner_glass
-from scenes.evidence.validation.inner_glass import GLASS, INNER_TAU, TAU, WINDOW, walls_at
+from mitsuba_cfs.trace.kernels.sampling import spread_rays
+from mitsuba_cfs.trace.kernels.scattering import AngularScattering
+from tests.validation import inner_glass
+from tests.validation.inner_glass import GLASS, INNER_TAU, TAU, WINDOW, walls_at
 
 pytestmark = pytest.mark.usefixtures("variant")
 

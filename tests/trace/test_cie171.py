@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenes.evidence.validation import cie171
-from scenes.evidence.validation.cie171_cases import SKIES, SUN, cases, reported
-from scenes.evidence.validation.cie171_quadrature import Wall
+from tests.validation import cie171
+from tests.validation.cie171_cases import SKIES, SUN, cases, reported
+from tests.validation.cie171_quadrature import Wall
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -69,7 +69,7 @@ def test_a_wall_outdoors_has_the_light_that_the_facade_leaves_it():
 
 def test_a_pane_of_the_quadrature_is_the_programs_pane():
     from mitsuba_cfs.bsdf.glazing import pane_values
-    from scenes.evidence.validation.cie171_quadrature import pane_transmittance
+    from tests.validation.cie171_quadrature import pane_transmittance
 
     cosine = np.linspace(0.01, 1, 50)
     ours, _, _ = pane_values(cie171.pane(), np.arccos(cosine))

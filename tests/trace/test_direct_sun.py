@@ -21,7 +21,7 @@ SUNS = SUNS / np.linalg.norm(SUNS, axis=1)[:, None]
 
 
 def matrix(scattering, exterior=rooms.NOTHING, suns=SUNS, points=POINTS, **options):
-    from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     room, groups = rooms.test_room()
     normals = np.tile(UP, (len(points), 1))
@@ -31,20 +31,20 @@ def matrix(scattering, exterior=rooms.NOTHING, suns=SUNS, points=POINTS, **optio
 
 
 def diffuser(tau: float):
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     return KlemsScattering(KLEMS_FULL, np.full((K, K), tau / np.pi), np.zeros(K))
 
 
 def glass(tau: float):
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     return KlemsScattering(KLEMS_FULL, np.zeros((K, K)), np.full(K, tau))
 
 
 def test_a_diffuser_in_the_sun_is_a_window_of_even_luminance():
-    from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
+    from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     room, groups = rooms.test_room()
     found = matrix(diffuser(0.5))
@@ -57,7 +57,7 @@ def test_a_diffuser_in_the_sun_is_a_window_of_even_luminance():
 
 
 def test_an_even_window_has_the_closed_form_of_its_view_factor():
-    from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
+    from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     from .test_matrices import window_factor
 
@@ -70,7 +70,7 @@ def test_an_even_window_has_the_closed_form_of_its_view_factor():
 
 
 def test_sun_through_glass_lights_the_sensors_in_its_beam():
-    from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
+    from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     found = matrix(glass(0.8)).values / SUN_SOLID_ANGLE
     foot = (
@@ -89,7 +89,7 @@ def test_sun_through_glass_lights_the_sensors_in_its_beam():
 def test_a_half_hidden_disc_gives_its_visible_part(share):
     """An edge outdoors covers the left of the disc seen from the sensor."""
     from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
 
     sun = np.array([0.0, -1.0, 0.5]) / np.sqrt(1.25)
     x, far = 1.8, 100.0
@@ -117,8 +117,8 @@ def half_hidden(x: float = 1.8, far: float = 100.0):
 
 def test_a_shadows_edge_is_known_to_a_hundredth_and_the_rest_exactly():
     """As five phases ask for it: with 64 directions on the disc a sensor at an edge was 9 % off."""
-    from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     cover, sun, point = half_hidden()
     points = point + np.array([[0, 0, 0], [0.6, 0, 0], [-0.6, 0, 0]])
@@ -167,9 +167,9 @@ def test_through_peak_takes_the_beam_and_leaves_the_rest():
 def test_five_phase_of_clear_glass_is_never_negative_and_has_the_exact_sun():
     from mitsuba_cfs import phases
     from mitsuba_cfs.sky.patches import ReinhartSky
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.direct_sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
+    from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     room, groups = rooms.test_room()
     sky = ReinhartSky(1)

@@ -66,7 +66,8 @@ def radiance_illuminance(name, sun, folder) -> np.ndarray:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_scattered_sun(name, tmp_path):
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     system = blind()
     write_bsdf_xml(BsdfFile({"Visible": system}, name="lobe"), tmp_path / "blind.xml")

@@ -7,9 +7,9 @@ import pytest
 
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.escape import SIDES, escaped_view
-from mitsuba_cfs.trace.estimate import Stopping
-from mitsuba_cfs.trace.view_matrix import view_matrix
+from mitsuba_cfs.trace.kernels.estimate import Stopping
+from mitsuba_cfs.trace.matrices.escape import SIDES, escaped_view
+from mitsuba_cfs.trace.matrices.view import view_matrix
 from tests.trace.rooms import DEPTH, HEIGHT, WIDTH, test_room
 
 pytestmark = pytest.mark.usefixtures("variant")

@@ -71,8 +71,9 @@ def test_a_group_with_fewer_states_ends_with_its_last(corner):
 def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     """V T D s - V_d T D_d s_d - the reflected beam by patches + itself, straight views, C_ds s."""
     from mitsuba_cfs.methods.phase_light import PhaseSystems
-    from mitsuba_cfs.trace.direct_sun import direct_sun_matrix, patch_beams, through_beams
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.scattering import patch_beams, through_beams
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     matrices, sky = corner
     scene, chosen = matrices.scene, [glass(), diffuser(0.4)]
@@ -149,8 +150,8 @@ def test_the_room_has_a_beam_once_wherever_t_has_it(corner):
 
 
 def test_the_suns_light_by_group_adds_up_to_that_of_the_room(corner):
-    from mitsuba_cfs.trace.direct_sun import direct_sun_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     matrices, sky = corner
     scene, ways = matrices.scene, [diffuser(0.2).scattering, diffuser(0.4).scattering]

@@ -48,7 +48,7 @@ def suns_at(places, diffuse: float = 0.0):
 def test_the_beam_between_patches_is_linear_in_angle_and_that_of_the_patch_at_its_middle():
     import mitsuba as mi
 
-    from mitsuba_cfs.trace.bins import DirectionBins
+    from mitsuba_cfs.trace.kernels.bins import DirectionBins
 
     bins, values = DirectionBins(KLEMS_FULL), np.random.default_rng(0).random(K)
 
@@ -93,7 +93,7 @@ def test_glass_keeps_its_hemispherical_transmittance():
 def test_five_phases_of_clear_glass_have_the_suns_own_transmittance_all_through():
     """A glass that had the sun's transmittance in every patch gives the same, hour by hour."""
     from mitsuba_cfs.methods.optics import GivenOptics
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     wanted = [(62, 0.3), (66, 0.9), (74, 0.3), (77, 0.6), (84, 0.6)]
     _, sun = suns_at(wanted)
@@ -120,9 +120,10 @@ def test_five_phases_of_clear_glass_are_never_five_per_cent_above_its_paths():
     never high.  With one transmittance in a ring 86 degrees would be 60 % high.  Windows are black
     from the room on both sides.
     """
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-    from mitsuba_cfs.trace.point_in_time import point_in_time
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.scattering import AngularBeam
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.point_in_time import point_in_time
 
     diffuse = 300.0  # cd/m2 of a uniform sky and ground
     sky, sun = suns_at([(62, 0.3), (74, 0.9), (86, 0.3)], diffuse)

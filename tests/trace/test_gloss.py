@@ -82,8 +82,8 @@ def test_faults_are_said():
 def test_a_mirror_outdoors_is_an_image_of_the_sky():
     """D of a window before a mirror is D of an open window, its patches turned over."""
     from mitsuba_cfs.sky.patches import ReinhartSky
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     _, groups = rooms.test_room()
     options = {"subdivision": 1, "samples": 2048, "stopping": Stopping(batches=4)}
@@ -104,8 +104,8 @@ def test_a_mirror_outdoors_is_an_image_of_the_sky():
 
 @pytest.mark.parametrize("gloss", [mirror(0.7, 0.02), mirror(0.7, 0.15), mirror(0.7, 0.3)])
 def test_a_rough_mirror_gives_off_no_more_than_it_gets(gloss):
-    from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 
     table = Surfaces(NORTH, np.zeros(2), np.zeros(2, dtype=int), (), (gloss,))
     found = sky_irradiance_matrix(
@@ -197,8 +197,8 @@ def test_the_sun_by_a_glossy_floor_is_a_spot_on_the_ceiling():
 
 def test_a_view_matrix_sees_the_window_in_the_floor():
     """V of a sensor that looks down on a mirror floor is V_d of its image that looks up."""
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     _, floor = black_room(mirror(0.5))
     _, groups = rooms.test_room()
@@ -212,7 +212,7 @@ def test_a_view_matrix_sees_the_window_in_the_floor():
 
 
 def direct_down(groups, point) -> float:
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     return view_matrix(rooms.NOTHING, groups, point, [[0.0, 0.0, -1.0]], max_depth=1).values.sum()
 
@@ -220,8 +220,8 @@ def direct_down(groups, point) -> float:
 @pytest.mark.parametrize("gloss", [lacquer(0.06), mirror(0.3, 0.1)])
 def test_a_glossy_room_is_the_same_to_matrices_and_to_paths(gloss):
     """E behind a clear opening under an even sky: row sums of V and paths, which share no walk."""
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     room = replace(room, gloss=(gloss, None, gloss, *(None,) * 6))

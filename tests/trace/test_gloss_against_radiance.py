@@ -8,15 +8,15 @@ from mitsuba_cfs.images.view import fisheye
 
 pytestmark = pytest.mark.usefixtures("variant")
 
-# Ev [lx] of `rtrace` and its standard error, by `python -m scenes.evidence.validation.gloss`
+# Ev [lx] of `rtrace` and its standard error, by `python -m tests.validation gloss`
 RTRACE = {"mirror": (8062.0, 6.1), "metal": (6998.9, 10.7), "floor": (2650.9, 2.1)}
 
 
 @pytest.mark.parametrize("name", RTRACE)
 def test_illuminance_at_the_eye_is_that_of_rtrace(name):
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.point_in_time import point_in_time
-    from scenes.evidence.validation import gloss
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+    from tests.validation import gloss
 
     given, view = gloss.case(name), fisheye(gloss.EYE, gloss.DIRECTION, 50)
     found = point_in_time(
@@ -34,7 +34,7 @@ def test_illuminance_at_the_eye_is_that_of_rtrace(name):
 @pytest.mark.parametrize("name", RTRACE)
 def test_illuminance_and_glare_are_those_of_radiance_run_here_and_now(name, tmp_path):
     pytest.importorskip("pyradiance")
-    from scenes.evidence.validation.gloss import outcome
+    from tests.validation.gloss import outcome
 
     found = outcome(name, tmp_path, size=100, points=2)
     noise = 4 * (found.ev_error**2 + found.ev_rtrace_error**2) ** 0.5

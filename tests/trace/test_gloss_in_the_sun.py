@@ -32,7 +32,8 @@ pytestmark = pytest.mark.usefixtures("variant")
 
 def test_the_sun_in_a_mirror_is_a_sun_to_the_direct_matrix():
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     room, groups = black_room(None)[0], rooms.test_room()[1]
     scattered = np.full((145, 145), 0.1)
@@ -49,8 +50,8 @@ def test_the_sun_in_a_mirror_is_a_sun_to_the_direct_matrix():
 
 
 def test_a_mirror_behind_the_windows_sends_them_no_sun():
-    from mitsuba_cfs.trace.scene import TracedScene
-    from mitsuba_cfs.trace.sun_ways import sun_ways
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.specular_paths import sun_ways
 
     _, groups = rooms.test_room()
     for shift, ways in ((0.0, 2), (30.0, 1)):  # before the window, and behind the house
@@ -81,8 +82,8 @@ def test_five_phases_have_the_sun_of_a_mirror_facade():
 def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.lit_room import LitRoom
-    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom
+    from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     sky = lit_by(np.zeros(146), SUN, 50_000.0 / SUN_SOLID_ANGLE)
     view = fisheye(EYE, (0.0, -1.0, 0.0), 32)
@@ -96,8 +97,8 @@ def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
 def test_a_five_phase_picture_shows_the_suns_disc_in_a_mirror(indoors):
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
     from mitsuba_cfs.images.view import fisheye
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.picture_sun import PictureSun
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     room, floor = black_room(mirror(0.8))
     beam = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
@@ -121,8 +122,8 @@ def test_the_sun_on_a_rough_facade_is_seen_through_the_window():
     """Pixels of a five-phase picture against the lobe itself, one sun and a black sky."""
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
     from mitsuba_cfs.images.view import fisheye
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.picture_outdoors import outdoors
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.pictures.outdoors import outdoors
 
     alpha, view = 0.2, fisheye(EYE, (0.0, -1.0, 0.0), 48)
     beam = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
@@ -147,8 +148,8 @@ def test_window_patches_have_the_sun_of_a_rough_facade_in_its_lobe(alpha):
     """Irradiance of the window by the patches' light, against the lobe's integral."""
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
     from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.reflected import outdoor_light, window_shares
 
     outside = TracedScene(facade(mirror(0.6, alpha)), rooms.test_room()[1])
     shares = window_shares(outside, samples=1024)
@@ -160,8 +161,8 @@ def test_window_patches_have_the_sun_of_a_rough_facade_in_its_lobe(alpha):
 
 
 def test_the_sun_on_a_smooth_mirror_is_counted_by_its_image_alone():
-    from mitsuba_cfs.trace.scene import TracedScene
-    from mitsuba_cfs.trace.sun_paths import Places, reflecting_places
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.lit_points import Places, reflecting_places
 
     normals = np.tile(np.float32([0, -1, 0]), (4096, 1))
     for gloss, diffuse, expected in (
@@ -177,8 +178,8 @@ def test_the_sun_on_a_smooth_mirror_is_counted_by_its_image_alone():
 
 def test_a_mirror_floor_absorbs_what_it_does_not_mirror():
     """In a black room: the floor keeps 0.6 of what meets it first, the others 0.4."""
-    from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
 
     black, floor = black_room(mirror(0.4))
     _, groups = rooms.test_room()

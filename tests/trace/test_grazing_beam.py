@@ -21,7 +21,8 @@ def beam_of(bsdf, theta) -> dict:
     """Transmittance of the beam at `theta` [rad], for the direct sun and for paths."""
     import mitsuba as mi
 
-    from mitsuba_cfs.trace.systems import lit_system, sun_scattering
+    from mitsuba_cfs.trace.kernels.scattering import sun_scattering
+    from mitsuba_cfs.trace.paths.systems import lit_system
 
     local = np.stack([np.sin(theta) * 0.6, np.sin(theta) * 0.8, np.cos(theta)])
     towards = mi.Vector3f(local.astype(np.float32))

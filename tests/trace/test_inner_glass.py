@@ -8,8 +8,8 @@ import pytest
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
-from scenes.evidence.validation.cut_groups import surfaces
-from scenes.evidence.validation.inner_glass import (
+from tests.validation.cut_groups import surfaces
+from tests.validation.inner_glass import (
     FIRST,
     GLASS,
     by_paths,
@@ -21,14 +21,14 @@ from scenes.evidence.validation.inner_glass import (
 pytestmark = pytest.mark.usefixtures("variant")
 
 # [lx] of the sensors by `path`, mean of four seeds, standard error at most 0.6 and 1.4 % of a
-# sensor: `python -m scenes.evidence.validation.inner_glass --paths 1048576`
+# sensor: `python -m tests.validation inner_glass --paths 1048576`
 PATHS = {2: [148.4, 109.7, 86.7, 74.1, 93.8], 3: [21.9, 18.0, 16.0, 16.4, 16.4]}
 
 
 def test_straight_on_the_glass_has_what_the_window_before_it_has() -> None:
     """Both normal patches: nothing between, so the glass has T D of the window, and no more."""
-    from mitsuba_cfs.trace.borrowed_daylight import borrowed_daylight
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.adjacent_daylight import borrowed_daylight
 
     def group(name: str, y: float, place: tuple) -> WindowGroup:
         return WindowGroup(name, (WindowSurface(name, upright(y, place, north=False)),))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.trace.estimate import Stopping
+from mitsuba_cfs.trace.kernels.estimate import Stopping
 
 from . import rooms
 
@@ -24,12 +24,12 @@ def town(side: int = 40, spread: float = 12.0):
 
 def apart(monkeypatch, *given, **chosen):
     """The scene in a structure of its own, all in one mesh."""
-    from mitsuba_cfs.trace import kept_mesh
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels import mesh
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
 
     with monkeypatch.context() as patch:
-        patch.setattr(kept_mesh, "FROM", 10**9)
-        patch.setattr(kept_mesh, "_last", [])
+        patch.setattr(mesh, "FROM", 10**9)
+        patch.setattr(mesh, "_last", [])
         return TracedScene(*given, **chosen)
 
 
@@ -59,8 +59,8 @@ def met(scene, rays: int = 50_000, *, half: bool = False):
 @pytest.mark.parametrize("half", [False, True])
 @pytest.mark.parametrize("blocks", [False, True])
 def test_rays_meet_what_they_meet_in_one_mesh(monkeypatch, blocks, half):
-    from mitsuba_cfs.trace.kept_mesh import SharedScene
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.mesh import SharedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
 
     given = town(), rooms.test_room()[1]
     shared = TracedScene(*given, windows_block=blocks)
@@ -77,8 +77,8 @@ def test_rays_meet_what_they_meet_in_one_mesh(monkeypatch, blocks, half):
 
 
 def test_scenes_of_equal_triangles_share_one_structure():
-    from mitsuba_cfs.trace.kept_mesh import kept_mesh
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.mesh import kept_mesh
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
 
     first, again, groups = town(), town(), rooms.test_room()[1]
     built = kept_mesh(first.triangles)
@@ -93,7 +93,7 @@ def test_scenes_of_equal_triangles_share_one_structure():
 
 
 def test_what_reaches_far_or_is_small_is_built_about_each_scenes_own_middle():
-    from mitsuba_cfs.trace.kept_mesh import kept_mesh
+    from mitsuba_cfs.trace.kernels.mesh import kept_mesh
 
     assert kept_mesh(town().triangles).is_shared
     assert not kept_mesh(town(spread=300.0).triangles).is_shared
@@ -101,8 +101,8 @@ def test_what_reaches_far_or_is_small_is_built_about_each_scenes_own_middle():
 
 
 def test_matrix_does_not_know_whether_the_structure_is_shared(monkeypatch):
-    from mitsuba_cfs.trace import kept_mesh, scene
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+    from mitsuba_cfs.trace.kernels import mesh, scene
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     def traced():
         scene._last_scenes.clear()
@@ -110,8 +110,8 @@ def test_matrix_does_not_know_whether_the_structure_is_shared(monkeypatch):
         return daylight_matrix(town(), rooms.test_room()[1], **few).values
 
     shared = traced()
-    monkeypatch.setattr(kept_mesh, "FROM", 10**9)
-    monkeypatch.setattr(kept_mesh, "_last", [])
+    monkeypatch.setattr(mesh, "FROM", 10**9)
+    monkeypatch.setattr(mesh, "_last", [])
     alone = traced()
     scene._last_scenes.clear()
     # of 9,280 paths some ten meet another tile at an edge, and each carries 1/64 of its row at most

@@ -41,7 +41,7 @@ def window_factor(x: float, y: float, z: float) -> float:
 
 
 def test_view_matrix_row_sum_in_a_black_room_is_pi_times_the_configuration_factor():
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room(scale=0.0)
     points = np.array([[1.0, 0.5, 0.8], [1.8, 2.0, 0.8], [3.0, 4.4, 0.8], [1.8, 1.0, 2.0]])
@@ -54,7 +54,7 @@ def test_view_matrix_row_sum_in_a_black_room_is_pi_times_the_configuration_facto
 
 
 def test_uniform_sky_gives_pi_on_a_horizontal_sensor_and_one_on_a_window():
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, sky_irradiance_matrix
 
     sky = sky_irradiance_matrix(rooms.NOTHING, [[0, 0, 0]], [UP], subdivision=1, samples=65536)
     assert sky.values[0, 0] == pytest.approx(0, abs=1e-5)  # no ground above the horizon
@@ -71,7 +71,7 @@ def test_uniform_sky_gives_pi_on_a_horizontal_sensor_and_one_on_a_window():
 
 
 def test_daylight_matrix_sends_each_klems_patch_to_the_sky_it_faces():
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     _, groups = rooms.test_room()
     daylight = daylight_matrix(rooms.NOTHING, groups, subdivision=4, samples=4096).values[0]
@@ -85,7 +85,7 @@ def test_daylight_matrix_sends_each_klems_patch_to_the_sky_it_faces():
 
 
 def test_a_wall_of_reflectance_r_before_the_window_reflects_r_times_what_it_receives():
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     r = 0.6
     wall = rooms.surfaces(
@@ -101,8 +101,8 @@ def test_a_wall_of_reflectance_r_before_the_window_reflects_r_times_what_it_rece
 
 def test_clear_opening_three_phase_is_the_two_phase_matrix():
     """V T D with T = 1 against sky coefficients traced straight through the open hole."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix, sky_irradiance_matrix
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, sky_irradiance_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     points, directions = [[1.2, 1.5, 0.85], [2.0, 3.5, 0.85]], [UP, UP]
@@ -119,7 +119,7 @@ def test_clear_opening_three_phase_is_the_two_phase_matrix():
 
 
 def test_absorbed_shares_sum_to_one_and_follow_the_reflectances():
-    from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
+    from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
 
     room, groups = rooms.test_room()
     values = absorption_matrix(room, groups, samples=2048).values[0]
@@ -138,15 +138,15 @@ def test_absorbed_shares_sum_to_one_and_follow_the_reflectances():
 
 def test_picture_does_not_depend_on_the_block_and_its_illuminance_is_the_view_matrix(monkeypatch):
     from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
-    from mitsuba_cfs.trace import image
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices import pixel_view
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     view = fisheye((1.8, 2.5, 1.2), (0, -1, 0), 64)
     luminance = np.linspace(500, 5000, 145)[None, :, None]
-    whole = image.luminance_pictures(room, groups, view, luminance, samples=16)
-    monkeypatch.setattr(image, "BLOCK_BYTES", 8 * 145 * 1000)
-    blocks = image.luminance_pictures(room, groups, view, luminance, samples=16)
+    whole = pixel_view.luminance_pictures(room, groups, view, luminance, samples=16)
+    monkeypatch.setattr(pixel_view, "BLOCK_BYTES", 8 * 145 * 1000)
+    blocks = pixel_view.luminance_pictures(room, groups, view, luminance, samples=16)
     np.testing.assert_allclose(whole, blocks, rtol=1e-5)
 
     directions, counts = pixel_directions(view)
@@ -158,8 +158,8 @@ def test_picture_does_not_depend_on_the_block_and_its_illuminance_is_the_view_ma
 
 
 def test_seed_and_batches_key_the_result():
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     options = {"samples": 256, "stopping": Stopping(batches=2)}
@@ -172,8 +172,8 @@ def test_seed_and_batches_key_the_result():
 
 
 def test_stated_error_is_the_spread_between_seeds():
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     runs = [
@@ -190,8 +190,8 @@ def test_stated_error_is_the_spread_between_seeds():
 
 def test_stated_error_of_sums_is_the_spread_between_seeds():
     """Entries of a row go together: they share the points that the sensors' rays hit."""
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     points = [[0.5 + 0.4 * i, 0.5 + 0.5 * j, 0.8] for i in range(8) for j in range(8)]
@@ -212,7 +212,7 @@ def test_stated_error_of_sums_is_the_spread_between_seeds():
 
 def test_sensors_do_not_change_each_other():
     """A row is the same, but for noise, whoever else is asked for."""
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     first = np.array([1.0, 4.55, 0.8])  # 5 cm from the back wall
@@ -226,7 +226,7 @@ def test_sensors_do_not_change_each_other():
 
 
 def test_rays_that_leave_through_a_gap_bring_nothing():
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     room, groups = rooms.test_room()
     keep = room.surface != 2  # without its back wall
@@ -258,7 +258,7 @@ def panes_before_a_screen(gap: float = 0.002) -> tuple[WindowGroup, list[WindowG
 
 def test_panes_before_a_screen_do_not_take_its_light():
     """Nor do they let through what comes back from outdoors, 3 % here."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     alone, both = panes_before_a_screen()
     expected, found = (
@@ -272,7 +272,7 @@ def test_panes_before_a_screen_do_not_take_its_light():
 
 
 def test_cells_of_a_screen_have_its_light():
-    from mitsuba_cfs.trace.cell_daylight import cell_daylight
+    from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
     from mitsuba_cfs.window_parts import window_cells
 
     alone, both = panes_before_a_screen()
@@ -287,8 +287,8 @@ def test_cells_of_a_screen_have_its_light():
 
 
 def test_a_sensor_sees_the_outdoors_through_a_screen():
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.straight_view import straight_view_matrix
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
     room, _ = rooms.test_room()
     alone, both = panes_before_a_screen()
@@ -306,7 +306,7 @@ def test_a_sensor_sees_the_outdoors_through_a_screen():
 
 def test_the_reveal_between_panes_and_a_screen_lights_the_screen():
     """Light comes in through the panes, falls on the reveal and from there on the screen."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     x0, x1, z0, z1, d = rooms.X0, rooms.X1, rooms.Z0, rooms.Z1, -0.8
     reveal = rooms.surfaces(
@@ -329,7 +329,7 @@ def test_the_reveal_between_panes_and_a_screen_lights_the_screen():
 
 
 def test_a_sensor_of_several_places_is_their_mean(variant):
-    from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
+    from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 
     corners = np.array([(-50, -2, 1), (50, -2, 1), (50, 50, 1), (-50, 50, 1)], dtype=float)
     roof = Surfaces(corners[[[0, 1, 2], [0, 2, 3]]], np.zeros(2), np.zeros(2, dtype=int))
@@ -344,8 +344,8 @@ def test_a_sensor_of_several_places_is_their_mean(variant):
 
 
 def test_batches_of_few_paths_go_on_to_the_next_places(variant):
-    from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 
     corners = np.array([(-1e4, 0, 1), (1e4, 0, 1), (1e4, 1e4, 1), (-1e4, 1e4, 1)], dtype=float)
     roof = Surfaces(corners[[[0, 1, 2], [0, 2, 3]]], np.zeros(2), np.zeros(2, dtype=int))

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 import mitsuba_cfs as cfs
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.images.view import pixel_directions
-from mitsuba_cfs.trace.picture_outdoors import outdoors
+from mitsuba_cfs.trace.pictures.outdoors import outdoors
 from scenes.demo import WEATHER
-from scenes.evidence.validation import fireflies
+from tests.validation import fireflies
 
 pytestmark = pytest.mark.usefixtures("variant")
 

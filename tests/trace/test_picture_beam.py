@@ -11,15 +11,15 @@ import pytest
 
 import mitsuba_cfs as cfs
 from mitsuba_cfs.images.view import pixel_directions
-from mitsuba_cfs.trace.picture_beam import beam_light
-from mitsuba_cfs.trace.picture_rows import PictureRows
-from mitsuba_cfs.trace.picture_sharing import tile_size
-from mitsuba_cfs.trace.sampling import vectors
-from mitsuba_cfs.trace.scene import kept_scene
-from mitsuba_cfs.trace.straight_view import straight_view_matrix
+from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows
+from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.sampling import vectors
+from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
+from mitsuba_cfs.trace.sun.picture_beam import beam_light
 from scenes.cost import room as box
 from scenes.demo import WEATHER
-from scenes.evidence.validation import fireflies
+from tests.validation import fireflies
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.trace.picture_edges import EDGE_PLACES, edge_pixels
-from mitsuba_cfs.trace.sampling import pixel_places
+from mitsuba_cfs.trace.kernels.sampling import pixel_places
+from mitsuba_cfs.trace.sun.picture_edges import EDGE_PLACES, edge_pixels
 
 VIEW = View(width=9, height=6)
 

@@ -23,8 +23,8 @@ DARK = np.zeros(146)
 
 
 def picture(systems, sky, scene, view=VIEW, **options):
-    from mitsuba_cfs.trace.lit_room import LitRoom
-    from mitsuba_cfs.trace.picture_paths import point_in_time_picture
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom
+    from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups, exterior = scene
     return point_in_time_picture(LitRoom(interior, exterior, groups, systems), sky, view, **options)
@@ -50,8 +50,8 @@ def random_tree_system(seed: int) -> TensorTreeBsdf:
 
 def test_no_light_of_a_picture_comes_through_the_room_from_behind():
     """A box closed round the window's outside: no sky or sun may light it through the window."""
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.picture_outdoors import outdoors
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.pictures.outdoors import outdoors
 
     room, groups = rooms.test_room()
     x0, x1, z0, z1, d = rooms.X0 - 1, rooms.X1 + 1, rooms.Z0 - 1, rooms.Z1 + 1, -2.0
@@ -80,9 +80,10 @@ def test_no_light_of_a_picture_comes_through_the_room_from_behind():
 
 @pytest.mark.parametrize("kind", ["glass", "mirror", "diffuser"])
 def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.lit_room import AngularBeam, LitRoom, PathOptics, Sky
-    from mitsuba_cfs.trace.point_in_time import point_in_time
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.scattering import AngularBeam
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.point_in_time import point_in_time
 
     half = AngularBeam(np.full(16, 0.3))
     system = {
@@ -102,7 +103,7 @@ def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
 
 
 def test_tiles_do_not_change_the_mean_of_a_face():
-    from mitsuba_cfs.trace.lit_room import Sky
+    from mitsuba_cfs.trace.paths.path_scene import Sky
 
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.NOTHING), Sky(SKY, SUN, SUN_LUMINANCE)
@@ -119,7 +120,7 @@ def test_tiles_do_not_change_the_mean_of_a_face():
 
 
 def test_light_is_smoothed_over_a_face_and_never_over_its_edge():
-    from mitsuba_cfs.trace.picture_sharing import SharedLight, Tiles
+    from mitsuba_cfs.trace.kernels.pixel_sharing import SharedLight, Tiles
 
     tiles = Tiles(4, 40)
     pixel = np.arange(40 * 40)
@@ -143,7 +144,7 @@ def test_light_is_smoothed_over_a_face_and_never_over_its_edge():
 def test_noise_of_few_paths_makes_no_glare_sources():
     """Four paths a pixel: DGP varies by less than 0.005, and nothing on the walls glares."""
     from mitsuba_cfs.glare.evaluation import evaluate
-    from mitsuba_cfs.trace.lit_room import Sky
+    from mitsuba_cfs.trace.paths.path_scene import Sky
 
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.NOTHING), Sky(SKY, SUN, SUN_LUMINANCE)
@@ -158,8 +159,8 @@ def test_noise_of_few_paths_makes_no_glare_sources():
 
 def test_a_colour_picture_has_the_bands_luminance():
     from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS, luminance
-    from mitsuba_cfs.trace.lit_room import LitRoom, Sky
-    from mitsuba_cfs.trace.picture_paths import colour_picture
+    from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+    from mitsuba_cfs.trace.pictures.point_in_time import colour_picture
 
     interior, groups = rooms.test_room()
     room = LitRoom(interior, rooms.NOTHING, groups, [glass(0.7)])
@@ -179,7 +180,7 @@ def test_a_colour_picture_has_the_bands_luminance():
 def test_other_views_show_the_same_luminance_in_the_same_direction(kind):
     from dataclasses import replace
 
-    from mitsuba_cfs.trace.lit_room import Sky
+    from mitsuba_cfs.trace.paths.path_scene import Sky
 
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.NOTHING), Sky(SKY, SUN, SUN_LUMINANCE)
@@ -198,10 +199,10 @@ def test_other_views_show_the_same_luminance_in_the_same_direction(kind):
 def test_windows_reflect_the_rooms_light_in_the_phase_methods():
     """A white back of the window: V's picture is the path-traced one of a Lambertian window."""
     from mitsuba_cfs import phases
-    from mitsuba_cfs.trace.annual_pictures import view_matrices
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.image import luminance_pictures
-    from mitsuba_cfs.trace.lit_room import Sky
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+    from mitsuba_cfs.trace.matrices.pixel_view import luminance_pictures
+    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.pictures.annual import view_matrices
 
     tau, back = 0.3, 0.6
     interior, groups = rooms.test_room()
@@ -224,10 +225,10 @@ def test_windows_reflect_the_rooms_light_in_the_phase_methods():
 
 def test_sun_of_several_groups_with_trees_is_that_of_paths():
     """Two windows, a tensor tree in one and glass in the other, before a wall that shades."""
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering
-    from mitsuba_cfs.trace.lit_room import Sky
-    from mitsuba_cfs.trace.picture_sun import PictureSun
-    from mitsuba_cfs.trace.systems import lit_system, sun_scattering
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering, sun_scattering
+    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.systems import lit_system
+    from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     K = KLEMS_FULL.size
     tree = random_tree_system(3)

@@ -23,8 +23,9 @@ def directions(count: int) -> np.ndarray:
 def test_discs_that_no_window_can_show_are_those_of_all_pairs(monkeypatch):
     """Among them suns whose disc alone reaches the window, from sensors near and far."""
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
-    from mitsuba_cfs.trace.sun_discs import SunDiscs
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
+    from mitsuba_cfs.trace.sun.discs import SunDiscs
 
     room, groups = rooms.test_room()
     sensors = np.array([[1.8, 0.05, 0.8], [1.8, 1.0, 0.8], [1.0, 4.0, 0.8], [1.8, 4.0, 1.7]])
@@ -49,9 +50,9 @@ def test_discs_that_no_window_can_show_are_those_of_all_pairs(monkeypatch):
 
 def test_rays_that_pass_the_box_of_a_mirror_are_all_that_meet_it(monkeypatch):
     from mitsuba_cfs.surfaces import Surfaces
-    from mitsuba_cfs.trace.scene import TracedScene
-    from mitsuba_cfs.trace.sun_paths import Places, sunlight
-    from mitsuba_cfs.trace.sun_ways import SunWay
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.lit_points import Places, sunlight
+    from mitsuba_cfs.trace.sun.specular_paths import SunWay
 
     pane = rooms.quad((0, -10, 0), (4, -11, 0), (4, -11, 3), (0, -10, 3))
     there = Surfaces(pane, np.zeros(2), np.zeros(2, dtype=int), (), (mirror(0.8),))
@@ -67,8 +68,8 @@ def test_rays_that_pass_the_box_of_a_mirror_are_all_that_meet_it(monkeypatch):
 
 
 def test_cells_hold_the_places_that_their_rays_start_from_and_others_do_not_matter(monkeypatch):
-    from mitsuba_cfs.trace import room_beam
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun import room_beam
 
     room, groups = rooms.test_room()
     inside = TracedScene(room, groups)

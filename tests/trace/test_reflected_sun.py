@@ -67,8 +67,8 @@ def agrees(found, expected, error) -> None:
 
 
 def test_a_wide_wall_in_the_sun_has_the_same_luminance_in_all_patches():
-    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.reflected import outdoor_light, window_shares
 
     far = rooms.quad((-1e3, -4, -1e3), (1e3, -4, -1e3), (1e3, -4, 1e3), (-1e3, -4, 1e3))
     outside = TracedScene(rooms.surfaces([(far, 0.4)]), rooms.test_room()[1])
@@ -85,8 +85,8 @@ def test_a_wide_wall_in_the_sun_has_the_same_luminance_in_all_patches():
 
 
 def test_each_place_stands_for_those_of_its_own_face():
-    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.reflected import outdoor_light, window_shares
 
     # a floor and a wall that meet: only the floor is in the sun, and only patches below see it
     wall = rooms.quad((-40, -4, 0), (40, -4, 0), (40, -4, 60), (-40, -4, 60))
@@ -104,8 +104,8 @@ def test_each_place_stands_for_those_of_its_own_face():
 
 def test_a_row_with_little_light_has_as_many_places_as_one_with_much():
     """A sensor in the depth had a twentieth of the places of one by the window, and their noise."""
-    from mitsuba_cfs.trace.reflected_sun import PLACES, SunShares, _Met
-    from mitsuba_cfs.trace.sun_paths import Places
+    from mitsuba_cfs.trace.sun.lit_points import Places
+    from mitsuba_cfs.trace.sun.reflected import PLACES, SunShares, _Met
 
     count = 8192
     points = np.random.default_rng(0).random((2 * count, 3)) * [1, 1, 0]
@@ -119,8 +119,8 @@ def test_a_row_with_little_light_has_as_many_places_as_one_with_much():
 
 def test_fewer_points_of_the_sun_are_fewer_places_outdoors_with_the_same_light():
     """A quick run asks at an eighth of them; what they say together has the same mean."""
-    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.reflected import outdoor_light, window_shares
 
     floor = rooms.quad((-40, -40, -2), (40, -40, -2), (40, 0, -2), (-40, 0, -2))
     outside = TracedScene(rooms.surfaces([(floor, 0.5)]), rooms.test_room()[1])
@@ -135,8 +135,8 @@ def test_fewer_points_of_the_sun_are_fewer_places_outdoors_with_the_same_light()
 
 
 def test_what_stands_before_the_sun_leaves_a_floor_dark():
-    from mitsuba_cfs.trace.reflected_sun import outdoor_light, window_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.reflected import outdoor_light, window_shares
 
     floor = rooms.quad((-40, -40, 0), (40, -40, 0), (40, 0, 0), (-40, 0, 0))
     roof = rooms.quad((-60, -60, 30), (60, -60, 30), (60, 60, 30), (-60, 60, 30))
@@ -170,8 +170,8 @@ def hole() -> WindowGroup:
 def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     """A closed room of one reflectance: rho / (1 - rho) of the flux over its area, on average."""
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.trace.room_beam import CELL_RAYS, room_cells, room_light, room_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.room_beam import CELL_RAYS, room_cells, room_light, room_shares
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
     group = hole()
@@ -199,8 +199,8 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
 
 
 def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
-    from mitsuba_cfs.trace.room_beam import CELL_LEAST, CELL_RAYS, room_cells, room_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.room_beam import CELL_LEAST, CELL_RAYS, room_cells, room_shares
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
     inside = TracedScene(room, [hole()])
@@ -220,8 +220,8 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     much of what is below it, cells twice as wide 17 %.
     """
     from mitsuba_cfs.methods.optics import BsdfOptics
-    from mitsuba_cfs.trace.room_beam import room_cells, room_light, room_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.sun.room_beam import room_cells, room_light, room_shares
 
     sides = [(k, at) for k in range(3) for at in (0.0, 3.0)]
     room = rooms.surfaces([(square(k, at), 0.5 if (k, at) == (0, 0.0) else 0.0) for k, at in sides])

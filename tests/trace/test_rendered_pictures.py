@@ -10,8 +10,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("variant")]
 @pytest.mark.parametrize("system", ["glass", "blind"])
 def test_illuminance_and_glare_are_radiances(tmp_path, system):
     from mitsuba_cfs.sky.epw import read_epw
-    from scenes.evidence.benchmarks.annual_product import WEATHER
-    from scenes.evidence.validation.rendered_pictures import moments, outcomes
+    from tests.benchmarks.annual_product import WEATHER
+    from tests.validation.rendered_pictures import moments, outcomes
 
     chosen = moments(read_epw(WEATHER))[4::4]  # March and June, in the morning
     for found in outcomes([system], chosen, tmp_path, size=160):

@@ -12,12 +12,14 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
-from mitsuba_cfs.trace.direct_sun import KlemsScattering
-from mitsuba_cfs.trace.image import picture_matrix_blocks
-from mitsuba_cfs.trace.picture_rows import MOST_TIMES, PictureRows
-from mitsuba_cfs.trace.picture_sharing import tile_size
-from mitsuba_cfs.trace.picture_sun import PictureSun
-from mitsuba_cfs.trace.room_sun import (
+from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows
+from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks
+from mitsuba_cfs.trace.sun.lit_points import Places
+from mitsuba_cfs.trace.sun.picture_sun import PictureSun
+from mitsuba_cfs.trace.sun.room_sun import (
     FACE_STEPS,
     EdgePlaces,
     _beside,
@@ -27,8 +29,6 @@ from mitsuba_cfs.trace.room_sun import (
     sun_elements,
     window_elements,
 )
-from mitsuba_cfs.trace.scene import kept_scene
-from mitsuba_cfs.trace.sun_paths import Places
 from scenes.cost import room as box
 
 from . import rooms
@@ -149,7 +149,7 @@ def test_elements_are_asked_again_where_one_beside_or_around_is_lit_unlike() -> 
 
 
 def test_places_that_stand_for_an_element_are_its_own_and_evenly_drawn() -> None:
-    from mitsuba_cfs.trace.room_sun import _chosen
+    from mitsuba_cfs.trace.sun.room_sun import _chosen
 
     element = np.repeat([0, 1, 2], [1, 7, 40])
     drawn = np.stack([_chosen(element, 3, 4, seed).reshape(3, 4) for seed in range(400)])

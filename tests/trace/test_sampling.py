@@ -24,7 +24,7 @@ def test_first_points_of_many_lattices_fill_every_pair_of_dimensions_evenly():
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_cfs.trace.sampling import lattice
+    from mitsuba_cfs.trace.kernels.sampling import lattice
 
     number = dr.arange(mi.UInt32, COUNT)
     streams = {
@@ -43,7 +43,7 @@ def test_one_lattice_is_stratified():
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_cfs.trace.sampling import lattice
+    from mitsuba_cfs.trace.kernels.sampling import lattice
 
     u = [lattice(dr.arange(mi.UInt32, 4096), mi.UInt32(3), d).numpy() for d in range(6)]
     for a, b in ((0, 1), (2, 3), (4, 5)):  # what `lattice_2d` joins
@@ -55,7 +55,7 @@ def test_generators_of_paths_are_even():
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_cfs.trace.sampling import path_generator
+    from mitsuba_cfs.trace.kernels.sampling import path_generator
 
     generator = path_generator(dr.arange(mi.UInt32, COUNT), mi.UInt32(1))
     u = [generator.next_float32().numpy() for _ in range(4)]

@@ -45,9 +45,9 @@ def sensors_of(groups: list[WindowGroup], count: int):
 
 def matrices(interior: Surfaces, groups: list[WindowGroup], exterior: Surfaces, sensors: int):
     """V and D."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.view_matrix import view_matrix
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
+    from mitsuba_cfs.trace.matrices.view import view_matrix
 
     stopping = Stopping(batches=2)
     view_matrix(interior, groups, *sensors_of(groups, sensors), stopping=stopping, **FEW)
@@ -56,13 +56,14 @@ def matrices(interior: Surfaces, groups: list[WindowGroup], exterior: Surfaces, 
 
 def the_rest(interior: Surfaces, groups: list[WindowGroup], exterior: Surfaces, sensors: int):
     """Most of what else a room's year is traced by."""
-    from mitsuba_cfs.trace.absorption_matrix import absorption_matrix
-    from mitsuba_cfs.trace.annual_pictures import view_matrices
-    from mitsuba_cfs.trace.direct_sun import KlemsScattering, direct_sun_matrix
-    from mitsuba_cfs.trace.escape import escaped_view
-    from mitsuba_cfs.trace.estimate import Stopping
-    from mitsuba_cfs.trace.reflected_sun import window_shares
-    from mitsuba_cfs.trace.scene import TracedScene
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+    from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
+    from mitsuba_cfs.trace.matrices.escape import escaped_view
+    from mitsuba_cfs.trace.pictures.annual import view_matrices
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
+    from mitsuba_cfs.trace.sun.reflected import window_shares
 
     K, stopping = KLEMS_FULL.size, Stopping(batches=2)
     points, up = sensors_of(groups, sensors)
@@ -97,7 +98,7 @@ def test_second_room_compiles_nothing(traced):
 
 
 def test_scene_of_the_same_objects_is_found_again_and_no_other():
-    from mitsuba_cfs.trace.scene import KEPT, kept_scene
+    from mitsuba_cfs.trace.kernels.scene import KEPT, kept_scene
 
     interior, groups = rooms.test_room()
     first = kept_scene(interior, groups)
@@ -115,7 +116,7 @@ def test_scene_of_the_same_objects_is_found_again_and_no_other():
 
 
 def test_a_scene_is_found_again_whether_its_centre_is_said_or_not() -> None:
-    from mitsuba_cfs.trace.scene import kept_scene
+    from mitsuba_cfs.trace.kernels.scene import kept_scene
 
     interior, groups = rooms.test_room()
     found = kept_scene(interior, groups)

@@ -112,8 +112,8 @@ def test_five_phases_take_the_parts_too():
 
 
 def test_an_open_site_is_not_cut_and_keeps_its_digits():
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
-    from mitsuba_cfs.trace.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     ground = rooms.quad((-60, -60, -0.3), (60, -60, -0.3), (60, 0, -0.3), (-60, 0, -0.3))
     for exterior in (rooms.NOTHING, rooms.surfaces([(ground, 0.2)])):
@@ -128,7 +128,7 @@ def test_an_open_site_is_not_cut_and_keeps_its_digits():
 
 def test_no_light_comes_through_the_room_from_behind():
     """A box round the window's outside, closed: not a ray of it may leave through the window."""
-    from mitsuba_cfs.trace.daylight_matrix import daylight_matrix
+    from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 
     x0, x1, z0, z1, d = rooms.X0, rooms.X1, rooms.Z0, rooms.Z1, -1.0
     box = rooms.surfaces(

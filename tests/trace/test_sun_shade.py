@@ -13,13 +13,13 @@ UP = np.array([[0.0, 0.0, 1.0]])
 
 
 def sunlit_shares(*arguments, **options):
-    from mitsuba_cfs.trace.sun_shade import sunlit_shares
+    from mitsuba_cfs.trace.sun.shade import sunlit_shares
 
     return sunlit_shares(*arguments, **options)
 
 
 def sky_irradiance_matrix(*arguments, **options):
-    from mitsuba_cfs.trace.daylight_matrix import sky_irradiance_matrix
+    from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 
     return sky_irradiance_matrix(*arguments, **options)
 
@@ -54,7 +54,7 @@ def test_sun_behind_a_receiver_gives_nothing_and_chunks_change_nothing(monkeypat
     whole = sunlit_shares(half_plane(0.0), points, normals, suns, samples=8)
     behind = normals @ suns.T < -0.02 * np.linalg.norm(normals, axis=1)[:, None] * 4
     assert behind.any() and not whole[behind].any()
-    monkeypatch.setattr("mitsuba_cfs.trace.sun_shade.RAYS", 500)
+    monkeypatch.setattr("mitsuba_cfs.trace.sun.shade.RAYS", 500)
     np.testing.assert_array_equal(
         sunlit_shares(half_plane(0.0), points, normals, suns, samples=8), whole
     )

@@ -50,7 +50,7 @@ def perpendicular(common: float, width: float, height: float) -> float:
 
 
 def test_box_against_closed_forms(variant):
-    from mitsuba_cfs.trace.view_factors import view_factors
+    from mitsuba_cfs.trace.matrices.view_factors import view_factors
 
     n = 2**16
     f = view_factors(box_parts(), samples=n)
@@ -73,7 +73,7 @@ def test_box_against_closed_forms(variant):
 
 
 def test_gap_shows_as_a_row_below_one(variant):
-    from mitsuba_cfs.trace.view_factors import view_factors
+    from mitsuba_cfs.trace.matrices.view_factors import view_factors
 
     whole = box_parts()
     open_ = Surfaces(whole.triangles[:-2], whole.reflectance[:-2], whole.surface[:-2])
@@ -84,7 +84,7 @@ def test_gap_shows_as_a_row_below_one(variant):
 
 
 def test_person_beside_a_wall_sees_it_most(variant):
-    from mitsuba_cfs.trace.view_factors import person_view_factors
+    from mitsuba_cfs.trace.matrices.view_factors import person_view_factors
 
     n = 2**15
     middle = person_view_factors(box_parts(4, 4, 4), [2, 2, 2], [0, 1, 0], samples=n)
@@ -116,7 +116,7 @@ def plate(width: float, depth: float, height: float) -> Surfaces:
 
 
 def test_the_sky_below_a_long_overhang(variant):
-    from mitsuba_cfs.trace.view_factors import sky_shares
+    from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 
     depth, down = 1.5, np.array([0.2, 0.8, 1.7, 2.9])
     places = np.stack([0 * down, 0 * down - 1e-3, 3.0 - down], axis=1)
@@ -131,7 +131,7 @@ def test_the_sky_below_a_long_overhang(variant):
 
 
 def test_the_sky_of_planes_that_nothing_hides(variant):
-    from mitsuba_cfs.trace.view_factors import sky_shares
+    from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 
     below = plate(5.0, 5.0, -1.0)  # lies under them, and hides no sky
     up, down, south = [0, 0, 1], [0, 0, -1], [0, -1, 0]

@@ -1,0 +1,1 @@
+"""Building blocks of the tracers: scenes, samples, bins, paths, estimates."""

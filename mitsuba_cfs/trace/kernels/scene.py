@@ -1,0 +1,368 @@
+"""Triangles, reflectances and windows as one Mitsuba mesh with tables that kernels gather from."""
+
+from __future__ import annotations
+
+import atexit
+from collections import OrderedDict
+from collections.abc import Sequence
+from functools import cached_property
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_cfs import variants
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
+from mitsuba_cfs.trace.kernels.gloss import TracedGloss
+from mitsuba_cfs.trace.kernels.mesh import (
+    KeptMesh,
+    SharedScene,
+    kept_mesh,
+    scene_of,
+    unit_normals,
+)
+from mitsuba_cfs.trace.kernels.random_walk import diffuse_direction
+from mitsuba_cfs.trace.kernels.sampling import (
+    DiscreteDistribution,
+    lattice_2d,
+    opaque,
+    opaque_vector,
+    vectors,
+)
+
+KEPT = 8  # scenes that are found again: what one room is traced by, indoors and outdoors
+OPAQUE = -1  # window index of a triangle that is not glazed
+SERIES_GAP = 1.0  # widest between a screen and its panes [m]
+SERIES_PLACES = 256  # on each window group, from which they are looked for
+
+
+class TracedScene:
+    """A Mitsuba scene of opaque triangles and window apertures, in coordinates about its centre.
+
+    To a view path windows are black: what arrives there is counted and the path ends.  One mesh
+    holds all: the triangle number of a hit gathers the normal, the reflectance and the window.
+
+    No number of a scene may stand in a kernel as a literal (`opaque`): each room would compile
+    all kernels for itself.
+    """
+
+    def __init__(
+        self,
+        surfaces: Surfaces,
+        groups: Sequence[WindowGroup] = (),
+        *,
+        windows_block: bool = True,
+        window_reflectance: ArrayLike | None = None,
+        centre: ArrayLike | None = None,
+    ) -> None:
+        """Build the scene.
+
+        Args:
+            windows_block: if false, a ray passes through the windows.
+            window_reflectance: [G] diffuse, of the windows from the room; 0 by default.
+            centre: [3] origin of the scene's coordinates; the middle of the windows by default.
+        """
+        variants.activate()
+        windows = [(g, window) for g, group in enumerate(groups) for window in group.windows]
+        if not windows and centre is None:
+            raise ValueError("a scene needs a window group or a centre")
+        glazed = np.concatenate([np.empty((0, 3, 3)), *(w.triangles for _, w in windows)])
+        glazed_group = np.concatenate([np.full(len(w.triangles), g) for g, w in windows] or [[]])
+
+        self.groups = tuple(groups)
+        self._panes = windows_block and bool(windows)
+        self.centre = _middle(groups) if centre is None else np.asarray(centre, float)
+        self.surface_count = int(surfaces.surface.max()) + 1 if len(surfaces.surface) else 0
+        if window_reflectance is None:
+            window_reflectance = np.zeros(len(groups))
+        glazed_reflectance = np.asarray(window_reflectance, float)[glazed_group.astype(int)]
+        blocking = slice(None) if windows_block else slice(0)
+        self._load_mesh(
+            surfaces, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
+        )
+        if windows:
+            self._load_windows(glazed, glazed_group)
+
+    def _load_mesh(
+        self,
+        surfaces: Surfaces,
+        glazed: NDArray[np.float64],
+        glazed_group: NDArray[np.int64],
+        glazed_reflectance: NDArray[np.float64],
+    ) -> None:
+        """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
+        mesh = kept_mesh(surfaces.triangles)
+        solid = surfaces if mesh.keep.all() else surfaces.some(mesh.keep)
+        if not len(solid.triangles) + len(glazed):
+            solid = _speck(self.centre)
+            mesh = KeptMesh(solid.triangles)
+        panes = glazed - self.centre
+        normals = np.concatenate([mesh.normals, unit_normals(panes)])
+        reflectance = np.concatenate([solid.reflectance, glazed_reflectance])
+        surface = np.concatenate([solid.surface, np.zeros(len(glazed))])
+        no_group = np.full(len(solid.triangles), OPAQUE)
+        group = np.concatenate([no_group, glazed_group])
+
+        self.normal = vectors(normals)
+        self.reflectance = mi.Float(reflectance.astype(np.float32))
+        self.surface = mi.UInt32(surface.astype(np.uint32))
+        self.group = mi.Int32(group.astype(np.int32))
+        self.gloss = (
+            TracedGloss(solid, normals[: len(solid.triangles)], len(glazed))
+            if (solid.glossy)
+            else None
+        )
+        self.scene: mi.Scene | SharedScene
+        if mesh.is_shared:
+            self.scene = SharedScene(mesh, panes, self.centre)
+        else:
+            self.scene = scene_of(np.concatenate([solid.triangles - self.centre, panes]))
+        radius = max(mesh.radius(self.centre) if len(solid.triangles) else 0.0, _greatest(panes))
+        # Offset along the normal that keeps a ray clear of the face it starts on [m]
+        self.epsilon = opaque(2e-5 * max(1.0, 0.05 * radius))
+
+    def _load_windows(self, glazed: NDArray[np.float64], glazed_group: NDArray[np.int64]) -> None:
+        """Tables by glazed triangle and by group, to sample points on the windows."""
+        groups, window_group = self.groups, glazed_group
+        areas = triangle_areas(glazed)
+        self.window_area = opaque(float(areas.sum()))
+        self.window_triangles = len(glazed)
+        self._glazed_vertices = [vectors(glazed[:, i] - self.centre, mi.Point3f) for i in range(3)]
+        self._glazed_group = mi.Int32(window_group.astype(np.int32))
+        self._glazed = DiscreteDistribution(areas)
+        frames = np.stack([g.frame for g in groups])  # [G, 3, 3]
+        self._frame_rows = [vectors(frames[:, i]) for i in range(3)]
+        self._axes = [tuple(map(opaque_vector, g.frame)) for g in groups]
+        self._group_first = np.searchsorted(window_group, np.arange(len(groups)))
+        self._group_choice = [
+            DiscreteDistribution(areas[window_group == g]) for g in range(len(groups))
+        ]
+
+    def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
+        """A point uniform over the area of all windows, and the group it lies in."""
+        triangle, reused = self._glazed.sample_reuse(u.x, active)
+        return self._point(triangle, mi.Point2f(reused, u.y), active), dr.gather(
+            mi.Int32, self._glazed_group, triangle, active
+        )
+
+    def sample_group(self, group: int, u: mi.Point2f) -> mi.Point3f:
+        """A point uniform over the area of one group's windows."""
+        triangle, reused = self._group_choice[group].sample_reuse(u.x)
+        first = dr.opaque(mi.UInt32, int(self._group_first[group]))
+        return self._point(triangle + first, mi.Point2f(reused, u.y), mi.Bool(True))
+
+    def window_triangle(
+        self, triangle: mi.UInt32, origin: mi.Point3f
+    ) -> tuple[mi.Int32, tuple[mi.Vector3f, ...]]:
+        """The group of a window's triangle, and its corners from `origin` in the group's frame."""
+        group = dr.gather(mi.Int32, self._glazed_group, triangle)
+        corners = (dr.gather(mi.Point3f, v, triangle) - origin for v in self._glazed_vertices)
+        return group, tuple(self.to_local(group, corner, mi.Bool(True)) for corner in corners)
+
+    def _point(self, triangle: mi.UInt32, u: mi.Point2f, active: mi.Bool) -> mi.Point3f:
+        a, b, c = (dr.gather(mi.Point3f, v, triangle, active) for v in self._glazed_vertices)
+        root = dr.sqrt(dr.maximum(1 - u.x, 0))
+        return a * (1 - root) + b * (root * (1 - u.y)) + c * (root * u.y)
+
+    def surface_at(
+        self,
+        hit: mi.PreliminaryIntersection3f,
+        origin: mi.Point3f,
+        direction: mi.Vector3f,
+        active: mi.Bool,
+    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
+        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance.
+
+        The reflectance is the diffuse one, where there is a gloss that for the ray's angle.
+        """
+        face = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
+        face = dr.mulsign(face, -dr.dot(face, direction))
+        point = mi.Point3f(origin + direction * hit.t + face * self.epsilon)
+        return point, face, self.diffuse(hit.prim_index, -dr.dot(face, direction), active)
+
+    def diffuse(self, triangle: mi.UInt32, cosine: mi.Float, active: mi.Bool) -> mi.Float:
+        """Diffuse reflectance of a triangle seen at a cosine to its normal."""
+        rho = dr.gather(mi.Float, self.reflectance, triangle, active)
+        if self.gloss is None:
+            return rho
+        return rho * self.gloss.diffuse_share(triangle, cosine, active)
+
+    def whole(self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool) -> mi.Float:
+        """Reflectance of a triangle for a ray along a direction, diffuse and by its gloss."""
+        if self.gloss is None:
+            return dr.gather(mi.Float, self.reflectance, triangle, active)
+        normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
+        cosine = dr.abs(dr.dot(normal, direction))
+        gloss = self.gloss.specular(triangle, cosine, active)
+        return self.diffuse(triangle, cosine, active) + gloss
+
+    def without_mirrors(
+        self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.Float:
+        """The same without what a smooth mirror reflects."""
+        if self.gloss is None:
+            return self.whole(triangle, direction, active)
+        normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
+        cosine = dr.abs(dr.dot(normal, direction))
+        rough = self.gloss.roughness(triangle, active) > 0
+        gloss = dr.select(rough, self.gloss.specular(triangle, cosine, active), 0.0)
+        return self.diffuse(triangle, cosine, active) + gloss
+
+    def bounce(
+        self,
+        hit: mi.PreliminaryIntersection3f,
+        origin: mi.Point3f,
+        direction: mi.Vector3f,
+        generator: mi.PCG32,
+        active: mi.Bool,
+    ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
+        """Where a ray meets a surface, where it goes on to, its weight, if by a mirror."""
+        position, face, weight = self.surface_at(hit, origin, direction, active)
+        away, mirrored = diffuse_direction(face, generator), mi.Bool(False)
+        if self.gloss is not None:
+            glossy, towards, weight = self.gloss.leave(
+                hit.prim_index, face, direction, weight, generator, active
+            )
+            away = dr.select(glossy, towards, away)
+            mirrored = glossy & (self.gloss.roughness(hit.prim_index, glossy) <= 0)
+        return position, away, weight, mirrored
+
+    def leaves(
+        self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.Bool:
+        """Which active rays meet a window from the room's side."""
+        active = active & hit.is_valid()
+        outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
+        window = dr.gather(mi.Int32, self.group, hit.prim_index, active) != OPAQUE
+        return active & window & (dr.dot(outwards, direction) > 0)
+
+    @cached_property
+    def panes_in_series(self) -> bool:
+        """Whether panes stand close before windows (a screen behind them): both are one way out."""
+        if not self._panes:
+            return False
+        number = dr.arange(mi.UInt32, SERIES_PLACES)
+        for g in range(len(self.groups)):
+            u, out = lattice_2d(number, opaque(g, mi.UInt32), 0), self.exterior_normal(g)
+            start = self.sample_group(g, u) + out * self.epsilon
+            hit = self._met(start, out, number >= 0)
+            if dr.any(self.leaves(hit, out, hit.t < SERIES_GAP)):
+                return True
+        return False
+
+    @dr.syntax
+    def met_outdoors(
+        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
+    ) -> tuple[mi.PreliminaryIntersection3f, mi.Point3f]:
+        """What rays on their way out meet beyond the panes that they pass; whence they last went.
+
+        The panes are those met from the room's side: that the ray starts on, others before it.
+        """
+        origin = mi.Point3f(origin)
+        hit = self._met(origin, direction, active)
+        passed = self.leaves(hit, direction, active)
+        while passed:
+            outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, passed)
+            origin = mi.Point3f(origin + direction * hit.t + outwards * self.epsilon)
+            hit = self._met(origin, direction, passed)
+            passed = self.leaves(hit, direction, passed)
+        return hit, origin
+
+    def hides(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Bool:
+        """Whether anything stands in the way out of rays; panes as of `met_outdoors`."""
+        if self._panes:
+            return self.met_outdoors(ray.o, ray.d, active)[0].is_valid()
+        return self.scene.ray_test(ray, coherent=coherent, active=active)
+
+    def _met(
+        self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
+    ) -> mi.PreliminaryIntersection3f:
+        ray = mi.Ray3f(origin, direction)
+        return self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+
+    def to_local(self, group: mi.Int32, v: mi.Vector3f, active: mi.Bool) -> mi.Vector3f:
+        """World vector in the frame of a window group (z is the exterior normal)."""
+        x, y, z = (dr.gather(mi.Vector3f, row, group, active) for row in self._frame_rows)
+        return mi.Vector3f(dr.dot(x, v), dr.dot(y, v), dr.dot(z, v))
+
+    def to_group(self, group: int, v: mi.Vector3f) -> mi.Vector3f:
+        """World vector in the frame of one window group."""
+        x, y, z = self._axes[group]
+        return mi.Vector3f(dr.dot(x, v), dr.dot(y, v), dr.dot(z, v))
+
+    def exterior_normal(self, group: int) -> mi.Vector3f:
+        """World direction outdoors of one window group."""
+        return self._axes[group][2]
+
+    def place(self, point: ArrayLike) -> mi.Point3f:
+        """A point of the world [m] in the scene's coordinates."""
+        return mi.Point3f(opaque_vector(np.asarray(point, dtype=float) - self.centre))
+
+    def outward(self, group: mi.Int32, active: mi.Bool) -> mi.Vector3f:
+        """A step off a window towards outdoors that keeps a ray clear of its pane."""
+        return dr.gather(mi.Vector3f, self._frame_rows[2], group, active) * self.epsilon
+
+    def to_world_any(self, group: mi.Int32, v: mi.Vector3f) -> mi.Vector3f:
+        """Vector in the frame of each lane's window group to world axes."""
+        x, y, z = (dr.gather(mi.Vector3f, row, group) for row in self._frame_rows)
+        return x * v.x + y * v.y + z * v.z
+
+    def to_world(self, group: int, v: mi.Vector3f) -> mi.Vector3f:
+        """Vector in the frame of one window group to world axes."""
+        x, y, z = self._axes[group]
+        return x * v.x + y * v.y + z * v.z
+
+
+def kept_scene(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup] = (),
+    *,
+    windows_block: bool = True,
+    window_reflectance: ArrayLike | None = None,
+    centre: ArrayLike | None = None,
+) -> TracedScene:
+    """A `TracedScene` of its arguments; that of the same objects is found again among the last.
+
+    A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
+    of thousands of triangles.
+    """
+    # said or not, one centre is one scene
+    values = (window_reflectance, _middle(groups) if centre is None and groups else centre)
+    arrays = [None if value is None else np.asarray(value, float) for value in values]
+    inputs = (surfaces, *groups)
+    key = (
+        variants.activate(), windows_block, *(None if a is None else a.tobytes() for a in arrays),
+        *map(id, inputs),
+    )  # fmt: skip
+    if key not in _last_scenes:
+        reflectance, middle = arrays
+        options = {
+            "windows_block": windows_block, "window_reflectance": reflectance, "centre": middle,
+        }  # fmt: skip
+        _last_scenes[key] = inputs, TracedScene(surfaces, groups, **options)
+    _last_scenes.move_to_end(key)
+    while len(_last_scenes) > KEPT:
+        _last_scenes.popitem(last=False)
+    return _last_scenes[key][1]
+
+
+# with the objects whose ids are in the key, which so stay theirs; empty before Dr.Jit ends
+_last_scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
+atexit.register(_last_scenes.clear)
+
+
+def _middle(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:
+    """The middle of the corners of all windows' triangles [3]."""
+    windows = [window.triangles for group in groups for window in group.windows]
+    return np.concatenate(windows).mean(axis=(0, 1))
+
+
+def _greatest(coordinates: NDArray[np.float64]) -> float:
+    return float(np.abs(coordinates).max()) if coordinates.size else 0.0
+
+
+def _speck(centre: NDArray[np.float64]) -> Surfaces:
+    """A black triangle of a square millimetre far below: tables and scenes must not be empty."""
+    corners = 1e-3 * np.eye(3) + centre - [0, 0, 1e3]
+    return Surfaces(corners[None], np.zeros(1), np.zeros(1, dtype=np.int64))

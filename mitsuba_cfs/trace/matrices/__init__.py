@@ -1,0 +1,1 @@
+"""Matrices of the phase methods: view, daylight, exchange, absorption, view factors."""

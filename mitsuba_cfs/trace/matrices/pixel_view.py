@@ -1,0 +1,307 @@
+"""Luminance pictures of a room lit through its windows, one matrix row for each pixel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.kernels.bins import DirectionBins
+from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.kernels.pixel_sharing import numbered
+from mitsuba_cfs.trace.kernels.sampling import (
+    batch_key,
+    column,
+    empty_sums,
+    opaque,
+    path_generator,
+    pixel_places,
+    sums_of,
+    tables,
+    vectors,
+)
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.view_paths import add_mirrored, add_view_paths
+
+BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
+NO_PATCH = -1  # of a ray that meets none
+
+
+def luminance_pictures(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    view: View,
+    window_luminance: ArrayLike,
+    *,
+    samples: int = 32,
+    **options: Any,
+) -> NDArray[np.float32]:
+    """Pictures [H, ny, nx]: luminance of each pixel for every hour's window luminance.
+
+        L[pixel, h] = sum over g, k of V[pixel, g, k] L_window[g, k, h]
+
+    Args:
+        window_luminance: [G, K, H] of the windows towards the room, T D s [cd/m2].
+        samples, options: see `picture_part_blocks`.
+    """
+    window_luminance = np.asarray(window_luminance, dtype=np.float32)
+    G, K, H = window_luminance.shape
+    flat = window_luminance.reshape(G * K, H)
+    pictures = np.zeros((H, view.height * view.width), dtype=np.float32)
+    blocks = picture_matrix_blocks(surfaces, groups, view, samples=samples, **options)
+    for pixels, matrix in blocks:
+        pictures[:, pixels] = (matrix.reshape(len(pixels), G * K) @ flat).T
+    return pictures.reshape(H, view.height, view.width)
+
+
+def picture_matrix_blocks(
+    surfaces: Surfaces, groups: Sequence[WindowGroup], view: View, **options: Any
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32]]]:
+    """Blocks of the view matrix of a picture: pixel numbers [n] and their rows [n, G, K].
+
+    The rows of a pixel hold its radiance per unit radiance of each window patch: 1 shared among the
+    patches that it sees directly, and what the surfaces it sees reflect.
+
+    Args: options: of `picture_part_blocks`.
+    """
+    for block in picture_part_blocks(surfaces, groups, view, **options):
+        reflected = block.lit + block.later
+        whole = block.seen.toarray() + reflected
+        yield block.pixels, whole.reshape(len(whole), len(groups), -1)
+
+
+@dataclass(frozen=True, slots=True)
+class PictureBlock:
+    """Rows of the view matrix of some pixels [n], by what the light has met before the eye.
+
+    Under the patches' luminances in some hours, what surfaces reflect has hours, c of them, in
+    place of the patches G * K.
+    """
+
+    pixels: NDArray[np.int64]  # [n] row * width + column
+    seen: sparse.csr_array  # [n, G * K] the windows that a pixel shows, few of all
+    row: NDArray[np.int64]  # [b] numbers of the rows that pixels share
+    lit: NDArray[np.float32]  # [b, c] what surfaces that they show reflect of the windows' light
+    later: NDArray[np.float32]  # [b, c] what comes after more reflections
+
+
+def picture_part_blocks(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    view: View,
+    *,
+    basis: KlemsBasis = KLEMS_FULL,
+    samples: int = 32,
+    max_depth: int = 32,
+    window_reflectance: ArrayLike | None = None,
+    seed: int = 0,
+    pixels: NDArray[np.int64] | None = None,
+    row: NDArray[np.int64] | None = None,
+    weight: NDArray[np.floating] | None = None,
+    light: PatchLight | None = None,
+    progress: Progress = silent,
+) -> Iterator[PictureBlock]:
+    """Blocks of the view matrix of a picture in its parts, of the same paths.
+
+    Pixels that show nothing are left out.  Results do not depend on the block size.
+
+    Args:
+        samples: paths for each pixel, at as many places within it.
+        window_reflectance: [G] of the windows from the room, as if diffuse; black by default.
+        pixels: [n] those to trace; one that comes again has other paths, stratified with its first.
+        row: [n] that each pixel adds what it shows by reflection to; by default one of its own.
+        weight: [n] of each pixel's light in its rows; 1 by default.
+        light: luminances of hours that the paths add up, not the patches; not of glossy rooms.
+    """
+    tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
+    if light is not None and tracer.gloss is not None:
+        raise ValueError("what gloss shows of the patches is held patch by patch, not by hours")
+    bins = DirectionBins(basis)
+    shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
+    row = np.arange(len(shown)) if row is None else row
+    weight = np.ones(len(shown)) if weight is None else weight
+    held = 2 * len(np.unique(row)) / max(len(row), 1)  # rows for each pixel
+    held += tracer.gloss is not None
+    columns = len(groups) * bins.size if light is None else light.hours
+    size = max(256, int(BLOCK_BYTES / (8 * held * columns)))
+    size = min(size, max(1, 2**31 // samples))
+    time = numbered(shown)
+    options = {"samples": samples, "max_depth": max_depth, "seed": seed, "light": light}
+    for start in range(0, len(shown), size):
+        end = start + size
+        part = shown[start:end], time[start:end], row[start:end], weight[start:end]
+        yield _block(tracer, bins, view, part, **options)
+        progress("picture", min(end, len(shown)) / len(shown))
+
+
+def _block(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    view: View,
+    chosen: tuple[NDArray, NDArray, NDArray, NDArray],
+    *,
+    samples: int,
+    max_depth: int,
+    seed: int,
+    light: PatchLight | None,
+) -> PictureBlock:
+    """The rows of some pixels.
+
+    Args: chosen: pixels [n], each for the first time (0) or again [n], their rows and weights [n].
+    """
+    pixels, time, row, weight = chosen
+    rows, place = np.unique(row, return_inverse=True)
+    n, b = len(pixels), len(rows)
+    own = n if tracer.gloss is not None else 0  # rows of what pixels show by gloss
+    columns = len(tracer.groups) * bins.size
+    shape = own + 2 * b, columns if light is None else light.hours
+    matrix, patches = empty_sums(math.prod(shape)), []
+    eye, share = tracer.place(view.position), column(weight)
+    number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
+    lit, again = column(own + place, mi.UInt32), dr.opaque(mi.UInt32, b)
+    path = column(pixels + time * view.width * view.height & 0xFFFFFFFF, mi.UInt32)
+    places = pixel_places((int(time.max(initial=0)) + 1) * samples)
+    for j in range(samples):
+        dx, dy = places[time * samples + j].T
+        directions, exists = pixel_rays(view, pixels, dx, dy)
+        way, exist = vectors(directions), column(exists, mi.Bool)
+        hit, patch, glazed = seen_patch(tracer, bins, eye, way, exist)
+        add_picture_paths(
+            tracer,
+            bins,
+            matrix,
+            eye,
+            way,
+            hit,
+            active=exist,
+            row=dr.arange(mi.UInt32, dr.width(number)),
+            lit=lit,
+            later=lit + again,
+            beta=share,
+            stream=number,
+            sample=first + dr.opaque(mi.UInt32, j),
+            generator=path_generator(path, batch_key(seed, j)),
+            max_depth=dr.opaque(mi.UInt32, max_depth),
+            light=light,
+        )
+        patches.append(tables(dr.select(glazed, mi.Int32(patch), NO_PATCH), matrix)[0])
+    sums = np.divide(sums_of(matrix, shape), samples, dtype=np.float32, casting="same_kind")
+    seen = _shares(np.stack(patches), weight / samples, columns)
+    if own:
+        seen = seen + sparse.csr_array(sums[:own])
+    return PictureBlock(pixels, seen, rows, sums[own : own + b], sums[own + b :])
+
+
+def _shares(
+    patches: NDArray[np.int32], weight: NDArray[np.floating], columns: int
+) -> sparse.csr_array:
+    """What pixels [n] have of patches [n, columns] that their rays [samples, n] meet or do not."""
+    _, pixel = found = np.nonzero(patches != NO_PATCH)
+    entries = weight[pixel], (pixel, patches[found])
+    shares = sparse.coo_array(entries, shape=(len(weight), columns))
+    return sparse.csr_array(shares).astype(np.float32)
+
+
+def seen_patch(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    eye: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+) -> tuple[mi.PreliminaryIntersection3f, mi.UInt32, mi.Bool]:
+    """What rays meet first, and the patch of all windows that they show, where it is one."""
+    ray = mi.Ray3f(eye, direction)
+    hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+    met = active & hit.is_valid()
+    group = dr.gather(mi.Int32, tracer.group, hit.prim_index, met)
+    glazed = met & (group != OPAQUE)
+    local = tracer.to_local(group, direction, glazed)
+    return hit, mi.UInt32(group) * mi.UInt32(bins.size) + bins.index(local), glazed & (local.z > 0)
+
+
+def add_seen_and_reflected(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    matrix: mi.Float64,
+    eye: mi.Point3f,
+    direction: mi.Vector3f,
+    active: mi.Bool,
+    *,
+    row: mi.UInt32,
+    beta: mi.Float,
+    **paths: Any,
+) -> None:
+    """What rays show in one row each: the patch that they meet, L = 1, or what a surface reflects.
+
+    Args: paths: `stream` to `max_depth` of `add_picture_paths`.
+    """
+    hit, patch, glazed = seen_patch(tracer, bins, eye, direction, active)
+    slot = row * opaque(bins.size * len(tracer.groups), mi.UInt32) + patch
+    dr.scatter_add(matrix, mi.Float64(beta), slot, glazed)
+    add_picture_paths(
+        tracer, bins, matrix, eye, direction, hit,
+        active=active, row=row, lit=row, later=row, beta=beta, light=None, **paths,
+    )  # fmt: skip
+
+
+def add_picture_paths(
+    tracer: TracedScene,
+    bins: DirectionBins,
+    matrix: mi.Float64,
+    eye: mi.Point3f,
+    direction: mi.Vector3f,
+    hit: mi.PreliminaryIntersection3f,  # of `seen_patch`
+    *,
+    active: mi.Bool,  # as of that
+    row: mi.UInt32,  # of what gloss shows
+    lit: mi.UInt32,  # row of what that reflects of the windows' light
+    later: mi.UInt32,  # row of what comes after more reflections
+    beta: mi.Float,  # weight of the path
+    stream: mi.UInt32,  # of the stratified samples: a pixel
+    sample: mi.UInt32,
+    generator: mi.PCG32,
+    max_depth: mi.UInt32,
+    light: PatchLight | None,  # of `add_view_paths`; without gloss alone
+) -> None:
+    """One path for each lane: rho / pi E of the surface that is met, nothing of a patch.
+
+    The three rows may be one.
+    """
+    active = active & hit.is_valid()
+    position, face, reflectance = tracer.surface_at(hit, eye, direction, active)
+    mirrors = mi.PCG32(generator)  # a copy: the loop changes what it is given
+    add_view_paths(
+        tracer,
+        bins,
+        matrix,
+        lit,
+        position,
+        face,
+        later=later - lit,
+        beta=beta * reflectance * dr.inv_pi,
+        sample=sample,
+        stream=mi.sample_tea_32(stream, mi.UInt32(0x1F123BB5))[0],
+        generator=generator,
+        max_depth=max_depth,
+        active=mi.Bool(active),
+        carried=None,
+        mirrored=None,
+        light=light,
+    )
+    if tracer.gloss is not None:
+        add_mirrored(
+            tracer, bins, matrix, hit, eye, direction,
+            row=row, later=later - row, beta=beta, sample=sample, stream=stream,
+            generator=mirrors, max_depth=max_depth, active=active,
+        )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Pictures: of a year by the phase methods, of one sky by path tracing."""

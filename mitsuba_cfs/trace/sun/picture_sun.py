@@ -1,0 +1,400 @@
+"""The sun in the pixels of a view: its disc, its beam on surfaces, its light in the windows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
+from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
+from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.trace.kernels.bins import DirectionBins
+from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, vectors
+from mitsuba_cfs.trace.kernels.scattering import Scattering
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, kept_scene
+from mitsuba_cfs.trace.sun.lit_points import on_disc_of, place_and_hour
+from mitsuba_cfs.trace.sun.picture_disc import (
+    before_eye,
+    disc_parts,
+    disc_rays,
+    disc_reach,
+)
+from mitsuba_cfs.trace.sun.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
+from mitsuba_cfs.trace.sun.room_sun import EDGE_POINTS, SunElements
+from mitsuba_cfs.trace.sun.specular_paths import SunWay, sun_ways
+
+LANES = 1 << 23  # pairs of pixel and sun traced at a time
+WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
+PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered sun
+
+
+class PictureSun:
+    """What a view shows of the sun, without any reflection but the pixel's own.
+
+    Every pixel is looked at through its middle, and the sun's beam falls on it or not; only pixels
+    at the edge of a shadow are looked at in several places.  The sun's disc itself is cut into
+    small pieces, so that it has its solid angle whatever the pixels' size.
+    """
+
+    def __init__(
+        self,
+        interior: Surfaces,
+        exterior: Surfaces,
+        groups: Sequence[WindowGroup],
+        scattering: Sequence[Scattering],
+        view: View,
+        *,
+        basis: KlemsBasis = KLEMS_FULL,
+        way: SunWay | None = None,
+    ) -> None:
+        """Find what each pixel shows; arguments as for `direct_sun_matrix`.
+
+        Args: way: to the sun; by default the straight one, and then all mirrors outdoors besides.
+        """
+        if len(scattering) != len(groups):
+            raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
+        self._inside = kept_scene(interior, groups)
+        self._outside = kept_scene(exterior, groups, windows_block=False)
+        self._way = SunWay(self._outside) if way is None else way
+        self._free = self._way.free
+        around = interior, exterior, groups, scattering, view
+        mirrors = sun_ways(self._outside)[1:] if way is None else []
+        self._mirrors = [PictureSun(*around, basis=basis, way=mirror) for mirror in mirrors]
+        self._scattering, self._bins = tuple(scattering), DirectionBins(basis)
+        self.view = view
+        directions, counts = pixel_directions(view)
+        shown = np.flatnonzero(counts.reshape(-1))
+        self.pixels = shown
+        self._directions = directions.reshape(-1, 3)[shown]
+        self._tree = cKDTree(self._directions)
+        self._size = float(np.sqrt(pixel_solid_angles(view).max()))  # of a pixel [rad]
+        self._eye = self._inside.place(view.position)
+        self._look()
+
+    def _look(self) -> None:
+        """Trace every pixel's middle: its window group, place, normal and reflectance."""
+        tracer = self._inside
+        direction = vectors(self._directions)
+        hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(self._eye, direction), coherent=True)
+        valid = hit.is_valid()
+        group = dr.select(valid, dr.gather(mi.Int32, tracer.group, hit.prim_index, valid), OPAQUE)
+        face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, valid)
+        face = dr.mulsign(face, -dr.dot(face, direction))
+        place = self._eye + direction * hit.t + face * tracer.epsilon
+        reflectance = tracer.diffuse(hit.prim_index, -dr.dot(face, direction), valid)
+        dull = valid & (group == OPAQUE) & (reflectance > 0)
+        self._surface = np.flatnonzero(dull.numpy())
+        chosen = column(self._surface, mi.UInt32)
+        self._place = dr.gather(mi.Point3f, mi.Point3f(place), chosen)
+        self._normal = dr.gather(mi.Vector3f, face, chosen)
+        self._reflectance = dr.gather(mi.Float, reflectance, chosen)
+        groups, self._panes = group.numpy(), []
+        for g in range(len(tracer.groups)):
+            pane = np.flatnonzero(groups == g)
+            if not len(pane):  # the view shows nothing of this group
+                self._panes.append((pane, None, None))
+                continue
+            chosen = column(pane, mi.UInt32)
+            towards = tracer.to_group(g, dr.gather(mi.Vector3f, direction, chosen))
+            point = dr.gather(mi.Point3f, mi.Point3f(self._eye + direction * hit.t), chosen)
+            step = tracer.exterior_normal(g) * tracer.epsilon
+            self._panes.append((pane, mi.Point3f(point + step), towards))
+
+    def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
+        """Add the sun's light on surfaces and windows [cd/m2] to the pixels' values [h, n].
+
+        Its disc is apart: `add_disc`, `discs`.
+
+        Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
+        """
+        for mirror in self._mirrors:
+            mirror.add_to(values, suns, illuminance)
+            mirror.add_disc(values, suns, illuminance)
+        suns, illuminance = self._turned(suns, illuminance)
+        for plane in [] if self._inside.gloss is None else self._inside.gloss.mirrors:
+            normal = self._inside.gloss.normals[plane]
+            shown = suns - 2 * (suns @ normal)[:, None] * normal
+            self._add_disc(values, shown, illuminance, int(plane))
+        lit = self._shining(suns, illuminance)
+        if not len(lit):
+            return
+        towards, strength = suns[lit], illuminance[lit]
+        self._add(values, lit, self._surface, towards, strength, self._beam_on_surfaces, edges=True)
+        for g, (pane, _, _) in enumerate(self._panes):
+            self._add(values, lit, pane, towards, strength, self._scattered_in_panes, g)
+
+    def on_elements(
+        self, elements: SunElements, suns: NDArray, illuminance: NDArray
+    ) -> NDArray[np.float32]:
+        """Luminance [m, h] of a picture's rows by the sun that parts of the room reflect."""
+        found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
+        for mirror in self._mirrors:
+            found += mirror.on_elements(elements, suns, illuminance)
+        suns, illuminance = self._turned(suns, illuminance)
+        lit, places = self._shining(suns, illuminance), elements.places
+        if not places.size or not len(lit):
+            return found
+        step = max(1, LANES // places.size)
+        for start in range(0, len(lit), step):
+            hours = lit[start : start + step]
+            light = self._beam_at(*place_and_hour(places, suns[hours]))
+            light = light.reshape(places.size, len(hours))
+            self._look_at_edges(elements, light, suns[hours])
+            found[:, hours] += elements.rows(light * illuminance[hours].astype(np.float32))
+        return found
+
+    def _look_at_edges(self, elements: SunElements, light: NDArray, suns: NDArray) -> None:
+        """Put the mean over its places on each element near rows that the edge of sun crosses."""
+        near = light[len(light) - elements.near.shape[1] :]
+        element, hour = elements.edges.crossed(near)
+        step = LANES // EDGE_POINTS
+        for start in range(0, len(hour), step):
+            part = slice(start, start + step)
+            number = (element[part, None] * EDGE_POINTS + np.arange(EDGE_POINTS)).ravel()
+            places = elements.edges.places.some(number)
+            towards = vectors(np.repeat(suns[hour[part]], EDGE_POINTS, axis=0))
+            to_sun = on_disc_of(towards, column(number, mi.UInt32))
+            value = self._beam_at(places.points(), places.normals(), to_sun)
+            near[element[part], hour[part]] = value.reshape(-1, EDGE_POINTS).mean(axis=1)
+
+    def _beam_at(
+        self, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f
+    ) -> NDArray[np.float32]:
+        """Irradiance of places through the windows, per unit normal to the sun [n]."""
+        cosine = dr.dot(normal, to_sun)
+        tau = self._straight(point, to_sun, cosine > 0)
+        return dr.select(tau > 0, tau * cosine, 0.0).numpy()
+
+    def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:
+        """Where the light of suns comes from, and its illuminance: 0 with the sun down."""
+        return self._way.turned(suns), np.where(suns[:, 2] > 0, illuminance, 0.0)
+
+    def _shining(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.int64]:
+        """The hours in which the sun stands before a window."""
+        facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
+        return np.flatnonzero(facing & (illuminance > 0))
+
+    def discs(self, suns: NDArray, illuminance: NDArray) -> list[SunDisc | None]:
+        """The sun's disc [h] as the eye sees it through the straight beam, None where hidden."""
+        found: list[SunDisc | None] = [None] * len(suns)
+        suns, illuminance = self._turned(suns, illuminance)
+        lit = self._shining(suns, illuminance)
+        lit = lit[self._tree.query(suns[lit])[0] < self._size] if len(lit) else lit
+        if not len(lit):
+            return found
+        ways = np.stack([disc_parts(suns[hour]) for hour in lit])
+        towards = vectors(ways.reshape(-1, 3))
+        tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
+        tau = np.broadcast_to(tau, ways.shape[0] * ways.shape[1]).reshape(ways.shape[:2])
+        for hour, way, part in zip(lit, ways, tau * before_eye(self.view, ways), strict=True):
+            found[hour] = seen_disc(way, part * (illuminance[hour] / SUN_SOLID_ANGLE))
+        return found
+
+    def _add(self, values, lit, columns, suns, strength, kernel, *options, edges=False) -> None:
+        """Add what a kernel gives for pairs of hours and pixels, some hours at a time.
+
+        Args: edges: whether what it gives ends within pixels, which are then looked at again.
+        """
+        if not len(columns):
+            return
+        step = max(1, LANES // len(columns))
+        for start in range(0, len(lit), step):
+            part = slice(start, start + step)
+            towards = vectors(suns[part])
+            light = mi.Float(strength[part].astype(np.float32))
+            lane = dr.arange(mi.UInt32, len(columns) * dr.width(light))
+            width = dr.opaque(mi.UInt32, len(columns))
+            hour = lane // width
+            found = kernel(lane - hour * width, hour, towards, light, *options)
+            found = found.numpy().reshape(-1, len(columns))
+            if edges:
+                self._look_again(found, suns[part], strength[part])
+            for row, hour_values in zip(lit[part], found, strict=True):
+                some = np.flatnonzero(hour_values)  # the sun falls on few pixels
+                values[row, columns[some]] += hour_values[some]
+
+    def _beam_on_surfaces(self, pixel, hour, suns, light) -> mi.Float:
+        """Luminance of the surfaces where the windows' straight beam falls on them."""
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, suns, hour), pixel)
+        cosine = dr.dot(dr.gather(mi.Vector3f, self._normal, pixel), to_sun)
+        place = dr.gather(mi.Point3f, self._place, pixel)
+        tau = self._straight(place, to_sun, cosine > 0)
+        rho = dr.gather(mi.Float, self._reflectance, pixel)
+        value = rho * dr.inv_pi * cosine * tau * dr.gather(mi.Float, light, hour)
+        return dr.select(tau > 0, value, 0.0)
+
+    def _look_again(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
+        """Put the mean over its places into each pixel [h, m] that the edge of a shadow crosses.
+
+        That is where the sun falls on its middle and not on a neighbour's, or the reverse.
+        """
+        hour, pixel = edge_pixels(found > 0, self.pixels[self._surface], self.view)
+        order = np.argsort(pixel, kind="stable")  # each is looked at once for all of its hours
+        hour, pixel = hour[order], pixel[order]
+        step = LANES // EDGE_PLACES
+        for start in range(0, len(hour), step):
+            some, part = pixel[start : start + step], hour[start : start + step]
+            found[part, some] = self._beam_in_pixels(some, suns[part]) * light[part]
+
+    def _beam_in_pixels(self, pixel: NDArray[np.int64], suns: NDArray) -> NDArray[np.float32]:
+        """Luminance [r] of surfaces per unit illuminance of suns [r, 3], mean over each pixel.
+
+        Args: pixel: [r] number among those that show surfaces, in ascending order.
+        """
+        shown, row = np.unique(pixel, return_inverse=True)
+        place, normal, rho = self._places_in(self.pixels[self._surface[shown]])
+        lane = dr.arange(mi.UInt32, len(pixel) * EDGE_PLACES)
+        pair = lane // EDGE_PLACES
+        number = lane - pair * EDGE_PLACES
+        at = dr.gather(mi.UInt32, column(row, mi.UInt32), pair) * EDGE_PLACES + number
+        on_disc = dr.gather(mi.UInt32, column(pixel, mi.UInt32), pair) * EDGE_PLACES + number
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(suns), pair), on_disc)
+        cosine = dr.dot(dr.gather(mi.Vector3f, normal, at), to_sun)
+        rho = dr.gather(mi.Float, rho, at)
+        tau = self._straight(dr.gather(mi.Point3f, place, at), to_sun, (rho > 0) & (cosine > 0))
+        value = dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0)
+        return (dr.block_sum(value, EDGE_PLACES) / EDGE_PLACES).numpy()
+
+    def _places_in(self, pixels: NDArray[np.int64]) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
+        """Surfaces that places spread over pixels [k] show, their normals and reflectances.
+
+        The reflectance is 0 where they show none.
+        """
+        tracer, direction = self._inside, vectors(places_in_pixels(self.view, pixels))
+        ray = mi.Ray3f(self._eye, direction)
+        hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True)
+        shown = hit.is_valid()
+        place, normal, rho = tracer.surface_at(hit, self._eye, direction, shown)
+        shown &= dr.gather(mi.Int32, tracer.group, hit.prim_index, shown) == OPAQUE
+        found = place, normal, dr.select(shown, rho, 0.0)
+        dr.eval(found)
+        return found
+
+    @dr.syntax
+    def _straight(self, place: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:
+        """Transmittance of the straight way from places in the room to the sun; 0 if hidden."""
+        ray = mi.Ray3f(place, to_sun)
+        hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        active = active & hit.is_valid()
+        group = dr.gather(mi.Int32, self._inside.group, hit.prim_index, active)
+        active &= group != OPAQUE
+        tau = dr.zeros(mi.Float, dr.width(active))
+        if active:  # few rays meet a window: the others skip its BSDF and the way outdoors
+            tau = self._passed(group, mi.Point3f(place + to_sun * hit.t), to_sun, active)
+        return tau
+
+    def _passed(
+        self, group: mi.Int32, window: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool
+    ) -> mi.Float:
+        """Transmittance from places on windows to the sun."""
+        local = self._inside.to_local(group, to_sun, active)
+        active = active & (local.z > 0)
+        tau = mi.Float(0)
+        for g, system in enumerate(self._scattering):
+            tau = dr.select(active & (group == g), system.through(local), tau)
+        if not self._free:
+            active &= tau > 0
+            tau *= self._way.reaching(mi.Ray3f(window, to_sun), active, coherent=True)
+        return tau
+
+    def _scattered_in_panes(self, pixel, hour, suns, light, g: int) -> mi.Float:
+        """Luminance of window pixels: f(sun, pixel) times the sun's illuminance on the pane."""
+        _, place, towards = self._panes[g]
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, suns, hour), pixel)
+        local = self._inside.to_group(g, to_sun)
+        lit, share = local.z > 0, mi.Float(1)
+        if not self._free:
+            ray = mi.Ray3f(dr.gather(mi.Point3f, place, pixel), to_sun)
+            share = self._way.reaching(ray, lit, coherent=True)
+        f = share * self._scattering[g].scattered(local, dr.gather(mi.Vector3f, towards, pixel))
+        return dr.select(lit, f * local.z * dr.gather(mi.Float, light, hour), 0.0)
+
+    def scattered_luminance(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.float32]:
+        """Luminance [G, K, h] of the windows by the sun that they scatter, mean over each group.
+
+        f is the mean over each patch; where part of the group lies in shadow, its share counts.
+        """
+        K, h, G = self._bins.size, len(suns), len(self._panes)
+        result = np.zeros((G, K, h), dtype=np.float32)
+        for mirror in self._mirrors:
+            result += mirror.scattered_luminance(suns, illuminance)
+        suns, illuminance = self._turned(suns, illuminance)
+        strength = np.maximum(illuminance, 0.0)
+        if not strength.any():
+            return result
+        towards = vectors(suns)
+        lane = dr.arange(mi.UInt32, K * PATCH_POINTS * h)
+        hours = dr.opaque(mi.UInt32, h)
+        sample = lane // hours
+        patch = sample // PATCH_POINTS
+        to_sun = dr.gather(mi.Vector3f, towards, lane - sample * hours)
+        u = lattice_2d(sample - patch * PATCH_POINTS, patch, 0)
+        outward = self._bins.sample(patch, u)
+        for g, system in enumerate(self._scattering):
+            local = self._inside.to_group(g, to_sun)
+            f = dr.select(local.z > 0, system.scattered(local, outward) * local.z, 0.0)
+            mean = f.numpy().reshape(K, PATCH_POINTS, h).mean(axis=1)
+            result[g] += mean * (strength * self._sunlit_share(g, towards))
+        return result
+
+    def _sunlit_share(self, g: int, suns: mi.Vector3f) -> NDArray[np.float64] | float:
+        """Share [h] of a group's area that the sun reaches."""
+        if self._free:
+            return 1.0
+        lane = dr.arange(mi.UInt32, WINDOW_POINTS * dr.width(suns))
+        hour = lane // WINDOW_POINTS
+        place = self._inside.sample_group(
+            g, lattice_2d(lane - hour * WINDOW_POINTS, opaque(g, mi.UInt32), 0)
+        )
+        step = self._inside.exterior_normal(g) * self._inside.epsilon
+        ray = mi.Ray3f(place + step, dr.gather(mi.Vector3f, suns, hour))
+        seen = self._way.reaching(ray, dr.full(mi.Bool, True, dr.width(lane)))
+        return seen.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
+
+    def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
+        """Add the disc as the eye sees it, by its share of each pixel; arguments of `add_to`."""
+        self._add_disc(values, *self._turned(suns, illuminance), None)
+
+    def _add_disc(
+        self, values: NDArray, suns: NDArray, illuminance: NDArray, mirror: int | None
+    ) -> None:
+        """Add the disc that stands at `suns`, or that a mirror plane of the room shows there."""
+        lit = self._shining(suns, illuminance) if mirror is None else np.flatnonzero(illuminance)
+        suns, strength = suns[lit], illuminance[lit]
+        reach = 2 * np.sin(disc_reach(self._size) / 2)
+        near = self._tree.query_ball_point(suns, reach)
+        hour = np.repeat(np.arange(len(lit)), [len(found) for found in near])
+        if not len(hour):
+            return
+        pixel = np.concatenate([found for found in near if found]).astype(np.int64)
+        pair, way, share = disc_rays(self.view, self.pixels[pixel], suns[hour], self._size)
+        if not len(pair):
+            return
+        towards = vectors(way)
+        if mirror is None:
+            tau = self._straight(mi.Point3f(self._eye), towards, mi.Bool(True)).numpy()
+        else:
+            tau = self._by_mirror(towards, mirror).numpy()
+        seen = np.bincount(pair, tau, minlength=len(hour)) * share
+        np.add.at(values, (lit[hour], pixel), seen * strength[hour] / SUN_SOLID_ANGLE)
+
+    def _by_mirror(self, towards: mi.Vector3f, plane: int) -> mi.Float:
+        """Share of the sun that comes to the eye by a mirror plane of the room."""
+        gloss = self._inside.gloss
+        normal = opaque_vector(gloss.normals[plane])
+        ray = mi.Ray3f(mi.Point3f(self._eye), towards)
+        hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True)
+        met = hit.is_valid()
+        met &= gloss.plane_of(hit.prim_index, met) == plane
+        normal = dr.mulsign(normal, -dr.dot(normal, towards))
+        cosine = -dr.dot(normal, towards)
+        place = mi.Point3f(ray.o + towards * hit.t + normal * self._inside.epsilon)
+        tau = self._straight(place, mi.Vector3f(towards + normal * (2 * cosine)), met)
+        return tau * gloss.specular(hit.prim_index, cosine, met)

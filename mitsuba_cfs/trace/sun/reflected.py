@@ -1,0 +1,290 @@
+"""The sun that surfaces outdoors reflect to windows, and to sensors straight through them.
+
+    L[row] = sum over places m of share[row, m] E_sun[m]
+             + sum over rough faces r that its paths meet, weight[r] f(path, sun) E_sun[r]
+
+Paths find the surfaces that a row has light from; a few thousand of the places they meet stand for
+all, and a shadow ray from each to the sun gives its irradiance hour by hour.  No path has to find
+the sun by itself: of a window patch's paths that a surface reflects one in five hundred does.
+
+Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun; the places
+stand for others near by as the virtual lights of Keller 1997, "Instant radiosity".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.trace.kernels.bins import DirectionBins
+from mitsuba_cfs.trace.kernels.sampling import (
+    batch_key,
+    column,
+    lattice_2d,
+    opaque,
+    tables,
+    vectors,
+)
+from mitsuba_cfs.trace.kernels.scattering import Scattering
+from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.matrices.straight_view import straight_rays
+from mitsuba_cfs.trace.sun.grid import sunlight_of_many
+from mitsuba_cfs.trace.sun.lit_points import Places, face_places, reflecting_places
+from mitsuba_cfs.trace.sun.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, mirrored
+
+BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
+PLACES = 1024  # that stand for all that paths meet, at most and where nothing is said
+FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
+MORTON_BITS = 12  # along each axis
+# shifts and masks that leave two empty bits behind each of up to 16
+SPREAD_BITS = (
+    (16, 0xFF0000FF), (8, 0xF00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249),
+)  # fmt: skip
+ROUGH = 4096  # rough faces whose lobes a row sees, at most
+LANES = 2**22  # shadow rays at once
+
+
+@dataclass(frozen=True, slots=True)
+class SunShares:
+    """Places that reflect the sun, and what rows have of their irradiance."""
+
+    places: Places  # [m]
+    share: sparse.csr_array  # [rows, m]
+    rough: RoughFaces | None = None  # whose lobes the rows see
+
+    @classmethod
+    def of(cls, met: Sequence[_Met], rows: int, seed: int, *, most: int = PLACES) -> SunShares:
+        """From what paths met: one of each run of near places, drawn by weight, stands for all.
+
+        The weights are shares of each row's: a sensor in the depth has as many places as one that
+        sees more.
+
+        Args: most: places, at the most.
+        """
+        places = Places.joined([m.places for m in met])
+        row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
+        weight = np.concatenate([np.empty(0), *(m.weight for m in met)])
+        rough = None
+        if any(m.rough for m in met):
+            rough = _few(RoughFaces.joined([part for m in met for part in m.rough]))
+        if not len(weight):
+            return cls(places, sparse.csr_array((rows, 0)), rough)
+        of_row = weight / np.bincount(row, weight, rows)[row]
+        run, chosen = _runs(places, of_row, most, np.random.default_rng(seed))
+        few = places.some(chosen)
+        share = sparse.csr_array(sparse.coo_array((weight, (row, run)), shape=(rows, len(chosen))))
+        return cls(few, share, rough)
+
+
+@dataclass(frozen=True, slots=True)
+class _Met:
+    """Places that paths met, the row that each gives light to, and how much of its irradiance."""
+
+    row: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    places: Places
+    rough: list[RoughFaces]
+
+
+def window_shares(
+    outside: TracedScene, *, samples: int, places: int = PLACES, seed: int = 0
+) -> SunShares:
+    """What window patches have of the sun on surfaces outdoors; rows [Q * K], radiance.
+
+    Args: samples: paths of each patch; places: that stand for what they meet, at the most.
+    """
+    bins, starts = DirectionBins(KLEMS_FULL), []
+    K, count = bins.size, len(outside.groups) * bins.size
+    for q in range(len(outside.groups)):
+        path = dr.arange(mi.UInt32, K * samples)
+        patch = path // dr.opaque(mi.UInt32, samples)
+        sample = path - patch * dr.opaque(mi.UInt32, samples)
+        key = batch_key(seed, q)
+        stream = mi.sample_tea_32(patch, key)[0]
+        way = outside.to_world(q, bins.sample(patch, lattice_2d(sample, stream, 0)))
+        position = outside.sample_group(q, lattice_2d(sample, stream, 2))
+        starts.append(tables(position, way))
+    # the paths of all parts at once: each bounce is a launch
+    position, way = (np.concatenate(part) for part in zip(*starts, strict=True))
+    row = column(np.repeat(np.arange(count), samples), mi.UInt32)
+    weight = opaque(1.0 / samples) + dr.zeros(mi.Float, count * samples)
+    met = _met(outside, row, weight, vectors(position, mi.Point3f), vectors(way), seed)
+    return SunShares.of([met], count, seed, most=places)
+
+
+def view_shares(
+    inside: TracedScene,
+    outside: TracedScene,
+    group: int,
+    way: Scattering,
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+    *,
+    samples: int,
+    places: int = PLACES,
+    seed: int = 0,
+) -> SunShares:
+    """What sensors see of the sun on surfaces outdoors through a group's beam; rows [S].
+
+    Args:
+        sensors: positions and normals [S, 3].
+        samples: points on the group for each sensor; places: as for `window_shares`.
+    """
+    key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+    sensor, target, omega, weight = straight_rays(inside, group, way, sensors, samples, key)
+    met = _met(outside, sensor, weight / samples, target, omega, seed)
+    return SunShares.of([met], len(sensors[0]), seed, most=places)
+
+
+def outdoor_light(
+    shares: SunShares,
+    outside: TracedScene,
+    suns: NDArray[np.float64],
+    strength: NDArray[np.float64],
+) -> NDArray[np.float32]:
+    """Light of the rows [rows, h] from surfaces outdoors in the sun.
+
+    Args: suns: [h, 3]; strength: [h] irradiance normal to it.
+    """
+    found = np.zeros((shares.share.shape[0], len(suns)), dtype=np.float32)
+    share, strength = shares.share.astype(np.float32), strength.astype(np.float32)
+    for hours in _blocks(shares.places.size, len(suns)):
+        light = sunlight_of_many(outside, shares.places, suns[hours])
+        found[:, hours] = share @ light * strength[hours]
+    if shares.rough is None:
+        return found
+    count = len(shares.rough.weight)
+    entries = shares.rough.weight, (shares.rough.pixel, np.arange(count))
+    of_row = sparse.csr_array(entries, shape=(len(found), count), dtype=np.float32)
+    for hours in _blocks(count, len(suns)):
+        found[:, hours] += of_row @ shares.rough.lobes(outside, suns[hours]) * strength[hours]
+    return found
+
+
+def _met(
+    outside: TracedScene,
+    row: mi.UInt32,
+    weight: mi.Float,
+    origin: mi.Point3f,
+    way: mi.Vector3f,
+    seed: int,
+) -> _Met:
+    """The surfaces that paths from windows meet, with what they reflect [1/sr].
+
+    By gloss a path goes on to what it mirrors; the sun itself in a mirror is the direct sun's.
+    """
+    start, along, share, of = tables(origin, way, weight, row)
+    some = np.flatnonzero(share > 0)
+    lanes = Lanes(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
+    rows, values, places, rough = [], [], [], []
+    for bounce in range(MOST_MIRRORS + 1):
+        if not len(lanes.row):
+            break
+        direction = vectors(lanes.way.T)
+        last = vectors(lanes.origin.T, mi.Point3f)
+        hit, last = outside.met_outdoors(last, direction, mi.Bool(True))
+        met = hit.is_valid()
+        normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, met)
+        rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(normal, direction)), met)
+        others = met, rho, hit.prim_index, last
+        there, met, rho, prim, begun = face_places(outside, last, direction, hit, met, *others)
+        lanes = replace(lanes, origin=begun.T)
+        value = lanes.weight * rho / np.pi
+        kept = np.flatnonzero(met & (value > 0))
+        rows.append(lanes.row[kept])
+        values.append(value[kept])
+        places.append(there.some(kept))
+        if outside.gloss is not None:
+            rough.append(_rough(outside, lanes, there, np.where(met, prim, 0), met))
+        lanes = mirrored(outside, lanes, hit, bounce)
+    if not rows:
+        return _Met(np.empty(0, dtype=np.int64), np.empty(0), Places.joined([]), [])
+    row_of, value, first = np.concatenate(rows), np.concatenate(values), Places.joined(places)
+    later = reflecting_places(outside, first, seed, BOUNCES, mirrored=True)
+    return _Met(
+        np.concatenate([row_of, row_of[later.path]]),
+        np.concatenate([value, value[later.path] * later.weight]),
+        Places.joined([first, later.places]),
+        rough,
+    )
+
+
+def _rough(
+    outside: TracedScene,
+    lanes: Lanes,
+    places: Places,
+    triangle: NDArray[np.uint32],
+    met: NDArray[np.bool_],
+) -> RoughFaces:
+    """Those of the faces that rays met whose gloss is rough."""
+    alpha = outside.gloss.roughness(column(triangle, mi.UInt32), column(met, mi.Bool)).numpy()
+    found = np.flatnonzero(alpha > 0)
+    some, faces = lanes.some(found), triangle[found].astype(np.int64)
+    return RoughFaces(some.row, some.weight, faces, some.way, places.some(found))
+
+
+def _few(rough: RoughFaces) -> RoughFaces:
+    """The first `ROUGH` of those of each row, which are spread as evenly as all of them."""
+    order = np.argsort(rough.pixel, kind="stable")
+    row = rough.pixel[order]
+    kept = order[np.arange(len(row)) - np.searchsorted(row, row) < ROUGH]
+    rows = int(rough.pixel.max(initial=0)) + 1
+    of_all = np.bincount(rough.pixel, rough.weight, rows)
+    of_kept = np.bincount(rough.pixel[kept], rough.weight[kept], rows)
+    few = rough.some(kept)
+    return replace(few, weight=few.weight * (of_all / np.maximum(of_kept, 1e-30))[few.pixel])
+
+
+def _runs(
+    places: Places, weight: NDArray[np.float64], most: int, random: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The run of near places, even in weight, that each is of; the one that stands for each run.
+
+    Runs follow Morton's curve over the places of one of 26 directions.
+    """
+    facing = np.round(FACING * places.normal).astype(np.int64) @ [9, 3, 1]
+    side = _numbered(facing - facing.min(initial=0))
+    order = np.argsort((side << 3 * MORTON_BITS) + _morton(places.point), kind="stable")
+    side, weight = side[order], weight[order]
+    climbed, total = np.cumsum(weight), np.bincount(side, weight)
+    number = np.ceil(most * total / total.sum()).astype(np.int64)
+    within = (climbed - 0.5 * weight - (np.cumsum(total) - total)[side]) / total[side]
+    run = np.clip((within * number[side]).astype(np.int64), 0, number[side] - 1)
+    run = _numbered((np.cumsum(number) - number)[side] + run)
+    of_run = np.bincount(run, weight)
+    marks = np.cumsum(of_run) - random.random(len(of_run)) * of_run
+    drawn = np.clip(
+        np.searchsorted(climbed, marks),
+        np.searchsorted(run, np.arange(len(of_run))),
+        np.searchsorted(run, np.arange(len(of_run)), side="right") - 1,
+    )
+    found = np.empty_like(run)
+    found[order] = run
+    return found, order[drawn]
+
+
+def _numbered(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The place of small whole numbers [m] among those of them that there are."""
+    there = np.bincount(values) > 0
+    return (np.cumsum(there) - 1)[values]
+
+
+def _morton(point: NDArray[np.float32]) -> NDArray[np.int64]:
+    """The place of points [m, 3] along Morton's curve through the box that holds them."""
+    low, size = point.min(axis=0), max(float(np.ptp(point, axis=0).max()), 1e-6)
+    cell = np.minimum((point - low) / size * 2**MORTON_BITS, 2**MORTON_BITS - 1).astype(np.int64)
+    for shift, mask in SPREAD_BITS:
+        cell = (cell | cell << shift) & mask
+    return cell @ [1, 2, 4]
+
+
+def _blocks(places: int, hours: int) -> list[slice]:
+    """Hours in blocks of so many shadow rays as are traced at once."""
+    step = max(1, LANES // max(places, 1))
+    return [slice(start, start + step) for start in range(0, hours if places else 0, step)]

@@ -1,1 +1,0 @@
-"""The dissertation's example applications (chapter 5) as scripts."""

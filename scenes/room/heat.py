@@ -1,0 +1,349 @@
+"""The heat balance of rooms, alone or coupled: temperatures, humidity, comfort, loads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bim.model import Problem, Space
+from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.annual import AnnualGlare
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.stored_arrays import StoredArrays
+from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.results import (
+    DaylightResult,
+    ExploredRoom,
+    GlareResults,
+    OperationResult,
+    RoomYear,
+    ThermalResult,
+)
+from scenes.room.operation_tables import ComfortTable, OperationTables
+from scenes.room.windows import RoomWindows
+from scenes.room.zone import RoomZone, balances, coupled
+from thermal.balance import ZoneResult
+from thermal.comfort import comfort_by_outdoors, pmv_ppd, standard_effective_temperature, summarise
+from thermal.moisture import Humidity, MoistZone, humidity_ratio, zone_humidity
+from thermal.ventilation import AirTransfer
+from thermal.zone import Zone
+
+FloatArray = NDArray[np.float64]
+
+
+def outdoor_humidity(weather: Weather) -> FloatArray:
+    """Humidity ratio outdoors [H] [kg/kg].
+
+    Raises: `DataError` for weather that says neither relative humidity nor dew point.
+    """
+    if weather.relative_humidity is not None:
+        relative, at = weather.relative_humidity, weather.dry_bulb_c
+    elif weather.dew_point_c is not None:
+        relative, at = 1.0, weather.dew_point_c
+    else:
+        raise DataError("says neither relative humidity nor dew point", file=weather.file)
+    return humidity_ratio(relative, at, weather.pressure_pa)
+
+
+def room_humidity(
+    rooms: Sequence[RoomZone],
+    results: Iterable[ZoneResult],
+    weather: Weather,
+    *,
+    air_links: FloatArray | None = None,
+    transfers: Sequence[AirTransfer] = (),
+) -> tuple[Humidity, ...]:
+    """The humidity of rooms whose air was balanced together."""
+    zones = [
+        MoistZone(
+            room.zone.volume,
+            result.air_c,
+            result.outdoor_air,
+            room.services.vapour,
+            room.services.humidify_to,
+            room.services.dehumidify_to,
+        )
+        for room, result in zip(rooms, results, strict=True)
+    ]
+    count = len(zones)
+    between = np.zeros((count, count)) if air_links is None else np.array(air_links, dtype=float)
+    if transfers:
+        between = np.repeat(between[None], len(weather.times), axis=0)
+        index = {room.zone.name: z for z, room in enumerate(rooms)}
+        for one in transfers:
+            between[:, index[one.target], index[one.source]] += one.flow
+    return zone_humidity(
+        zones, outdoor_humidity(weather), weather.dry_bulb_c, weather.pressure_pa, between,
+        row_s=3600.0 * weather.step_h,
+    )  # fmt: skip
+
+
+def felt_by(person: ComfortTable, result: ZoneResult, humidity: Humidity) -> dict[str, FloatArray]:
+    """Relative humidity of the air [%], the person's PMV, PPD [%] and SET [degC], each [H].
+
+    The person is in the humidity stated, else in the air's.
+    """
+    air = 100.0 * np.clip(humidity.relative, 0.0, 1.0)
+    about = person.model_dump(exclude={"mean_radiant"})
+    if person.humidity is None:
+        about["humidity"] = air
+    pmv, ppd = pmv_ppd(result.air_c, result.mrt_c, **about)
+    felt = standard_effective_temperature(result.air_c, result.mrt_c, **about)
+    return {"relative_humidity_percent": air, "pmv": pmv, "ppd": ppd, "set_c": felt}
+
+
+BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
+
+
+def operated_year(
+    room: RoomZone, result: ZoneResult, weather: Weather, states: tuple[str, ...], rule: str
+) -> OperationResult:
+    """What control, heating, cooling and lamps of a room did.
+
+    Args: states: names of the shading states; rule: of their control.
+    """
+    hours = pd.DataFrame(
+        {
+            "shading_state": room.state,
+            "heating_w": result.heating,
+            "cooling_w": result.cooling,
+            "lighting_w": room.lamps,
+        },
+        index=weather.midpoints,
+    ).rename_axis("time")
+    summary = {
+        "heating_kwh": result.heating.sum() / 1e3,
+        "cooling_kwh": result.cooling.sum() / 1e3,
+        "lighting_kwh": room.lamps.sum() / 1e3,
+        "peak_heating_w": result.heating.max(),
+        "peak_cooling_w": result.cooling.max(),
+    }
+    summary = {key: float(value) for key, value in summary.items()}
+    return OperationResult(states, hours, summary, rule)
+
+
+def thermal_result(
+    room: RoomZone,
+    result: ZoneResult,
+    weather: Weather,
+    felt: dict[str, NDArray[np.float64]],
+    fenestration: Iterator[dict[str, float | str]],
+) -> ThermalResult:
+    """The tables of a room's year.
+
+    Args: felt: `felt_by`; fenestration: `fenestration_table` of its windows.
+    """
+    comfort, summary = _comfort(result, weather, room.occupied)
+    return ThermalResult(
+        _temperatures(result, room.zone, weather).assign(**felt),
+        pd.DataFrame(room.gains, index=weather.midpoints).rename_axis("time"),
+        comfort,
+        summary,
+        tuple(fenestration),
+    )
+
+
+def fenestration_table(
+    windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]]
+) -> Iterator[dict[str, float | str]]:
+    """What the windows are, group by group and state by state, at normal incidence."""
+    seen = set()
+    for states, heats in zip(windows.systems, thermals, strict=True):
+        for system, heat in zip(states, heats, strict=True):
+            if id(system) in seen:
+                continue
+            seen.add(id(system))
+            visible = system.visible
+            yield {
+                "system": system.name,
+                "source": system.source,
+                "u_value": heat.fenestration.u_value,
+                "g_value": float(heat.g_value[0]),
+                "solar_transmittance": float(heat.transmittance[0]),
+                "solar_reflectance": float(heat.reflectance[0]),
+                "visible_transmittance": float(
+                    visible.direct_hemispherical(visible.transmission_front)[0]
+                ),
+            }
+
+
+def _temperatures(result: ZoneResult, zone: Zone, weather: Weather) -> pd.DataFrame:
+    """Table of the year's temperatures [degC]."""
+    columns = {
+        "outdoor_c": weather.dry_bulb_c,
+        "air_c": result.air_c,
+        "mrt_c": result.mrt_c,
+        "operative_c": result.operative_c,
+    }
+    for i, surface in enumerate(zone.surfaces):
+        columns[f"{surface.name} ({surface.outside})_c"] = result.surface_in_c[:, i]
+    for i, window in enumerate(zone.windows):
+        columns[f"window {window.name} inside_c"] = result.window_inner_c[:, i]
+        columns[f"window {window.name} outside_c"] = result.window_outer_c[:, i]
+    return pd.DataFrame(columns, index=weather.midpoints).rename_axis("time")
+
+
+def _comfort(
+    result: ZoneResult, weather: Weather, occupied: NDArray[np.bool_]
+) -> tuple[pd.DataFrame, dict[str, float]]:
+    """Adaptive comfort (ASHRAE 55) of every hour, and its shares of the occupied ones."""
+    table = {"occupied": occupied}
+    summary: dict[str, float] = {}
+    for name, band in BANDS.items():
+        comfort = comfort_by_outdoors(
+            result.operative_c, weather.dry_bulb_c, band, per_day=weather.per_day
+        )
+        table.setdefault("running_mean_c", comfort.outdoor_mean_c)
+        table.setdefault("comfort_c", (comfort.low_c + comfort.high_c) / 2)
+        table.setdefault("applicable", comfort.applicable)
+        table[name] = comfort.comfortable
+        counted = summarise(comfort, occupied, weather.midpoints.month.to_numpy())
+        summary[name] = 100.0 * counted.comfortable / counted.hours
+    summary["too_warm_hours"] = counted.too_warm * weather.step_h
+    summary["too_cold_hours"] = counted.too_cold * weather.step_h
+    summary["outside_the_model_hours"] = counted.not_applicable * weather.step_h
+    frame = pd.DataFrame(table, index=weather.midpoints).rename_axis("time")
+    return frame, summary
+
+
+Heat = tuple[ThermalResult, OperationResult | None]
+
+
+@dataclass(frozen=True, slots=True)
+class HeatInputs:
+    """What the heat of a room comes from, and what its tables name."""
+
+    zone: RoomZone
+    fenestration: tuple[dict[str, float | str], ...]  # `fenestration_table` of its windows
+    states: tuple[str, ...]  # names of the shading states
+    tables: OperationTables | None  # None: not operated
+
+
+@dataclass(frozen=True, slots=True)
+class DaylitRoom:
+    """A room with its year of light, before its heat."""
+
+    space: Space
+    daylight: DaylightResult
+    glare: GlareResults
+    inputs: HeatInputs
+    seconds: dict[str, float]  # by stage
+    annual_glare: pd.DataFrame | None = None
+    dgp: AnnualGlare | None = None
+    problems: tuple[Problem, ...] = ()
+    explored: ExploredRoom | None = None
+    template: str = ""
+    borrowed: str = ""
+
+    def with_heat(self, heat: Heat) -> RoomYear:
+        """The whole year."""
+        thermal, ran = heat
+        names = (field.name for field in fields(self) if field.name != "inputs")
+        return RoomYear(
+            heat=thermal, operation=ran, **{name: getattr(self, name) for name in names}
+        )
+
+
+def heat_of(
+    rooms: Sequence[HeatInputs],
+    weather: Weather,
+    step_s: float,
+    *,
+    terrain: str = "suburbs",
+    air_links: NDArray[np.float64] | None = None,
+    progress: Progress = silent,
+    store: StoredArrays | None = None,
+) -> list[Heat]:
+    """Temperatures, comfort and loads of rooms that are balanced together.
+
+    Args:
+        step_s: of the balance [s].
+        air_links: air between them [Z, Z] [m3/s]; None: none.
+        store: where the balances and what is found lie; None: in memory.
+    """
+    zones = [room.zone for room in rooms]
+    found = balances(
+        zones, weather, step_s, air_links=air_links, terrain=terrain, progress=progress,
+        store=store,
+    )  # fmt: skip
+    passed = iter if store is None else store.each
+    moist = room_humidity(zones, passed(found), weather, air_links=air_links)
+    heats: list[Heat] = []
+    for room, balance, humidity in zip(rooms, passed(found), moist, strict=True):
+        tables = room.tables or OperationTables()
+        felt = felt_by(tables.comfort, balance, humidity)
+        heat = thermal_result(room.zone, balance, weather, felt, iter(room.fenestration))
+        ran = None
+        if room.tables is not None:
+            rule = tables.control.rule
+            ran = operated_year(room.zone, balance, weather, room.states, rule)
+        heats.append((heat, ran) if store is None else store.kept((heat, ran)))
+    return heats
+
+
+def heat_alone(
+    room: HeatInputs, weather: Weather, step_s: float, progress: Progress = silent
+) -> Heat:
+    """The heat of a room with rooms of its own temperature around it."""
+    terrain = (room.tables or OperationTables()).terrain
+    (heat,) = heat_of([room], weather, step_s, terrain=terrain, progress=progress)
+    progress("heat", 1.0)
+    return heat
+
+
+def coupled_years(
+    rooms: Sequence[DaylitRoom],
+    weather: Weather,
+    step_s: float,
+    tables: OperationTables,
+    progress: Progress = silent,
+    *,
+    store: StoredArrays | None = None,
+) -> tuple[list[RoomYear], str]:
+    """The years of rooms that exchange heat through what lies between them, and that in words.
+
+    Args:
+        tables: of all rooms; they say the site's terrain and the air through open doors.
+        store: where the rooms' heat lies; None: in memory.
+    """
+    progress("heat balance", 0.0)
+    zones, links, _ = coupled([room.inputs.zone for room in rooms], tables.air.door_m3_s)
+    inputs = [replace(r.inputs, zone=zone) for r, zone in zip(rooms, zones, strict=True)]
+    found = heat_of(
+        inputs, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress,
+        store=store,
+    )  # fmt: skip
+    progress("heat balance", 1.0)
+    years = [room.with_heat(heat) for room, heat in zip(rooms, found, strict=True)]
+    return years, _said(zones)
+
+
+def _said(rooms: Sequence[RoomZone]) -> str:
+    """What the rooms exchange heat through, and behind what the room itself is taken to lie."""
+    through = among = other = 0.0
+    guids = {room.space.guid for room in rooms}
+    for room in rooms:
+        for surface, guid in zip(room.zone.surfaces, room.room.neighbours, strict=True):
+            if surface.partner:
+                through += surface.area / 2.0
+            elif guid in guids:
+                among += surface.area
+            elif guid is not None and surface.outside == "twin":
+                other += surface.area
+    text = (
+        f"The heat of the {len(rooms)} rooms is balanced together: it flows between them through "
+        f"{through:.1f} m2 of walls, floors and doors."
+    )
+    apart = {
+        "towards each other where no face of the other was found": among,
+        "towards rooms that are not computed": other,
+    }
+    behind = " and ".join(f"{area:.1f} m2 {what}" for what, area in apart.items() if area >= 0.05)
+    if behind:
+        text += f" Behind these sides a room of the same temperature is taken to lie: {behind}."
+    return text

@@ -1,0 +1,70 @@
+"""Processor seconds and compiled kernels of each room of a building as `cfs run --quick` has it.
+
+    python -m tests.benchmarks rooms_of_building BUILDING.ifc --weather CITY.epw \
+        --cfs SYSTEM.xml --space 111 --space 103 [--results FILE.npz]
+
+No matrix is kept.  Kernels that Dr.Jit has on disk (`~/.drjit`) count as known: with another HOME
+the figures are those of a first run.  To compare two states run the same file with each in
+PYTHONPATH; `--results` keeps what the rooms give.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from mitsuba_cfs import variants
+from scenes.quick import ROOM
+from scenes.room.options import RoomOptions
+from scenes.room.room_year import compute_room
+from scenes.room.skies import skies_for
+from scenes.run.job import read_inputs
+from scenes.run.options import JobOptions
+
+
+def main() -> None:
+    """Print a line for each room."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("building", type=Path)
+    parser.add_argument("--weather", type=Path, required=True)
+    parser.add_argument("--cfs", type=Path, required=True)
+    parser.add_argument("--space", action="append", default=[])
+    parser.add_argument("--results", type=Path)
+    given = parser.parse_args()
+    room = RoomOptions.of(**ROOM, picture_hours=("06-21 12",))
+    options = JobOptions(
+        given.building, given.weather, given.cfs, spaces=tuple(given.space), quick=True, room=room
+    )
+    inputs = read_inputs(options, lambda stage, fraction: None)
+    variants.activate()
+    skies = skies_for(inputs.weather, room.method, room.sampling, **room.sky)
+    kept = {}
+    for space in inputs.spaces:
+        seconds, compiled, result = _timed(inputs, space, room, skies)
+        print(f"{space.label}: {seconds:.1f} s of the processor, {compiled} kernels", flush=True)
+        kept[f"{space.name} illuminance"] = result.daylight.illuminance
+        kept[f"{space.name} air"] = result.heat.temperatures["air_c"].to_numpy()
+        kept[f"{space.name} picture"] = result.glare.pictures[0].luminance
+    if given.results is not None:
+        np.savez(given.results, **kept)
+
+
+def _timed(inputs, space, room, skies):
+    """Processor seconds, kernels that were not known, and the room's year."""
+    import drjit as dr
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        start = time.process_time()
+        result = compute_room(
+            inputs.building, space, inputs.systems, inputs.weather, room, skies=skies
+        )
+        seconds = time.process_time() - start
+        kernels = dr.kernel_history([dr.KernelType.JIT])
+    return seconds, sum(not kernel["cache_hit"] for kernel in kernels), result
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""Two rooms that share a wall, and a door, against EnergyPlus.
+
+    python -m tests.validation energyplus_two_rooms
+
+Table 15's room with clear double glazing to the south; behind its back wall a room of the same
+size with an outside wall to the north, no window and no gains.  EnergyPlus runs here and now.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from mitsuba_cfs.sky.epw import read_epw
+from tests.benchmarks.thermal_year import EPW, energyplus_room, glazing
+from tests.validation import reference_room
+from tests.validation.energyplus_cases import STEPS
+from tests.validation.energyplus_model import (
+    Model,
+    detailed_surface,
+    hourly_outputs,
+    run_energyplus,
+)
+from tests.validation.facade_sun import facade_sun, sun_steps
+from thermal.balance import ZoneResult, simulate_zones
+from thermal.climate import Solar
+from thermal.longwave import area_view_factors
+from thermal.zone import Zone
+
+OUTPUTS = {
+    "ROOM:Zone Mean Air Temperature": "front air",
+    "REAR:Zone Mean Air Temperature": "rear air",
+    "BACK:Surface Inside Face Temperature": "front wall",
+    "FRONT:Surface Inside Face Temperature": "rear wall",
+}
+DOOR_M3_S = 0.03
+SETTLED = 7 * 24  # hours left out at the start
+_REAR = {  # vertices counter-clockwise from outside
+    "FRONT": ("Wall", "WALL", [(0, 5, 3), (0, 5, 0), (4, 5, 0), (4, 5, 3)]),
+    "R0": ("Wall", "WALL", [(0, 10, 3), (0, 10, 0), (0, 5, 0), (0, 5, 3)]),
+    "R4": ("Wall", "WALL", [(4, 5, 3), (4, 5, 0), (4, 10, 0), (4, 10, 3)]),
+    "NORTH": ("Wall", "FACADE", [(4, 10, 3), (4, 10, 0), (0, 10, 0), (0, 10, 3)]),
+    "REAR FLOOR": ("Floor", "FLOOR", [(0, 5, 0), (0, 10, 0), (4, 10, 0), (4, 5, 0)]),
+    "REAR CEILING": ("Ceiling", "CEILING", [(0, 10, 3), (0, 5, 3), (4, 5, 3), (4, 10, 3)]),
+}
+
+
+def energyplus_model(door: float) -> Model:
+    """Both rooms; door: air exchanged each way [m3/s]."""
+    model = energyplus_room("S") | hourly_outputs(OUTPUTS)
+    walls = model["BuildingSurface:Detailed"]
+    walls["BACK"] |= {
+        "outside_boundary_condition": "Surface",
+        "outside_boundary_condition_object": "FRONT",
+    }
+    for name, (kind, construction, vertices) in _REAR.items():
+        outside = {"FRONT": "Surface", "NORTH": "Outdoors"}.get(name, "Adiabatic")
+        partner = "BACK" if name == "FRONT" else ""
+        walls[name] = detailed_surface(kind, construction, "REAR", outside, vertices, partner)
+    model["Zone"]["REAR"] = {"volume": 60.0}
+    air = model["ZoneInfiltration:DesignFlowRate"]
+    zone = "zone_or_zonelist_or_space_or_spacelist_name"
+    air["REAR AIR"] = air["AIR"] | {zone: "REAR"}
+    if door > 0:
+        model["ZoneMixing"] = {
+            f"{a} to {b}": {
+                "zone_or_space_name": b,
+                "source_zone_or_space_name": a,
+                "schedule_name": "ON",
+                "design_flow_rate_calculation_method": "Flow/Zone",
+                "design_flow_rate": door,
+            }
+            for a, b in (("ROOM", "REAR"), ("REAR", "ROOM"))
+        }
+    return model
+
+
+def our_rooms(door: float) -> tuple[ZoneResult, ...]:
+    """The same two rooms by `thermal`, from the weather file on."""
+    weather, system = read_epw(EPW), glazing()
+    steps = sun_steps(weather, STEPS)
+    front = reference_room.zone("S", system.fenestration)
+    rear = _rear(front)
+    front = replace(
+        front,
+        surfaces=tuple(
+            replace(s, outside="rear", partner="front") if s.name == "back" else s
+            for s in front.surfaces
+        ),
+    )
+    sunny = reference_room.solar(
+        facade_sun(steps, reference_room.facade_normal("S")), system, reference_room.RoomLight()
+    )
+    rows = len(steps.direct_normal)
+    facade = np.zeros((rows, len(rear.surfaces)))
+    facade[:, rear.index_of("facade")] = facade_sun(steps, np.array([0.0, 1.0, 0.0])).total
+    none = np.zeros((rows, 0))
+    shady = Solar(none, none, np.zeros((rows, len(rear.surfaces))), facade)
+    return simulate_zones(
+        [front, rear],
+        reference_room.climate(weather),
+        [sunny, shady],
+        step_s=3600.0 / STEPS,
+        air_links=[[0.0, door], [door, 0.0]],
+    )
+
+
+def _rear(front: Zone) -> Zone:
+    """The room behind: the front room turned round, its window closed."""
+    by_name = {s.name: s for s in front.surfaces}
+    turned = [replace(by_name[name]) for name in ("left", "right", "floor", "ceiling")]
+    wall = replace(by_name["back"], name="front", outside="room", partner="back",
+                   normal=-by_name["back"].normal)  # fmt: skip
+    facade = replace(by_name["facade"], area=12.0, normal=-by_name["facade"].normal)
+    surfaces = (facade, *turned, wall)
+    return Zone(
+        "rear",
+        60.0,
+        surfaces,
+        infiltration_ach=0.5,
+        view_factors=area_view_factors([s.area for s in surfaces], [s.normal for s in surfaces]),
+    )
+
+
+def compare() -> pd.DataFrame:
+    """RMS difference and bias [K] of both rooms' air and of both faces of the wall, hourly."""
+    rows = []
+    for label, door in (("wall", 0.0), ("wall and open door", DOOR_M3_S)):
+        theirs = run_energyplus(energyplus_model(door), EPW, outputs=OUTPUTS)
+        front, rear = our_rooms(door)
+        ours = {
+            "front air": front.air_c,
+            "rear air": rear.air_c,
+            "front wall": front.surface_in_c[:, 3],
+            "rear wall": rear.surface_in_c[:, 5],
+        }
+        for name, values in ours.items():
+            gap = (values - theirs[name].to_numpy())[SETTLED:]
+            rows.append({"between": label, "quantity": name, "mean C": values.mean(),
+                         "rmse K": np.sqrt(np.mean(gap**2)), "bias K": gap.mean()})  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(compare().round(3).to_string(index=False) + "\n")

@@ -1,0 +1,122 @@
+"""Sunny hours behind what stands before a window: three and five phases against paths.
+
+    python -m tests.validation sunny_overhangs [--cases "overhang 2 m" ...] [--paths N]
+
+The room, cases and sensors of `cut_groups`; 800 W/m2 from the sun, 100 W/m2 of sky, the sun at four
+places.  Illuminance of the twelve sensors in the four hours over that by paths, lowest and highest,
+and the share of them within 3 %; the spread of five phases over seeds and the error of the paths,
+root mean squares; the processor time over that with the window in one part.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_cfs.bsdf.glazing import Glazing, specular_klems
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.methods.optics import BsdfOptics
+from mitsuba_cfs.methods.path_light import PathSystems
+from mitsuba_cfs.methods.phase_light import PhaseSystems
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.sky.annual import AnnualSky, given_sky
+from mitsuba_cfs.surfaces import Surfaces
+from tests.validation.cut_groups import (
+    BRIGHT,
+    CASES,
+    POINTS,
+    UP,
+    front,
+    room,
+    surfaces,
+)
+
+SUNS = ((20, 0), (45, 10), (62, -25), (30, 50))  # altitude, azimuth from south to east [degrees]
+SEEDS = 2
+
+
+def sunny() -> AnnualSky:
+    """The four hours."""
+    altitude, azimuth = np.radians(np.array(SUNS, dtype=float)).T
+    level = np.cos(altitude)
+    suns = np.stack([level * np.sin(azimuth), -level * np.cos(azimuth), np.sin(altitude)], axis=1)
+    return given_sky(suns, np.full(4, 800.0), np.full(4, 100.0), day_of_year=80)
+
+
+def by_phases(
+    scene: DaylightScene, glass: KlemsBsdf, *, five_phase: bool, parts: int = 0, seed: int = 0
+) -> tuple[NDArray[np.float64], float, int]:
+    """Illuminance [S, H], processor time [s] and number of parts."""
+    start = time.process_time()
+    sampling = Sampling(window_parts=parts, seed=seed)
+    traced = PhaseScene(scene, sampling, five_phase=five_phase)
+    values = PhaseSystems(traced, [[BsdfOptics(glass)]]).light(sunny()).illuminance()
+    return values, time.process_time() - start, len(traced.parts.groups)
+
+
+def by_paths(
+    scene: DaylightScene, glass: KlemsBsdf, paths: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Illuminance [S, H] and its standard error."""
+    values, errors = [], []
+    light = PathSystems(scene, [[BsdfOptics(glass)]], Sampling(hour_samples=paths))
+    for hour in range(len(SUNS)):
+        one = light.light(sunny().part([hour]))
+        found, error = one.estimate()
+        values.append(found[:, 0])
+        errors.append(error * found[:, 0])
+    return np.stack(values, axis=1), np.stack(errors, axis=1)
+
+
+def row(name: str, glass: KlemsBsdf, paths: int) -> str:
+    """One line of the table."""
+    interior, group = room()
+    quads = CASES[name]
+    outside = surfaces(quads + front(-15, 19, -4, 6, 0.4)) if quads else Surfaces.none()
+    scene = DaylightScene(interior, outside, [group], POINTS, UP)
+    expected, error = by_paths(scene, glass, paths)
+    _, whole, _ = by_phases(scene, glass, five_phase=True, parts=1)
+    found = [by_phases(scene, glass, five_phase=True, seed=seed) for seed in range(SEEDS)]
+    three, *_ = by_phases(scene, glass, five_phase=False)
+    bright = expected > BRIGHT
+    values = np.stack([values for values, *_ in found])
+    five = (values[0] / expected)[bright]
+    off = np.abs(five - 1)
+    noise = (values.std(axis=0, ddof=1) / expected)[bright]
+    quotient = (three / expected)[bright]
+    return (
+        f"| {name} | {five.min():.3f} to {five.max():.3f} | {100 * np.mean(off <= 0.03):.0f} % | "
+        f"{quotient.min():.2f} to {quotient.max():.2f} | "
+        f"{100 * np.sqrt(np.mean(noise**2)):.1f} % | "
+        f"{100 * np.sqrt(np.mean((error / expected)[bright] ** 2)):.1f} %, "
+        f"{100 * (error / expected)[bright].max():.1f} % | {found[0][2]} | "
+        f"{found[0][1] / whole:.1f} |"
+    )
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
+    parser.add_argument("--paths", type=int, default=131_072, help="of a sensor in an hour")
+    options = parser.parse_args(arguments)
+    glass = specular_klems(Glazing("double", 0.78, 0.14, 0.14), KLEMS_FULL)
+    interior, group = room()
+    compiled = DaylightScene(interior, surfaces(CASES["fins"]), [group], POINTS, UP)
+    for parts in (1, 0):
+        by_phases(compiled, glass, five_phase=True, parts=parts)
+    print(
+        "| before the window | 5-phase | within 3 % | 3-phase | 5-phase's noise | paths' error, "
+        "largest | parts | time, times |\n|---|---|---|---|---|---|---|---|"
+    )
+    for name in options.cases:
+        print(row(name, glass, options.paths), flush=True)
+
+
+if __name__ == "__main__":
+    main()
