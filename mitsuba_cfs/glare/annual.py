@@ -103,8 +103,13 @@ class AnnualGlare:
 class Pictures(Protocol):
     """The luminance of a view's pixels in every hour, worked out when asked for."""
 
-    view: View
-    pixels: NDArray[np.int64]  # [n] row * width + column of the pixels that show something
+    @property
+    def view(self) -> View:
+        """The view."""
+
+    @property
+    def pixels(self) -> NDArray[np.int64]:
+        """Numbers [n], row * width + column, of the pixels that show something."""
 
     @property
     def hours(self) -> int:

@@ -227,7 +227,10 @@ def group_shares(light: PhaseLight | SeasonalLight) -> Array:
     )
 
 
-def with_view(light: PhaseLight | SeasonalLight, view: View) -> PhaseLight | SeasonalLight:
+L = TypeVar("L", PhaseLight, SeasonalLight)
+
+
+def with_view(light: L, view: View) -> L:
     """The same light for another eye: what depends on the windows alone is not computed again."""
     if isinstance(light, SeasonalLight):
         return replace(
@@ -239,8 +242,8 @@ def with_view(light: PhaseLight | SeasonalLight, view: View) -> PhaseLight | Sea
 def path_light_of(light: PhaseLight | SeasonalLight) -> PathLight | SeasonalLight:
     """The light of the same scene, systems and hours by path tracing."""
     if isinstance(light, SeasonalLight):
-        return replace(light, lights=tuple(path_light_of(_by_phases(one)) for one in light.lights))
-    return PathLight(light.scene, light.systems, light.sky, light.sampling)
+        return replace(light, lights=tuple(map(_by_path_tracing, light.lights)))
+    return _by_path_tracing(light)
 
 
 def hours_by_season(
@@ -278,6 +281,10 @@ def _by_season(
 
 def _states(light: SeasonalLight, state: State | None) -> State:
     return hourly_states(state, len(light.systems), len(light.sky.lit))
+
+
+def _by_path_tracing(light: PhaseLight | PathLight) -> PathLight:
+    return PathLight(light.scene, light.systems, light.sky, light.sampling)
 
 
 def _by_phases(light: PhaseLight | PathLight) -> PhaseLight:

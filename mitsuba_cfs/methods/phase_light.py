@@ -178,7 +178,7 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
     hours = _shining_hours(light)
     suns = _direct_sun(light, hours, progress)
     beams = [[bool(beam_matrix(one.optics).any()) for one in group] for group in coefficients]
-    room, sensors = None, []
+    room, groups = None, []
     outdoors = len(light.scene.outdoor_groups)
     if light.reflected is not None and any(any(group) for group in beams[:outdoors]):
         room = sunlit_room(light.matrices, light.reflected)
@@ -194,8 +194,8 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
                 added, error = more.values, more.sum_error
             of_states.append(_with_direct_sun(light, SensorLight(one, added, None, error),
                                               g, suns[j], hours))  # fmt: skip
-        sensors.append(tuple(of_states))
-    return replace(light, sensors=tuple(sensors))
+        groups.append(tuple(of_states))
+    return replace(light, sensors=tuple(groups))
 
 
 def sensor_light(light: PhaseLight) -> tuple[tuple[SensorLight, ...], ...]:
@@ -336,7 +336,7 @@ def _without_direct_sun(light: PhaseLight, kind: Sequence[int], hours: NDArray[n
 def _direct_sun(
     light: PhaseLight, hours: NDArray[np.int64], progress: Progress
 ) -> list[Estimate | None]:
-    """C_ds [J][G, S, h] of the hours in which the sun shines on a window; None where it never does."""
+    """C_ds [J][G, S, h] of the hours in which the sun shines on a window; None without any."""
     if not len(hours):
         return [None] * light.states
     scene, chosen = light.scene, light.matrices.sampling

@@ -33,7 +33,7 @@ class PathLight:
     scene: DaylightScene
     systems: Sequence[States]  # [G][J] optics of each window group in each of its states
     sky: AnnualSky
-    sampling: Sampling = Sampling()
+    sampling: Sampling
 
     def __post_init__(self) -> None:
         if len(self.systems) != len(self.scene.groups):

@@ -1,6 +1,4 @@
-"""A scene in the dissertation's sense, room and outdoors without what fills the windows, and how
-finely it is computed.
-"""
+"""A scene, room and outdoors without what fills the windows, and how finely it is computed."""
 
 from __future__ import annotations
 

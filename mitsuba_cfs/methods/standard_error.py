@@ -39,9 +39,9 @@ Array = NDArray[np.float64]
 def relative_standard_error(light: PhaseLight, state: State | None = None) -> Array:
     """Relative standard error of each sensor's mean over the hours [S].
 
-    That of V, D, B, C_ds, the reflected sun, and W and X of what windows reflect; those of different
-    groups and states are taken as independent.  The error that D leaves as a mean over a part of a
-    group is included (`mitsuba_cfs.methods.subdivision`).
+    That of V, D, B, C_ds, the reflected sun, and W and X of what windows reflect; those of
+    different groups and states are taken as independent.  The error that D leaves as a mean over a
+    part of a group is included (`mitsuba_cfs.methods.subdivision`).
     """
     rows, sensors = states_of(light, state), sensor_light(light)
     variance = _matrix_variance(light, rows)
@@ -151,7 +151,7 @@ def _part_variance(
 def _error_of_means(
     light: PhaseLight, group: GroupCoefficients, g: int, some: NDArray[np.bool_]
 ) -> Array:
-    """The change in the sensors' mean [S] by D's means over a group's parts, in some of the hours."""
+    """Error of the sensors' mean [S] by D's means over a group's parts, in some of the hours."""
     matrices = light.matrices
     points, normals = light.scene.sensors()
     whole, _, rest = light.sky.totals(some)

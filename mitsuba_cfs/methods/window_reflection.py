@@ -5,10 +5,10 @@ V T D s lacks it, because its windows are black from both sides:
     L' = L + R W L + (R W)^2 L + ...
     I' = I + X R_f I + (X R_f)^2 I + ...
 
-L = T I is the luminance of the windows, I = D s the luminance in front of them; W and X are what the
-windows see of the room and of the outdoors that they light, R and R_f their reflection to either
-side on the same patches.  A mirror image keeps its direction to a patch.  Light that leaves the room
-and comes back is left out: 0.1 to 0.4 % beside fins, by path tracing.
+L = T I is the luminance of the windows, I = D s the luminance in front of them; W and X are what
+the windows see of the room and of the outdoors that they light, R and R_f their reflection to
+either side on the same patches.  A mirror image keeps its direction to a patch.  Light that leaves
+the room and comes back is left out: 0.1 to 0.4 % beside fins, by path tracing.
 
 `optics` are those of the window parts [Q], each in its state.
 """
