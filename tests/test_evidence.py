@@ -20,7 +20,7 @@ NO_EVIDENCE = {
     "thermal.md": {"| closure | absorptances from | layer resistance | films of the layers |"},
     "comply.md": {"| in the folder of results | what |", "| option | what |"},
     "studies.md": {"| in the folder | what |"},
-    "pv.md": {"| key | what |"},
+    "pv.md": {"| key | meaning |"},
 }  # fmt: skip
 ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
 
