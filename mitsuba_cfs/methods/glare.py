@@ -27,13 +27,18 @@ from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.matrices.cache import CacheEntry, kept_or_found
 from mitsuba_cfs.methods import METRICS, UnknownMethodError
-from mitsuba_cfs.methods.light import Light, SeasonalLight, eye_illuminance
+from mitsuba_cfs.methods.light import (
+    Light,
+    SeasonalLight,
+    eye_illuminance,
+    illuminance,
+    with_pictures,
+)
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.phase_pictures import (
     pictures_by_state,
     pictures_in_state,
-    with_pictures,
 )
 from mitsuba_cfs.methods.point_in_time import (
     PathLight,
@@ -84,13 +89,14 @@ def hourly_glare(
     if metric == "sDGP":
         return _simplified(eye_illuminance(light, every)[chosen])
     direct = metric == "eDGP"
-    light = with_pictures(light, direct=direct)
     eye = eye_illuminance(light, every)[chosen] if direct else None
     geometry = GlareView(light.scene.eye)
     table = np.full((len(FIGURES), len(chosen)), np.nan)
     kinds, kind = np.unique(rows, axis=1, return_inverse=True)
 
     def rated(i: int, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        nonlocal light
+        light = with_pictures(light, direct=direct)  # not where all ratings are in the cache
         glare = annual_glare(
             pictures_in_state(light, chosen[columns], kinds[:, i].tolist(), direct=direct),
             geometry=geometry,
@@ -110,6 +116,13 @@ def hourly_glare(
             stored = None if entry is None else entry.load()
             table[:, columns] = rated(i, columns) if stored is None else stored.mean[:, columns]
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
+
+
+def metric_values(light: Light, metric: str) -> NDArray[np.float64]:
+    """A metric of `METRICS` in every hour of the light's sky [L]; illuminance [S, L] in lx."""
+    if metric == "illuminance":
+        return illuminance(light)
+    return hourly_glare(light, metric).dgp
 
 
 def pictures(

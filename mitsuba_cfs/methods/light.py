@@ -30,6 +30,7 @@ from mitsuba_cfs.methods.phase_matrices import (
     PhaseMatrices,
     phase_matrices,
     with_eye,
+    with_view_matrices,
 )
 from mitsuba_cfs.methods.point_in_time import (
     PathLight,
@@ -237,6 +238,21 @@ def with_view(light: L, view: View) -> L:
             light, lights=tuple(with_view(_by_phases(one), view) for one in light.lights)
         )
     return replace(light, matrices=with_eye(light.matrices, view), sensors=None)
+
+
+def with_pictures(light: L, *, direct: bool = False, progress: Progress = silent) -> L:
+    """The light with the matrices of the view's pixels, for several calls that need them.
+
+    Args: direct: those of eDGP.
+    """
+    if isinstance(light, SeasonalLight):
+        lights, count = [], len(light.lights)
+        for i, one in enumerate(light.lights):
+            steps = part(progress, i / count, (i + 1) / count)
+            lights.append(with_pictures(_by_phases(one), direct=direct, progress=steps))
+        return replace(light, lights=tuple(lights))
+    matrices = with_view_matrices(light.matrices, direct=direct, progress=progress)
+    return replace(light, matrices=matrices)
 
 
 def path_light_of(light: PhaseLight | SeasonalLight) -> PathLight | SeasonalLight:

@@ -43,7 +43,6 @@ from mitsuba_cfs.methods.window_reflection import (
     returned_from_outdoors,
     with_exchange_of,
 )
-from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.matrices.adjacent_view import RoomBehind
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown
@@ -53,17 +52,6 @@ from mitsuba_cfs.trace.sun.picture_beam import BeamLight, beam_light
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
 T = TypeVar("T")
-
-
-def with_pictures(
-    light: PhaseLight, *, direct: bool = False, progress: Progress = silent
-) -> PhaseLight:
-    """The light with V of the view's pixels, for several calls that make pictures.
-
-    Args: direct: V_d instead, for eDGP.
-    """
-    matrices = with_view_matrices(light.matrices, direct=direct, progress=progress)
-    return replace(light, matrices=matrices)
 
 
 def pictures_by_state(
@@ -79,7 +67,7 @@ def pictures_by_state(
     """
     kinds = list(combinations(rows))
     if not few_pictures(light.matrices, len(hours)):
-        light = with_pictures(light)
+        light = replace(light, matrices=with_view_matrices(light.matrices))
         return [(at, pictures_in_state(light, hours[at], state)) for state, at in kinds]
     made = [(at, _five_phase_pictures(light, hours[at], state, None)) for state, at in kinds]
     whole = PatchLight.joined([five.light(np.arange(five.hours)) for _, five in made])

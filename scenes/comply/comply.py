@@ -230,7 +230,7 @@ class Check:
         }
         if self.moving and self.shaded:
             operated = operated or {0}
-        room.timed(TRACING, lambda: room.traced.trace("sDGP"))
+        room.timed(TRACING, lambda: room.traced)
         found = room.timed(SUMS, lambda: lights_of(room, operated))
         closed = next((one.closed for one in found if one.closed is not None), None)
         closed = closed if self.shaded else None

@@ -14,9 +14,15 @@ from bim.model import Building, Space
 from bim.sensors import held_grids, held_views, sensor_grid, view_point
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
 from mitsuba_cfs.images.view import View, fisheye, fitted
+from mitsuba_cfs.methods.light import (
+    SeasonalLight,
+    daylight_coefficients,
+    direct_sun,
+    illuminance_with_error,
+    path_light_of,
+)
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.room import room_metrics
 from mitsuba_cfs.progress import Progress
@@ -102,15 +108,14 @@ def room_daylight(
         state: [L] which one holds in each lit hour.
         held: whose grids' sensors come last in the scene.
     """
-    sky, traced = light.sky, light.filled.traced
-    scene = traced.scene
+    sky, scene = light.sky, light.scene
     if method == "point-in-time":
-        lit, error = paths_of(light, progress).estimate(state)
+        lit, error = illuminance_with_error(path_light_of(light), state, progress=progress)
     else:
-        lit, error = light.illuminance(state), light.relative_error(state)
+        lit, error = illuminance_with_error(light, state)
     illuminance = sky.whole_year(lit.astype(np.float32)).T
     # LM-83's direct sun and the daylight factor are those of open blinds
-    direct = light.direct_sun()
+    direct = direct_sun(light)
     direct = None if direct is None else sky.whole_year(direct.astype(np.float32)).T
     factor = overcast_factor(light)
 
@@ -136,9 +141,8 @@ def overcast_factor(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
 
     Where the outdoors changes over the year, with most leaves.
     """
-    subdivision = light.filled.traced.sampling.subdivision
-    overcast = cie_patches("overcast", ReinhartSky(subdivision), 1.0)
-    return daylight_factor(light.filled.coefficients() @ overcast, 1.0)
+    overcast = cie_patches("overcast", ReinhartSky(light.sampling.subdivision), 1.0)
+    return daylight_factor(daylight_coefficients(light) @ overcast, 1.0)
 
 
 def illuminance_table(result: DaylightResult, times: pd.DatetimeIndex) -> pd.DataFrame:

@@ -21,11 +21,18 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.path_light import PathLight
-from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.light import (
+    SeasonalLight,
+    eye_illuminance,
+    path_light_of,
+    seasonal_light,
+    with_pictures,
+)
+from mitsuba_cfs.methods.optics import SystemOptics
+from mitsuba_cfs.methods.phase_light import PhaseLight, phase_light
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, phase_matrices, with_outdoors
+from mitsuba_cfs.methods.point_in_time import PathLight
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, in_shares, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
@@ -153,9 +160,9 @@ class RoomSimulation:
         return season_of(self.seasons, months)
 
     @cached_property
-    def traced(self) -> PhaseScene:
+    def traced(self) -> PhaseMatrices:
         """V and D."""
-        return PhaseScene(
+        return phase_matrices(
             self.scene,
             self.sampling,
             five_phase=self.options.method != "three-phase",
@@ -167,26 +174,31 @@ class RoomSimulation:
     def light(self) -> PhaseLight | SeasonalLight:
         """The light of the lit hours in every state."""
         steps = part(self.progress, 0.6, 0.9, "daylight")
-        filled = [self._filled(self.traced, self.inner)]
+        matrices, optics = [self.traced], [self._optics(self.inner)]
         for season in self.seasons[1:]:
             inner = self.inner
             if inner is not None:
                 inner = inner_glass(season.building, self.space, self.systems)
-            scene = self._scene(season.building, inner)
-            filled.append(self._filled(self.traced.before(scene), inner))
-        if len(filled) == 1:
-            return filled[0].light(self.skies, progress=steps)
-        return SeasonalLight.of(filled, self.skies, self.season, progress=steps)
+            matrices.append(with_outdoors(self.traced, self._scene(season.building, inner)))
+            optics.append(self._optics(inner))
+        if len(matrices) == 1:
+            return phase_light(*matrices, *optics, self.skies, progress=steps)
+        return seasonal_light(matrices, optics, self.skies, self.season, progress=steps)
 
-    def _filled(self, traced: PhaseScene, inner: InnerGlass | None) -> PhaseSystems:
-        optics = () if inner is None else inner.optics
-        return PhaseSystems(traced, [*self.windows.optics(), *optics])
+    def _optics(self, inner: InnerGlass | None) -> list[Sequence[SystemOptics]]:
+        """The optics of the window groups in their states [G][J]."""
+        return [*self.windows.optics(), *(() if inner is None else inner.optics)]
+
+    @cached_property
+    def viewed(self) -> PhaseLight | SeasonalLight:
+        """The light with the matrices of the view, which the glare of many hours takes."""
+        return with_pictures(self.light, progress=in_shares(self.progress, TRACED))
 
     def eye(self) -> NDArray[np.float32]:
         """Illuminance at the eye in every state [J, L] [lx]."""
         hours = np.ones(len(self.skies.lit), dtype=np.int64)
-        states = range(self.light.filled.states)
-        return np.stack([self.light.eye(j * hours) for j in states]).astype(np.float32)
+        states = range(self.light.states)
+        return np.stack([eye_illuminance(self.light, j * hours) for j in states]).astype(np.float32)
 
     @cached_property
     def state(self) -> NDArray[np.int64]:
@@ -200,7 +212,7 @@ class RoomSimulation:
             self.windows.states,
             irradiance=lambda: self.sun.irradiance,
             eye=lambda: self.skies.whole_year(self.eye()),
-            dgp=lambda: glare_by_state(self.light, rating_of(self.outputs), self.progress),
+            dgp=lambda: glare_by_state(self.viewed, rating_of(self.outputs), self.progress),
         )
 
     @property
@@ -219,10 +231,12 @@ class RoomSimulation:
         self.progress("daylight", 1.0)
         return found
 
-    @cached_property
+    @property
     def pictured(self) -> PhaseLight | PathLight | SeasonalLight:
         """The light that pictures are made of."""
-        return paths_of(self.light) if self.options.method == "point-in-time" else self.light
+        if self.options.method == "point-in-time":
+            return path_light_of(self.light)
+        return self.viewed if "viewed" in self.__dict__ else self.light
 
     def holes(self) -> tuple[Problem, ...]:
         """What of the light leaves through no window."""
@@ -231,7 +245,7 @@ class RoomSimulation:
     def annual_glare(self) -> pd.DataFrame:
         """Glare of every hour."""
         return glare_of_year(
-            self.light, self.lit_state, self.weather,
+            self.viewed, self.lit_state, self.weather,
             rating=rating_of(self.outputs), progress=self.progress,
         )  # fmt: skip
 
@@ -243,7 +257,13 @@ class RoomSimulation:
         if isinstance(light, PhaseLight) and self.inner is None:
             kept = kept_glare(light, self.windows, metric, columns, rating)
         return hourly_glare(
-            light, metric, self.lit_state, hours=columns, options=rating, kept=kept, progress=steps
+            light,
+            metric,
+            self.lit_state,
+            hours=columns,
+            options=rating,
+            cached=kept,
+            progress=steps,
         )
 
     def explored(self) -> ExploredRoom:
@@ -251,7 +271,7 @@ class RoomSimulation:
         names = [state.name for state in max(self.windows.systems, key=len)]
         steps = part(self.progress, 0.0, 1.0, "explorer")
         sensors = len(self.daylight.points)
-        return explored_room(self.light, self.state, names, steps, sensors=sensors)
+        return explored_room(self.pictured, self.state, names, steps, sensors=sensors)
 
     def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
         """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
@@ -276,22 +296,24 @@ class RoomSimulation:
         sky = annual_sky(self.weather, self.sampling.subdivision, hours=[hour], **self.options.sky)
         found = with_colour(
             glare, band_scenes(building, self.space, groups, glare.view),
-            self.light.filled.systems[: len(groups)], sky, state=int(self.state[hour]),
+            self.light.systems[: len(groups)], sky, state=int(self.state[hour]),
             sampling=self.sampling, progress=part(self.progress, 0.0, 1.0, "colour"),
         )  # fmt: skip
         self.progress("colour", 1.0)
         return found
 
     @cached_property
-    def outdoors(self) -> list[PhaseScene]:
+    def outdoors(self) -> list[PhaseMatrices]:
         """D of the solar band in each season: the visible one's where both bands reflect alike."""
         first, *rest = (
             exterior_surfaces(season.building, self.space, "solar") for season in self.seasons
         )
-        scene = self._solar(first)
-        return [scene, *(scene.before(replace(scene.scene, exterior=one)) for one in rest)]
+        matrices = self._solar(first)
+        of_d = replace(matrices, five_phase=False)
+        scenes = [replace(matrices.scene, exterior=one) for one in rest]
+        return [matrices, *(with_outdoors(of_d, scene) for scene in scenes)]
 
-    def _solar(self, exterior: Surfaces) -> PhaseScene:
+    def _solar(self, exterior: Surfaces) -> PhaseMatrices:
         if (
             self.inner is None
             and "scene" in self.__dict__
@@ -300,11 +322,11 @@ class RoomSimulation:
             return self.traced
         scene = DaylightScene(Surfaces.none(), exterior, self.windows.groups)
         steps = part(self.progress, 0.0, 1.0, "sun")
-        found = PhaseScene(scene, self.sampling, cache=self.cache, progress=steps)
-        if scene.groups:
-            _ = found.daylight
-            steps("sun", 1.0)
-        return found
+        matrices = phase_matrices(
+            scene, self.sampling, five_phase=False, needs=(), cache=self.cache, progress=steps
+        )
+        steps("sun", 1.0)
+        return matrices
 
     @cached_property
     def outer(self) -> OuterFaces:

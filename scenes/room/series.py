@@ -18,9 +18,8 @@ from bim.templates import template_rooms
 from bim.to_tracer import exterior_surfaces, window_groups
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, phase_matrices, with_outdoors
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.progress import Progress, Stage, item, silent
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
@@ -74,17 +73,19 @@ class OutdoorLight:
 
     def _daylight(self, band: str) -> NDArray[np.float64]:
         """D of every season [.., K, P], one after the other."""
-        found: list[PhaseScene] = []
+        found: list[PhaseMatrices] = []
         groups = window_groups(self.space)
         for season in seasons(self.building):
             exterior = exterior_surfaces(season.building, self.space, band)
             scene = DaylightScene(Surfaces.none(), exterior, groups)
             if found:
-                traced = found[0].before(scene)
+                matrices = with_outdoors(found[0], scene)
             else:
-                traced = PhaseScene(scene, self.sampling, cache=self.cache)
-            found.append(traced)
-        return np.concatenate([traced.daylight.values for traced in found])
+                matrices = phase_matrices(
+                    scene, self.sampling, five_phase=False, needs=(), cache=self.cache
+                )
+            found.append(matrices)
+        return np.concatenate([matrices.daylight.values for matrices in found])
 
 
 def alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

@@ -13,8 +13,8 @@ from bim.outer_faces import OuterFaces
 from bim.to_thermal import ThermalRoom
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.gloss import Gloss
-from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
-from mitsuba_cfs.methods.seasonal_light import hours_by_season, in_order_of_hours
+from mitsuba_cfs.methods.light import hours_by_season, in_order_of_hours
+from mitsuba_cfs.methods.phase_matrices import BATCHES, PhaseMatrices
 from mitsuba_cfs.progress import Progress, part
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import Surfaces
@@ -45,10 +45,10 @@ def _of_zone(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss | No
 class SeasonalOutdoors:
     """What stands before a room's windows in each season, in the solar band."""
 
-    scenes: list[PhaseScene]  # the same window groups, in the same parts
+    scenes: list[PhaseMatrices]  # the same window groups, in the same parts
     season: NDArray[np.int64]  # [L] of each lit hour
 
-    def parts(self) -> list[tuple[PhaseScene, NDArray[np.int64]]]:
+    def parts(self) -> list[tuple[PhaseMatrices, NDArray[np.int64]]]:
         """The scene of each season that has some of the lit hours, with these."""
         return hours_by_season(self.scenes, self.season)
 
@@ -97,14 +97,16 @@ class RoomSun:
             return np.zeros((len(shares), len(self.skies.lit)))
         weights = (shares * KLEMS_FULL.projected_solid_angles()).reshape(len(shares), -1)
 
-        def of_season(scene: PhaseScene, sky: FloatArray) -> FloatArray:
+        def of_season(scene: PhaseMatrices, sky: FloatArray) -> FloatArray:
             daylight = scene.parts.of_groups(scene.daylight.values)
             rows = weights @ daylight.reshape(weights.shape[1], -1)
             return (rows.astype(sky.dtype) @ sky).astype(float)
 
         return self._by_season(of_season)
 
-    def _by_season(self, of_season: Callable[[PhaseScene, FloatArray], FloatArray]) -> FloatArray:
+    def _by_season(
+        self, of_season: Callable[[PhaseMatrices, FloatArray], FloatArray]
+    ) -> FloatArray:
         """Values [.., L] of all lit hours, from the scene and the sky [P, l] of each season."""
         parts, sky = self.seasons.parts(), self.skies.solar
         if len(parts) == 1:
@@ -129,7 +131,7 @@ class RoomSun:
             facade[:, outer.surfaces] = self.skies.whole_year(lit).T
         return facade
 
-    def _seen_by_faces(self, outdoors: PhaseScene) -> FloatArray:
+    def _seen_by_faces(self, outdoors: PhaseMatrices) -> FloatArray:
         """Irradiance of the outer faces per unit radiance of each sky patch [n, P] [sr]."""
         return sky_irradiance_matrix(
             outdoors.scene.exterior,

@@ -14,7 +14,7 @@ from bim.templates import room_features
 from bim.to_radiance import write_radiance
 from bim.to_tracer import furnished_surfaces, interior_surfaces, window_groups
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
 from tests.bim.small_ifc import DEPTH, OPENING, WIDTH, box_model

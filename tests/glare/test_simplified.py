@@ -34,7 +34,7 @@ def test_sdgp_is_wienolds_line_and_at_most_one():
 def test_a_direct_view_leaves_out_what_the_room_reflects_twice(variant, scale, same):
     """The pictures of eDGP: a part of the whole ones, pixel by pixel, as the seed is the same."""
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
     from mitsuba_cfs.methods.scene import DaylightScene
     from tests.trace import rooms
 
@@ -57,7 +57,7 @@ def place(variant):
     """The benchmark's room in small, and its window."""
     from dataclasses import replace
 
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
     from scenes.cost.reference import reference_scene, reference_sky, reference_system
 
     scene = reference_scene(96)

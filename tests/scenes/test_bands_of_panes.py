@@ -63,7 +63,7 @@ def test_each_band_has_its_own_system_in_light_and_in_glare(bands):
     from mitsuba_cfs.methods.path_light import PathSystems
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     scene, windows, hour = bands
     assert len(windows.groups) == 3 and [len(states) for states in windows.systems] == [1, 1, 1]

@@ -21,25 +21,25 @@ def glass_transmittance(cosine):
 
 def glass():
     """T and the sun's way of glass that a file knows at the middles of its patches."""
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     tau = glass_transmittance(KLEMS_FULL.incident_directions()[:, 2])
-    return GivenOptics(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
+    return MatrixOptics(np.diag(tau), KlemsScattering(KLEMS_FULL, np.zeros((K, K)), tau))
 
 
 def diffuser(tau: float):
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 
     block = np.full((K, K), tau / np.pi)
-    return GivenOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
+    return MatrixOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
 
 
 def traced(interior, exterior, groups, points, **sampling):
     """The matrices of a room, none of them traced yet."""
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
     from mitsuba_cfs.methods.scene import DaylightScene
 
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))

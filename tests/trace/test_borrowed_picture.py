@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import View, pixel_directions
-from mitsuba_cfs.methods.optics import GivenOptics
+from mitsuba_cfs.methods.optics import MatrixOptics
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.sampling import spread_rays
@@ -48,7 +48,7 @@ def _picture(scene: DaylightScene, view: View, sky: AnnualSky, **options: bool) 
     """Luminance [ny, nx] of the last room under the first hour of a sky."""
     traced = PhaseScene(replace(scene, view=view), FEW, **options)
     dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun comes by patches
-    given = GivenOptics(INNER_TAU * np.eye(KLEMS_FULL.size), dark)
+    given = MatrixOptics(INNER_TAU * np.eye(KLEMS_FULL.size), dark)
     made = PhaseSystems(traced, [[given]]).light(sky).pictures(np.arange(1), [0])
     picture = np.zeros(view.width * view.height)
     picture[made.pixels] = made.values(np.arange(1))[0]

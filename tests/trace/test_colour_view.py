@@ -17,7 +17,7 @@ from mitsuba_cfs.methods.colour_view import (
     with_luminance,
 )
 from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.sky.patches import ReinhartSky

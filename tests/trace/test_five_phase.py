@@ -106,12 +106,12 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
 
 def test_a_beam_that_lies_beside_the_diagonal_too_is_not_counted_twice(corner):
     """As a tensor tree's, whose cells lie across patches: eyes behind one had 14 % too much."""
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
     from mitsuba_cfs.methods.phase_light import PhaseSystems
 
     matrices, clear = corner[0], glass()
     spread = 0.8 * clear.transmission + 0.2 * np.roll(clear.transmission, 1, axis=0)
-    beside = GivenOptics(spread, clear.scattering)
+    beside = MatrixOptics(spread, clear.scattering)
     found = [PhaseSystems(matrices, [[one], [diffuser(0.2)]]).straight for one in (clear, beside)]
     assert found[0].beam(0, 0).any() and not found[1].beam(0, 0).any()
 
@@ -134,7 +134,7 @@ def test_what_t_has_of_a_beam_beside_the_diagonal_is_taken_with_it():
 
 def test_the_room_has_a_beam_once_wherever_t_has_it(corner):
     """T of a tensor tree has a part of its beam beside the diagonal: the room reflects it once."""
-    from mitsuba_cfs.methods.optics import GivenOptics
+    from mitsuba_cfs.methods.optics import MatrixOptics
 
     clear, sky = glass(), replace(corner[1], whole=corner[1].sun)
     room, groups = rooms.test_room()
@@ -143,7 +143,7 @@ def test_the_room_has_a_beam_once_wherever_t_has_it(corner):
     beside = np.argsort(-(ways @ ways.T), axis=0)[1]
     spread = 0.6 * clear.transmission
     spread[beside, np.arange(K)] += 0.4 * np.diag(clear.transmission) * OMEGA / OMEGA[beside]
-    tree = GivenOptics(spread, clear.scattering)
+    tree = MatrixOptics(spread, clear.scattering)
     found, expected = (lit(scene, [[one]], sky) for one in (tree, clear))
     assert expected[:, [0, 2]].min() > 500  # the second sun is behind the facade
     assert found == pytest.approx(expected, rel=1e-3)
@@ -192,7 +192,7 @@ def test_windows_reflect_the_light_of_the_room_as_paths_have_it(kind):
     from mitsuba_cfs.methods.path_light import PathSystems
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
     from mitsuba_cfs.methods.scene import DaylightScene
     from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 

@@ -48,7 +48,7 @@ def both(exterior: Surfaces, sky: AnnualSky, sensor_samples: int = 32_768):
     from mitsuba_cfs.methods.path_light import PathSystems
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     system = [[BsdfOptics(clear_glass())]]
     chosen = Sampling(
@@ -255,7 +255,7 @@ def reflected(exterior: Surfaces, sky: AnnualSky, **sampling):
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = {"sensor_samples": 4096, "patch_samples": 512, "subdivision": 1} | sampling
     traced = PhaseScene(scene(exterior), Sampling(**few))

@@ -68,7 +68,7 @@ def by_phases(exterior: Surfaces, five_phase: bool = False, **sampling):
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     traced = PhaseScene(scene(exterior), Sampling(**FEW | sampling), five_phase=five_phase)
     light = PhaseSystems(traced, [[BsdfOptics(clear_glass())]]).light(overcast())
@@ -79,7 +79,7 @@ def by_paths(exterior: Surfaces):
     """The same by paths, and its relative error."""
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.path_light import PathSystems
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     filled = PathSystems(
         scene(exterior), [[BsdfOptics(clear_glass())]], Sampling(hour_samples=131_072)
@@ -221,7 +221,7 @@ def test_states_of_a_cut_group_go_together():
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     glass = clear_glass()
     half = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, *(0.5 * b for b in glass.blocks().values()))

@@ -115,7 +115,7 @@ def by_phases(scene, front: float, *, five_phase: bool, subdivision: int = 1):
     """The light of the hours behind panes that mirror so much outdoors."""
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(sensor_samples=16_384, patch_samples=8_192, subdivision=subdivision)
     traced = PhaseScene(scene, few, five_phase=five_phase)
@@ -147,7 +147,7 @@ def test_panes_light_the_fins_beside_them_in_sensors_and_pictures(five_phase) ->
 def test_the_sun_on_the_fins_comes_to_panes_hour_by_hour_as_in_their_sum() -> None:
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=1)
     traced = PhaseScene(replace(between_fins(), view=None), few)
@@ -162,7 +162,7 @@ def test_an_hour_alone_is_what_it_is_among_others() -> None:
     """What windows send out and get back goes from hours on; that of sensors, from these on."""
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(
         sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2, view_samples=1
@@ -185,7 +185,7 @@ def test_each_hour_has_the_reflection_of_its_own_state() -> None:
     """Among hours of other states as with its system alone."""
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     few = Sampling(sensor_samples=256, patch_samples=256, subdivision=1, window_parts=2)
     states = [mirroring(0.4, 0.1), mirroring(0.0, 0.4)]
@@ -213,7 +213,7 @@ def test_the_stated_error_has_the_noise_of_what_windows_send_one_another(shares)
     """All else is that of one seed; the spread over 24 seeds by chi-square, one time in 1,000."""
     from mitsuba_cfs.methods.phase_light import PhaseSystems
     from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     scene, seeds = replace(between_fins(), view=None), 24
     few = Sampling(sensor_samples=8192, patch_samples=512, subdivision=1, window_parts=1)
@@ -241,7 +241,7 @@ def test_the_stated_error_has_the_noise_of_what_windows_send_one_another(shares)
 def test_panes_light_the_fins_beside_them_as_paths_have_it() -> None:
     """The gain of two sensors; the sun's mirror image is as wide as a window patch, 15 degrees."""
     from mitsuba_cfs.methods.path_light import PathSystems
-    from mitsuba_cfs.methods.sampling import Sampling
+    from mitsuba_cfs.methods.scene import Sampling
 
     scene = replace(between_fins(), view=None)
     few, found = Sampling(hour_samples=524_288, subdivision=4), {}

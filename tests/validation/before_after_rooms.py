@@ -20,7 +20,7 @@ from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.generate import generate_tensor_tree
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.glare.annual import full_picture
-from mitsuba_cfs.methods.optics import GivenOptics, States
+from mitsuba_cfs.methods.optics import MatrixOptics, States
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.trace.kernels.scattering import WINDOW_UP, PluginScattering
 from tests.validation.tree_peak import fabric
@@ -142,7 +142,7 @@ def windows() -> tuple[Drawn, Drawn]:
     """The window black to the light of the room, and with its glass."""
     now = Drawn(office(), [glass()], sky((0.2, -1.0, 1.0), 800.0, 100.0))
     (optics,) = glass()
-    black = GivenOptics(optics.transmission, optics.scattering, optics.paths)
+    black = MatrixOptics(optics.transmission, optics.scattering, optics.paths)
     return replace(now, systems=[[black]]), now
 
 
@@ -166,7 +166,7 @@ def tree() -> tuple[Drawn, Drawn]:
     trees, _ = generate_tensor_tree(fabric(), LEVELS, samples=TREE_SAMPLES, seed=1)
     scene, noon = office(), sky((0.15, -1.0, 0.3), 800.0, 100.0)
     known = cfs.BsdfOptics(cfs.klems_of(trees[0]), trees[0])
-    wide = GivenOptics(known.transmission, spread(trees[0]), reflection=known.reflection)
+    wide = MatrixOptics(known.transmission, spread(trees[0]), reflection=known.reflection)
     return Drawn(scene, [[wide]], noon), Drawn(scene, [[known]], noon)
 
 

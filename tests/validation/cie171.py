@@ -23,7 +23,7 @@ from mitsuba_cfs.bsdf.glazing import Pane, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.by_name import traced_scene, with_systems
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics, SystemOptics
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping

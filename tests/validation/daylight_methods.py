@@ -24,10 +24,10 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.matrices.fine_basis import fine_basis
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
@@ -97,7 +97,7 @@ def by_phases(
     room = DaylightScene(scene.interior, empty(), scene.groups, scene.points, scene.up)
     known, found = BsdfOptics(system), {}
     systems = [
-        [GivenOptics(known.transmission, way, reflection=known.reflection) for way in ways.values()]
+        [MatrixOptics(known.transmission, way, reflection=known.reflection) for way in ways.values()]
     ]
     three_phase = PhaseSystems(PhaseScene(room, SAMPLING, five_phase=False), systems).light(sky)
     found["three-phase"] = three_phase.illuminance()

@@ -16,9 +16,9 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer
 from mitsuba_cfs.images.view import fisheye
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics, SystemOptics
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics
 from mitsuba_cfs.methods.path_light import PathSystems
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
@@ -57,7 +57,7 @@ def glazing() -> PathOptics:
 def measurement(scene: DaylightScene, exterior: Surfaces, sampling: Sampling) -> PathSystems:
     """The room with everything as geometry, path-traced."""
     scene = replace(scene, exterior=exterior)
-    return PathSystems(scene, [[GivenOptics(paths=glazing())]] * len(scene.groups), sampling)
+    return PathSystems(scene, [[MatrixOptics(paths=glazing())]] * len(scene.groups), sampling)
 
 
 def known_system(

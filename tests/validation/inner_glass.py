@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.optics import GivenOptics
+from mitsuba_cfs.methods.optics import MatrixOptics
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene, RoomBeyond
+from mitsuba_cfs.methods.scene import Sampling
+from mitsuba_cfs.methods.scene import DaylightScene, AdjacentRoom
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
@@ -113,7 +113,7 @@ def scene(rooms: int) -> DaylightScene:
         taken = [] if last else [(upright(walls_at(rooms)[number + 1], GLASS, north=True), 0.0)]
         tau = INNER_TAU if number > 1 else TAU
         beyond = (
-            () if found is None else (RoomBeyond(found, (tau * eye,), INNER_TAU * np.ones(145)),)
+            () if found is None else (AdjacentRoom(found, (tau * eye,), INNER_TAU * np.ones(145)),)
         )
         found = DaylightScene(
             surfaces([*room(number, rooms), *taken]), Surfaces.none(), [group(number, rooms)],
@@ -125,7 +125,7 @@ def scene(rooms: int) -> DaylightScene:
 def by_phases(rooms: int, seed: int = 0, sampling: Sampling = SAMPLING) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
     traced = PhaseScene(scene(rooms), replace(sampling, seed=seed), five_phase=False)
-    light = PhaseSystems(traced, [[GivenOptics(INNER_TAU * np.eye(KLEMS_FULL.size))]])
+    light = PhaseSystems(traced, [[MatrixOptics(INNER_TAU * np.eye(KLEMS_FULL.size))]])
     return light.light(overcast()).illuminance()[:, 0]
 
 

@@ -26,10 +26,10 @@ from bim.ifc.corrections import OPEN
 from bim.model import Building, Space
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.optics import GivenOptics
+from mitsuba_cfs.methods.optics import MatrixOptics
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.demo import VENETIAN_BLIND
@@ -91,7 +91,7 @@ def by_phases(scene: DaylightScene, seed: int) -> NDArray[np.float64]:
     """Illuminance of the sensors [S] [lx] by this project's three phases."""
     traced = PhaseScene(scene, replace(SAMPLING, seed=seed), five_phase=False)
     tau = [0.0] * len(scene.outdoor_groups) + inner_taus(scene)
-    light = PhaseSystems(traced, [[GivenOptics(t * EYE)] for t in tau])
+    light = PhaseSystems(traced, [[MatrixOptics(t * EYE)] for t in tau])
     return light.light(overcast()).illuminance()[:, 0]
 
 

@@ -32,10 +32,10 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.images.view import View, fisheye, pixel_directions, pixel_solid_angles
-from mitsuba_cfs.methods.optics import GivenOptics
+from mitsuba_cfs.methods.optics import MatrixOptics
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.trace.kernels.sampling import spread_rays
 from scenes.room.inner_glass import opened
@@ -83,7 +83,7 @@ def _inner(scene: DaylightScene) -> Sequence:
 def ours(scene: DaylightScene, taus: Sequence[float]) -> NDArray[np.float64]:
     """Luminance [ny, nx] [cd/m2] by this project's three phases."""
     traced = PhaseScene(scene, SAMPLING, five_phase=False)
-    systems = [[GivenOptics(tau * np.eye(KLEMS_FULL.size))] for tau in taus]
+    systems = [[MatrixOptics(tau * np.eye(KLEMS_FULL.size))] for tau in taus]
     made = PhaseSystems(traced, systems).light(overcast()).pictures(np.arange(1), [0] * len(taus))
     view = scene.view
     picture = np.zeros(view.width * view.height)

@@ -32,7 +32,7 @@ from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods import METHODS
 from mitsuba_cfs.methods.by_name import traced_scene, values, with_systems
 from mitsuba_cfs.methods.optics import BsdfOptics
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw

@@ -22,7 +22,7 @@ from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseSystems
 from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
+from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.surfaces import Surfaces
