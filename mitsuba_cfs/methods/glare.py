@@ -32,13 +32,13 @@ from mitsuba_cfs.methods.light import (
     SeasonalLight,
     eye_illuminance,
     illuminance,
-    with_pictures,
 )
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.phase_pictures import (
     pictures_by_state,
     pictures_in_state,
+    with_phase_pictures,
 )
 from mitsuba_cfs.methods.point_in_time import (
     PathLight,
@@ -88,17 +88,17 @@ def hourly_glare(
         return _by_path_tracing(light, metric, chosen, every, options, progress)
     if metric == "sDGP":
         return _simplified(eye_illuminance(light, every)[chosen])
-    direct = metric == "eDGP"
+    phases, direct = light, metric == "eDGP"
     eye = eye_illuminance(light, every)[chosen] if direct else None
     geometry = GlareView(light.scene.eye)
     table = np.full((len(FIGURES), len(chosen)), np.nan)
     kinds, kind = np.unique(rows, axis=1, return_inverse=True)
 
     def rated(i: int, columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        nonlocal light
-        light = with_pictures(light, direct=direct)  # not where all ratings are in the cache
+        nonlocal phases
+        phases = with_phase_pictures(phases, direct=direct)  # unless all ratings are in the cache
         glare = annual_glare(
-            pictures_in_state(light, chosen[columns], kinds[:, i].tolist(), direct=direct),
+            pictures_in_state(phases, chosen[columns], kinds[:, i].tolist(), direct=direct),
             geometry=geometry,
             options=options,
             illuminance=None if eye is None else eye[columns],
@@ -325,9 +325,9 @@ def _by_path_tracing(
 def _simplified(eye: NDArray[np.float64]) -> AnnualGlare:
     """sDGP from the illuminance at the eye [n] [lx]."""
     unknown = np.full(len(eye), np.nan)
-    rest = {name: unknown for name in FIGURES[2:]}
     dgp = np.array([indices.simplified_dgp(E) for E in eye.tolist()])
-    return AnnualGlare(dgp=dgp, Ev=np.asarray(eye, dtype=float), **rest)
+    rest: dict[str, Any] = dict.fromkeys(FIGURES[2:], unknown)
+    return AnnualGlare(dgp, np.asarray(eye, dtype=float), **rest)
 
 
 def _numbered(path: Path | None, name: str) -> Path | None:

@@ -30,8 +30,8 @@ from mitsuba_cfs.methods.phase_matrices import (
     PhaseMatrices,
     phase_matrices,
     with_eye,
-    with_view_matrices,
 )
+from mitsuba_cfs.methods.phase_pictures import with_phase_pictures
 from mitsuba_cfs.methods.point_in_time import (
     PathLight,
     path_eye_illuminance,
@@ -86,6 +86,7 @@ class SeasonalLight:
 
 
 Light: TypeAlias = PhaseLight | PathLight | SeasonalLight
+ByPhases: TypeAlias = PhaseLight | SeasonalLight
 
 
 def daylight(
@@ -96,6 +97,7 @@ def daylight(
     method: str = "five-phase",
     sampling: Sampling | None = None,
     needs: Collection[str] = DEFAULT_NEEDS,
+    matrices: PhaseMatrices | None = None,
     cache: MatrixCache | None = None,
     progress: Progress = silent,
 ) -> PhaseLight | PathLight:
@@ -105,16 +107,18 @@ def daylight(
         systems: of each window group its states [G][J], such as open and closed.
         method: one of `METHODS`.
         needs: metrics (`METRICS`) that are asked for more than once.
+        matrices: of the scene by this method, where they have been traced for other systems.
         cache: of traced matrices, `MatrixCache.of_user()`.
     """
     if method not in METHODS:
         raise UnknownMethodError(f"method {method!r}: expected one of {', '.join(METHODS)}")
     if method == "point-in-time":
         return PathLight(scene, systems, sky, sampling or Sampling())
-    matrices = phase_matrices(
-        scene, sampling, five_phase=method == "five-phase", needs=needs, cache=cache,
-        progress=part(progress, 0.0, 0.7),
-    )  # fmt: skip
+    if matrices is None:
+        matrices = phase_matrices(
+            scene, sampling, five_phase=method == "five-phase", needs=needs, cache=cache,
+            progress=part(progress, 0.0, 0.7),
+        )  # fmt: skip
     return phase_light(matrices, systems, sky, needs=needs, progress=part(progress, 0.7, 1.0))
 
 
@@ -187,15 +191,13 @@ def eye_illuminance(light: Light, state: State | None = None) -> Array:
     return illuminance_of_all(with_sensor_light(light), state)[-1]
 
 
-def direct_sun(light: PhaseLight | SeasonalLight, state: State | None = None) -> Array | None:
+def direct_sun(light: ByPhases, state: State | None = None) -> Array | None:
     """Illuminance of the sensors directly from the sun [S, L] [lx]; None by three phases."""
     groups = direct_sun_by_group(light, state)
     return None if groups is None else np.sum(groups, axis=0)
 
 
-def direct_sun_by_group(
-    light: PhaseLight | SeasonalLight, state: State | None = None
-) -> list[Array] | None:
+def direct_sun_by_group(light: ByPhases, state: State | None = None) -> list[Array] | None:
     """The same through each window group alone [G][S, L] [lx]."""
     if isinstance(light, PhaseLight):
         return phases.direct_sun_by_group(with_sensor_light(light), state)
@@ -208,7 +210,7 @@ def direct_sun_by_group(
     return list(in_order_of_hours(found))
 
 
-def daylight_coefficients(light: PhaseLight | SeasonalLight, state: int = 0) -> Array:
+def daylight_coefficients(light: ByPhases, state: int = 0) -> Array:
     """Illuminance of the sensors per unit luminance of each sky patch [S, P].
 
     V T D, with what windows reflect, and with the straight view through the windows.
@@ -219,7 +221,7 @@ def daylight_coefficients(light: PhaseLight | SeasonalLight, state: int = 0) -> 
     return coefficients_in_state(with_sensor_light(_by_phases(first)), state)
 
 
-def group_shares(light: PhaseLight | SeasonalLight) -> Array:
+def group_shares(light: ByPhases) -> Array:
     """Sum over hours and sensors of the illuminance by each group in its first state [G] [lx]."""
     lights = [light] if isinstance(light, PhaseLight) else [one for one, _ in light.seasons()]
     return sum(
@@ -228,34 +230,31 @@ def group_shares(light: PhaseLight | SeasonalLight) -> Array:
     )
 
 
-L = TypeVar("L", PhaseLight, SeasonalLight)
-
-
-def with_view(light: L, view: View) -> L:
+def with_view(light: ByPhases, view: View) -> ByPhases:
     """The same light for another eye: what depends on the windows alone is not computed again."""
     if isinstance(light, SeasonalLight):
-        return replace(
-            light, lights=tuple(with_view(_by_phases(one), view) for one in light.lights)
-        )
-    return replace(light, matrices=with_eye(light.matrices, view), sensors=None)
+        return replace(light, lights=tuple(_with_view(one, view) for one in light.lights))
+    return _with_view(light, view)
 
 
-def with_pictures(light: L, *, direct: bool = False, progress: Progress = silent) -> L:
+def with_pictures(
+    light: ByPhases, *, direct: bool = False, progress: Progress = silent
+) -> ByPhases:
     """The light with the matrices of the view's pixels, for several calls that need them.
 
     Args: direct: those of eDGP.
     """
     if isinstance(light, SeasonalLight):
-        lights, count = [], len(light.lights)
-        for i, one in enumerate(light.lights):
+        lights: list[PhaseLight] = []
+        count = len(light.lights)
+        for i, one in enumerate(map(_by_phases, light.lights)):
             steps = part(progress, i / count, (i + 1) / count)
-            lights.append(with_pictures(_by_phases(one), direct=direct, progress=steps))
+            lights.append(with_phase_pictures(one, direct=direct, progress=steps))
         return replace(light, lights=tuple(lights))
-    matrices = with_view_matrices(light.matrices, direct=direct, progress=progress)
-    return replace(light, matrices=matrices)
+    return with_phase_pictures(light, direct=direct, progress=progress)
 
 
-def path_light_of(light: PhaseLight | SeasonalLight) -> PathLight | SeasonalLight:
+def path_light_of(light: ByPhases) -> PathLight | SeasonalLight:
     """The light of the same scene, systems and hours by path tracing."""
     if isinstance(light, SeasonalLight):
         return replace(light, lights=tuple(map(_by_path_tracing, light.lights)))
@@ -297,6 +296,11 @@ def _by_season(
 
 def _states(light: SeasonalLight, state: State | None) -> State:
     return hourly_states(state, len(light.systems), len(light.sky.lit))
+
+
+def _with_view(light: PhaseLight | PathLight, view: View) -> PhaseLight:
+    light = _by_phases(light)
+    return replace(light, matrices=with_eye(light.matrices, view), sensors=None)
 
 
 def _by_path_tracing(light: PhaseLight | PathLight) -> PathLight:

@@ -185,7 +185,8 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
     for g, group in enumerate(coefficients):
         of_states = []
         for j, one in enumerate(group):
-            added, error = None, 0.0
+            added: Array | None = None
+            error: Array | float = 0.0
             if light.reflected is None:
                 added = _beam_in_room(light, one, g) if beams[g][j] else None
             elif g < outdoors:
@@ -236,25 +237,27 @@ def group_shares(light: PhaseLight) -> Array:
 
     Without what windows reflect.
     """
-    whole, sun, _ = light.sky.totals(np.ones(len(light.sky.lit), dtype=bool))
-    sums = []
-    for states in sensor_light(light):
-        one = states[0]
-        total = one.coefficients.whole @ whole
-        if one.coefficients.by_sun is not None:
-            total -= one.coefficients.by_sun @ sun
-        for values in (one.added, one.sun):
-            if values is not None:
-                total += values.sum(axis=1)
-        sums.append(total[: len(light.scene.points)].sum())
-    return np.array(sums)
+    firsts, count = [states[0] for states in sensor_light(light)], len(light.scene.points)
+    return np.array([over_hours(one, light.sky)[:count].sum() for one in firsts])
+
+
+def over_hours(one: SensorLight, sky: AnnualSky) -> Array:
+    """Sum over the hours of the illuminance of the sensors, the eye last [S] [lx]."""
+    whole, sun, _ = sky.totals(np.ones(len(sky.lit), dtype=bool))
+    total: Array = one.coefficients.whole @ whole
+    if one.coefficients.by_sun is not None:
+        total -= one.coefficients.by_sun @ sun
+    for values in (one.added, one.sun):
+        if values is not None:
+            total += values.sum(axis=1)
+    return total
 
 
 def coefficients_in_state(light: PhaseLight, state: int) -> Array:
     """Daylight coefficients of the sensors [S, P], with every group in a state, or its last."""
     kind = [min(state, len(states) - 1) for states in light.systems]
     sensors = sensor_light(light)
-    coefficients = sum(sensors[g][j].coefficients.whole for g, j in enumerate(kind))
+    coefficients = _total([sensors[g][j].coefficients.whole for g, j in enumerate(kind)])
     shares, _ = reflection_shares(light.matrices, light.optics(kind))
     if shares is not None:
         coefficients = coefficients + coefficients_of(light.matrices, shares)
@@ -316,14 +319,14 @@ def _without_direct_sun(light: PhaseLight, kind: Sequence[int], hours: NDArray[n
     sensors, sky = sensor_light(light), sky_in(light, hours)
     chosen = [sensors[g][j] for g, j in enumerate(kind)]
     shares, outwards = reflection_shares(light.matrices, light.optics(kind))
-    whole = sum(one.coefficients.whole for one in chosen)
+    whole = _total([one.coefficients.whole for one in chosen])
     if shares is not None:
         whole = whole + coefficients_of(light.matrices, shares)
     # in the sky's single precision: the noise of the sums is ten thousand times its rounding
     values = (whole.astype(sky.dtype) @ sky).astype(float)
     if not light.matrices.five_phase:
         return values
-    by_sun = sum(one.coefficients.by_sun for one in chosen)
+    by_sun = _total([one.coefficients.by_sun for one in chosen])
     values -= phases.times_sky(by_sun, _sun_in(light, hours))
     for one in chosen:
         if one.added is not None:
@@ -391,6 +394,12 @@ def _beam_in_room(light: PhaseLight, one: GroupCoefficients, g: int) -> Array:
         if beams is not None:
             total = total + indirect[:, q] @ beams[1]
     return total
+
+
+def _total(groups: Sequence[Array | None]) -> Array:
+    """The sum of coefficients of the groups, which all have them."""
+    first, *others = (one for one in groups if one is not None)
+    return sum(others, start=first)
 
 
 def _in_states(values: Sequence[Array | None], row: NDArray[np.int64]) -> Array:

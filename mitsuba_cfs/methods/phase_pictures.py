@@ -43,6 +43,7 @@ from mitsuba_cfs.methods.window_reflection import (
     returned_from_outdoors,
     with_exchange_of,
 )
+from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.matrices.adjacent_view import RoomBehind
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown
@@ -52,6 +53,14 @@ from mitsuba_cfs.trace.sun.picture_beam import BeamLight, beam_light
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
 T = TypeVar("T")
+
+
+def with_phase_pictures(
+    light: PhaseLight, *, direct: bool = False, progress: Progress = silent
+) -> PhaseLight:
+    """The light with the matrices of the view's pixels; `direct`: with those of eDGP."""
+    matrices = with_view_matrices(light.matrices, direct=direct, progress=progress)
+    return replace(light, matrices=matrices)
 
 
 def pictures_by_state(
@@ -67,7 +76,7 @@ def pictures_by_state(
     """
     kinds = list(combinations(rows))
     if not few_pictures(light.matrices, len(hours)):
-        light = replace(light, matrices=with_view_matrices(light.matrices))
+        light = with_phase_pictures(light)
         return [(at, pictures_in_state(light, hours[at], state)) for state, at in kinds]
     made = [(at, _five_phase_pictures(light, hours[at], state, None)) for state, at in kinds]
     whole = PatchLight.joined([five.light(np.arange(five.hours)) for _, five in made])

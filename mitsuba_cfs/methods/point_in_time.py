@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ class PathLight:
     scene: DaylightScene
     systems: Sequence[States]  # [G][J] optics of each window group in each of its states
     sky: AnnualSky
-    sampling: Sampling
+    sampling: Sampling = field(default_factory=Sampling)
 
     def __post_init__(self) -> None:
         if len(self.systems) != len(self.scene.groups):

@@ -126,7 +126,7 @@ def reflected_to_sensors(
     parts = matrices.parts.of(g)
     rest = [without_straight(matrices, group, q) for q in parts]
 
-    def light_of(batch: int) -> Array:
+    def light_of(batch: int) -> NDArray[np.float64]:
         """The light of the sensors in the hours with sun [S, h]."""
         light = np.zeros((len(matrices.scene.sensors()[0]), len(sun.shining)))
         if sun.before:
@@ -188,7 +188,7 @@ def _by_patches(
     group: GroupCoefficients,
     rest: Sequence[Array],
     g: int,
-) -> Array | float:
+) -> NDArray[np.float64] | float:
     """The sun that the outdoors reflects in V T D s, at the sensors [S, L] [lx]."""
     if not sun.before:
         return 0.0
@@ -214,7 +214,7 @@ def _flat(before: NDArray[np.float32], parts: NDArray[np.int64] | None = None) -
     return before.reshape(len(before) * before.shape[1], before.shape[2])
 
 
-def _all_hours(sun: ReflectedSun, values: Array) -> Array:
+def _all_hours(sun: ReflectedSun, values: Array) -> NDArray[np.float64]:
     """Values [..., h] of the hours with sun as values [..., L] of all."""
     whole = np.zeros((*values.shape[:-1], len(sun.sky.illuminance)))
     whole[..., sun.shining] = values

@@ -97,9 +97,9 @@ def _read_view(path: Path, view: View, elements: SunlitRows | None) -> ViewMatri
         if data["sunlit"] and elements is None:
             return None
         row, share = data["row"], data["share"]
-        parts = [PictureMatrix(data[name], row, share) for name in ("indirect", "lit")]
-        noise = ViewNoise(data["indirect_noise"], data["lit_noise"])
-        return ViewMatrices(view, data["pixels"], *parts, _sparse(data, "seen"), noise, elements)
+        indirect, lit = (PictureMatrix(data[name], row, share) for name in ("indirect", "lit"))
+        noise, seen = ViewNoise(data["indirect_noise"], data["lit_noise"]), _sparse(data, "seen")
+        return ViewMatrices(view, data["pixels"], indirect, lit, seen, noise, elements)
 
 
 def _read_elements(path: Path) -> SunlitRows:

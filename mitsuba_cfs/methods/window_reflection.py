@@ -67,8 +67,9 @@ def reflected_luminance(
             that beam before the windows [Q * K, H], by shadow rays: few paths of W would meet the
             sun's patch.
     """
-    added = np.zeros(luminance.shape)
-    source, met = luminance, np.zeros(luminance.shape)
+    added: NDArray[np.float64] = np.zeros(luminance.shape)
+    source: NDArray[np.floating] = luminance
+    met: NDArray[np.floating] = added
     if in_sun is not None:  # below 0 by rounding alone
         source, met = np.maximum(luminance - in_sun[0], 0), in_sun[1].reshape(luminance.shape)
     for _ in range(ORDERS):
@@ -77,7 +78,7 @@ def reflected_luminance(
         for q, one in enumerate(optics):
             if one.reflection is not None:
                 back[q] = one.reflection @ before[q]
-        added, source, met = added + back, back, np.zeros(1)
+        added, source, met = added + back, back, np.zeros_like(met)
     return added
 
 
@@ -90,10 +91,10 @@ def sensor_reflection(
     """
     width = exchange.shape[-1]
     flat = exchange.reshape(width, width).astype(np.float32)
-    order = view.reshape(-1, width).astype(np.float32)
+    order: NDArray[np.float32] = view.reshape(-1, width).astype(np.float32)
     total = np.zeros_like(order)
     for _ in range(ORDERS):
-        order = _by_part(optics, _reflection, order) @ flat
+        order = np.matmul(_by_part(optics, _reflection, order), flat, dtype=np.float32)
         total += order
     return total
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.methods.light import illuminance
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 
@@ -38,20 +41,17 @@ def diffuser(tau: float):
 
 def traced(interior, exterior, groups, points, **sampling):
     """The matrices of a room, none of them traced yet."""
-    from mitsuba_cfs.methods.phase_scene import PhaseScene
-    from mitsuba_cfs.methods.scene import Sampling
-    from mitsuba_cfs.methods.scene import DaylightScene
+    from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     scene = DaylightScene(interior, exterior, groups, points, up)
-    return PhaseScene(scene, Sampling(patch_samples=4096, **sampling))
+    return phase_matrices(scene, Sampling(patch_samples=4096, **sampling))
 
 
 def lit(matrices, systems, sky, state=None):
     """Illuminance [S, L] of a room with systems by group and state."""
-    from mitsuba_cfs.methods.phase_light import PhaseSystems
 
-    return PhaseSystems(matrices, systems).light(sky).illuminance(state)
+    return illuminance(phase_light(matrices, systems, sky), state)
 
 
 def sun_series(sky: ReinhartSky, patches, diffuse: float = 0.0) -> AnnualSky:
