@@ -13,7 +13,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.process import BaseProcess
@@ -22,7 +22,6 @@ from typing import Any, ClassVar
 
 Told = Callable[[str], None]
 TOLD, DONE = "told ", "done"  # how lines of a process apart begin
-BLAS_THREADS = "OPENBLAS_NUM_THREADS"  # read when a process loads NumPy
 ENDS_WITHIN = 10.0  # s: processes that were told to end
 MOST_ENDED = 5  # items that end their process, one after the other, before the rest is given up
 
@@ -45,23 +44,6 @@ def process_pool(processes: int, begin: Callable[[], object] | None = None) -> P
     return ProcessPoolExecutor(
         processes, mp_context=get_context("spawn"), initializer=_begin, initargs=(begin,)
     )
-
-
-@contextlib.contextmanager
-def shared_blas(processes: int) -> Iterator[None]:
-    """Fresh interpreters that start meanwhile multiply with their share of the cores.
-
-    With threads for every core in each of them a product of matrices takes half as many seconds of
-    the processors again, or twice.  What the user says of it stays.
-    """
-    if BLAS_THREADS in os.environ:
-        yield
-        return
-    os.environ[BLAS_THREADS] = str(max((os.cpu_count() or 1) // processes, 1))
-    try:
-        yield
-    finally:
-        os.environ.pop(BLAS_THREADS, None)
 
 
 def _begin(begin: Callable[[], object] | None) -> None:

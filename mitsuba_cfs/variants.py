@@ -15,9 +15,12 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+from threadpoolctl import threadpool_limits
+
 from mitsuba_cfs import llvm
 from mitsuba_cfs.errors import VariantError
 
+BLAS_THREADS = "OPENBLAS_NUM_THREADS"  # environment variable
 CUDA, LLVM, SCALAR = "cuda_ad_mono", "llvm_ad_mono", "scalar_rgb"
 
 log = logging.getLogger(__name__)
@@ -60,11 +63,18 @@ def activate(preferred: str | None = None, *, vectorised: bool = True) -> str:
 
 
 def share_cores(processes: int) -> None:
-    """Trace with this process' share of the cores, one of so many that trace beside each other.
+    """Limit the threads of Dr.Jit and of BLAS to this process' share of the cores.
 
-    Threads that wait for work are busy, and two processes' on one core wait for each other.
+    Threads that wait for work are busy, and two processes' on one core wait for each other. A
+    number of BLAS threads that the user has set (`OPENBLAS_NUM_THREADS`) is left as it is.
+
+    Args: processes: how many of them compute at the same time.
     """
-    _tracer("drjit").set_thread_count(max((os.cpu_count() or 1) // processes, 1))
+    threads = max((os.cpu_count() or 1) // processes, 1)
+    _tracer("drjit").set_thread_count(threads)
+    if BLAS_THREADS not in os.environ:
+        os.environ[BLAS_THREADS] = str(threads)  # read by a library that is loaded later
+        threadpool_limits(threads, user_api="blas")
 
 
 def return_memory() -> None:

@@ -29,7 +29,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, ClassVar, Generic, TypeVar
 
 from mitsuba_cfs.errors import DataError, RoomError
-from mitsuba_cfs.processes import MOST_ENDED, how_it_ended, process_pool, shared_blas
+from mitsuba_cfs.processes import MOST_ENDED, how_it_ended, process_pool
 from mitsuba_cfs.variants import share_cores
 from scenes.user_errors import one_line
 
@@ -67,8 +67,7 @@ class Tasks(Generic[T, R]):
         if scheduler is not None:
             yield from self._on_cluster(scheduler)
         elif processes > 1:
-            with shared_blas(processes):
-                yield from self._beside_each_other(processes)
+            yield from self._beside_each_other(processes)
         else:
             for item in self.items:
                 yield _attempted(self.compute, self.failed, item)

@@ -10,14 +10,15 @@ DOCS = REPOSITORY / "docs"
 SAID = ("- Judge:", "- Shared:", "- Cannot show:")
 # Heads of tables that claim nothing: what there is, what is asked for, what is written
 NO_EVIDENCE = {
-    "architecture.md": "all", "bim.md": "all", "formats.md": "all", "glossary.md": "all", "quickstart.md": "all",
+    "architecture.md": "all", "bim.md": "all", "formats.md": "all", "glossary.md": "all",
+    "quickstart.md": "all",
     "validation.md": {"| subject | judged by | page |"},
     "daylight.md": {"| function | gives |"},
     "glare.md": {
         "| index | of | source |", "| option | default | |",
         "| part of a five-phase picture | resolution |",
     },
-    "thermal.md": {"| closure | absorptances from | layer resistance | films of the layers |"},
+    "thermal.md": {"| closure | absorptances from | layer resistance | film resistances |"},
     "comply.md": {"| in the folder of results | what |", "| option | what |"},
     "studies.md": {"| in the folder | what |"},
     "pv.md": {"| key | meaning |"},

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-import sys
 import time
 import zipfile
 import zlib
@@ -20,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from platformdirs import user_cache_path
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import opened_arrays, replacing
@@ -57,13 +57,7 @@ def default_folder() -> Path:
         if any(one.exists() and not one.is_dir() for one in (folder, *folder.parents)):
             raise DataError("is a file; the cache needs a folder", file=folder, field=VARIABLE)
         return folder
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = str(Path.home() / "Library" / "Caches")
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "cfs"
+    return user_cache_path("cfs", appauthor=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,9 +16,9 @@ from scenes.cli import run
 from scenes.commands import run as run_command
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat import study_file as heat_file
+from scenes.room import series as rooms_of_a_run
 from scenes.room.glare import default_hours
 from scenes.room.options import RoomOptions
-from scenes.run import rooms as rooms_of_a_run
 from scenes.run import run as job
 from scenes.run.options import JobOptions
 from scenes.study.study_file import read_study

@@ -12,17 +12,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from bim.model import Building, Space
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError, RoomError
-from mitsuba_cfs.processes import BLAS_THREADS
 from mitsuba_cfs.progress import silent
+from mitsuba_cfs.variants import BLAS_THREADS
 from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.room import series
 from scenes.room.options import RoomOptions
 from scenes.room.series import RoomSeries
 from scenes.run import outputs, rooms_apart
-from scenes.run import rooms as series
 from scenes.run.job import JobInputs, read_inputs
 from scenes.run.options import JobOptions
 from scenes.run.rooms_apart import Workers
@@ -207,24 +208,28 @@ def test_processes_beside_each_other_share_the_cores():
     assert list(tasks.results(processes=3)) == [expected]
 
 
-def blas_threads(_: int) -> tuple[int, str | None]:
-    """A process, and what it was told of OpenBLAS' threads."""
-    return os.getpid(), os.environ.get("OPENBLAS_NUM_THREADS")
+def blas_threads(_: int) -> tuple[int, set[int]]:
+    """A process, and the threads of each BLAS library that it has loaded."""
+    loaded = threadpool_info()
+    return os.getpid(), {one["num_threads"] for one in loaded if one["user_api"] == "blas"}
 
 
-@pytest.mark.parametrize(
-    ("cores", "given", "expected"), [(6, None, "3"), (1, None, "1"), (6, "5", "5")]
-)
-def test_processes_multiply_with_their_share_of_the_cores(monkeypatch, cores, given, expected):
-    """They are told before they load NumPy, and this one is told nothing."""
-    monkeypatch.setattr(os, "cpu_count", lambda: cores)
-    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    if given:
-        monkeypatch.setenv("OPENBLAS_NUM_THREADS", given)
+def blas_threads_here() -> set[int]:
+    return blas_threads(0)[1]
+
+
+@pytest.mark.parametrize(("user", "expected"), [(None, {1}), ("2", {2})])
+def test_processes_multiply_with_their_share_of_the_cores(monkeypatch, user, expected):
+    """Unless the user has set their number; this process keeps its own."""
+    monkeypatch.delenv(BLAS_THREADS, raising=False)
+    if user:
+        monkeypatch.setenv(BLAS_THREADS, user)
+    before = blas_threads_here()
     tasks = Tasks([1], blas_threads, fault, key=str, scene=str)
-    [(process, told)] = list(tasks.results(processes=2))
-    assert (told, process != os.getpid()) == (expected, True)
-    assert os.environ.get("OPENBLAS_NUM_THREADS") == given
+    [(process, threads)] = list(tasks.results(processes=os.cpu_count()))
+    assert process != os.getpid()
+    assert threads == expected
+    assert blas_threads_here() == before
 
 
 def ends_its_process(item: str) -> str:
