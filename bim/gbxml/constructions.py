@@ -8,8 +8,9 @@ from functools import cached_property
 
 from bim.defaults import EPS, resistance_layer
 from bim.gbxml.document import Document
-from bim.model import Construction, MaterialLayer, Problem
+from bim.model import Construction, MaterialLayer
 from bim.polygon_rooms import GlazingValues, SurfaceFinish
+from bim.report.issue import Issue
 
 
 class Constructions:
@@ -17,7 +18,7 @@ class Constructions:
 
     def __init__(self, document: Document) -> None:
         self.document = document
-        self.problems: list[Problem] = []
+        self.issues: list[Issue] = []
         self._finishes: dict[str, SurfaceFinish] = {}
         self._windows: dict[str, GlazingValues] = {}
 
@@ -74,8 +75,8 @@ class Constructions:
         resistance = self.document.quantity(material, "R-value")
         if not thickness or not conductivity:
             if not resistance:
-                what = f"material {name}: states neither Thickness and Conductivity nor R-value"
-                self.problems.append(Problem(material.get("id", ""), what, "layer left out"))
+                values = {"material": name}
+                self.issues.append(Issue("resistance-missing", material.get("id", ""), values))
                 return []
             layer = resistance_layer(name, resistance, thickness)
         else:
@@ -102,8 +103,8 @@ class Constructions:
         g_value = None if g_text is None else self.document.number(g_text, least=0.0, most=1.0)
         u_value = self.document.quantity(known, "U-value") or None
         if u_value is None and g_value == 0:
-            what = f"window type {name}: its U and g are 0"
-            self.problems.append(Problem(known.get("id", ""), what, "its values are not used"))
+            values = {"type": name}
+            self.issues.append(Issue("window-type-of-zeros", known.get("id", ""), values))
             return GlazingValues(panes=panes, name=name)
         visible, solar = (self._share(known, "Transmittance", k) for k in ("Visible", "Solar"))
         return GlazingValues(u_value, g_value, visible, solar, panes, name)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from bim.gbxml.document import SI, Document
-from bim.model import NOT_USED, Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue
 from bim.use import (
     CLOCK,
     DAYS,
@@ -45,13 +46,12 @@ class UseReader:
     def __init__(self, document: Document) -> None:
         self.document = document
         self._schedules: dict[str, YearSchedule] = {}
-        self._said: dict[str, None] = {}
+        self._issues: dict[Issue, None] = {}  # each once
 
     @property
-    def problems(self) -> tuple[Problem, ...]:
+    def issues(self) -> tuple[Issue, ...]:
         """What was taken otherwise than the file may mean it."""
-        name = self.document.file.name
-        return tuple(Problem(name, *text.split(" | "), kind=NOT_USED) for text in self._said)
+        return tuple(self._issues)
 
     def use(self, space: Space) -> StatedUse | None:
         """What the file states of a room's use; None where it states nothing.
@@ -99,7 +99,7 @@ class UseReader:
         if "Latent" in heat:
             yield "person_vapour_g_h", vapour_g_h(heat["Latent"])
         if set(heat) == {"Total"}:
-            self._said["PeopleHeatGain that is total alone | not used: a person gives 75 W"] = None
+            self._issues[Issue("heat-gain-not-split", self.document.file.name)] = None
 
     def _gains(self, element: ElementTree.Element, space: Space) -> Iterator[tuple[str, Any]]:
         for field, key, schedule in (
@@ -169,7 +169,9 @@ class UseReader:
                     design.get("unit", self.document.root.get("temperatureUnit", "C")), zone,
                 )  # fmt: skip
                 yield HELD[word], YearSchedule.constant(field, float(at))
-                self._said[f"{field} of zones without a schedule | held in all hours"] = None
+                values = {"field": field}
+                issue = Issue("set-point-without-schedule", self.document.file.name, values)
+                self._issues[issue] = None
 
     def _celsius(self, values: np.ndarray, unit: str, owner: ElementTree.Element) -> np.ndarray:
         if unit not in CELSIUS:

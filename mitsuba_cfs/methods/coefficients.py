@@ -36,7 +36,7 @@ from mitsuba_cfs.methods.window_reflection import (
 )
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.kernels.scattering import patch_beams
-from mitsuba_cfs.trace.matrices.adjacent_view import borrowed_view
+from mitsuba_cfs.trace.matrices.adjacent import borrowed_view
 from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
 BATCHES = 4

@@ -30,8 +30,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.scene import kept_scene
-from mitsuba_cfs.trace.matrices.adjacent_daylight import borrowed_daylight
-from mitsuba_cfs.trace.matrices.adjacent_view import LendingRoom, RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind, borrowed_daylight
 from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
@@ -242,7 +241,7 @@ def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
     interior, parts = matrices.scene.interior, matrices.parts.groups
     sunlit = window_elements(
         kept_scene(interior, parts),
-        float(interior.areas.sum()),
+        interior,
         samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
         seed=matrices.sampling.seed,
     )

@@ -45,7 +45,7 @@ from mitsuba_cfs.methods.window_reflection import (
 )
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.matrices.adjacent_view import RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import RoomBehind
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown
 from mitsuba_cfs.trace.pictures.annual import FivePhasePictures, ViewMatrices
 from mitsuba_cfs.trace.pictures.outdoors import outdoors

@@ -19,8 +19,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
-from mitsuba_cfs.trace.sun.lit_points import Places
-from mitsuba_cfs.trace.sun.room_sun import EdgePlaces, SunElements, SunlitRows
+from mitsuba_cfs.trace.sun.room_sun import SunlitRows
 
 SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
 LARGEST = 256 << 20  # [bytes] of a file; larger ones would push out all the others
@@ -53,7 +52,7 @@ def cached_view(
         matrices = trace(light=light, elements=elements)
         sunlit = matrices.elements
         # matrices without the elements that they have would be of no use
-        if sunlit is elements or (sunlit is not None and _write(beside, _of_elements(sunlit))):
+        if sunlit is elements or (sunlit is not None and _write(beside, sunlit.arrays())):
             _write(path, _of_view(matrices))
         cache.trim(keep=path)
     return matrices
@@ -104,14 +103,7 @@ def _read_view(path: Path, view: View, elements: SunlitRows | None) -> ViewMatri
 
 def _read_elements(path: Path) -> SunlitRows:
     with opened_arrays(path) as data:
-        places = Places(data["places_point"], data["places_normal"])
-        more = Places(data["more_point"], data["more_normal"])
-        ends = _sparse(data, "smooth"), EdgePlaces(more, _sparse(data, "beside"))
-        mean, noise = (
-            SunElements(places, _sparse(data, f"far{i}"), _sparse(data, f"near{i}"), *ends)
-            for i in range(2)
-        )
-        return SunlitRows(mean, noise, data["close"])
+        return SunlitRows.of_arrays(data)
 
 
 def _write(path: Path, arrays: dict[str, NDArray[Any]]) -> bool:
@@ -140,18 +132,6 @@ def _of_view(matrices: ViewMatrices) -> dict[str, NDArray[Any]]:
         "sunlit": np.array(matrices.elements is not None),
         **_arrays("seen", matrices.seen),
     }
-
-
-def _of_elements(rows: SunlitRows) -> dict[str, NDArray[Any]]:
-    """The elements of the rows, and those of their noise, which are at the same points."""
-    first = rows.mean
-    arrays = {"close": rows.close, **_arrays("smooth", first.smooth)}
-    arrays |= _arrays("beside", first.edges.beside)
-    for i, elements in enumerate((first, rows.noise)):
-        arrays |= _arrays(f"far{i}", elements.share) | _arrays(f"near{i}", elements.near)
-    for name, places in (("places", first.places), ("more", first.edges.places)):
-        arrays |= {f"{name}_point": places.point, f"{name}_normal": places.normal}
-    return arrays
 
 
 def _arrays(name: str, matrix: sparse.csr_array) -> dict[str, NDArray[Any]]:

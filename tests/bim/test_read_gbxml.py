@@ -12,6 +12,7 @@ from bim.building_file import read_building_file
 from bim.gbxml.building import read_gbxml
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
+from tests.issues import of_code
 
 MATERIALS = """
 <Construction id="wall"><Name>Wall</Name><LayerId layerIdRef="l1"/>
@@ -111,8 +112,8 @@ def test_rooms_have_their_areas_and_volumes(building):
 
 
 def test_what_a_space_states_otherwise_is_said(building):
-    (said,) = [p for p in building.problems if "states" in p.what]
-    assert "Hall: states 30.00 m2 floor area, drawn 32.00 m2" in said.what
+    (said,) = of_code(building, "floor-area-differs")
+    assert said.values == {"room": "Hall", "stated": 30.0, "drawn": pytest.approx(32.0)}
 
 
 def test_the_window_looks_out_and_states_its_type(building):
@@ -146,8 +147,8 @@ def test_level_surfaces_that_are_named_walls_are_floors_and_ceilings(tmp_path):
     assert kinds["Office-roof"] == ("ceiling", "adiabatic")
     assert kinds["Office-floor"] == ("floor", "adiabatic")
     assert kinds["Office-south"] == ("wall", "outside")
-    (said,) = [p for p in found.problems if "lie level" in p.what]
-    assert said.what == "4 surface(s) of type InteriorWall lie level"
+    (said,) = of_code(found, "walls-level")
+    assert said.values == {"count": 4, "type": "InteriorWall"}
 
 
 def test_a_space_without_surfaces_or_area_is_no_room(tmp_path):
@@ -155,9 +156,9 @@ def test_a_space_without_surfaces_or_area_is_no_room(tmp_path):
     empty = '<Space id="Shades"><Name>Shades</Name></Space><Space id="Room"><Area>9</Area></Space>'
     text = two_rooms().replace("<BuildingStorey", empty + "<BuildingStorey", 1)
     found = read_gbxml(written(tmp_path, text))
-    lost = [p.where for p in found.problems if p.lost == "room"]
+    lost = [p.where for p in found.issues if p.effect.lost == "room"]
     assert (len(found.spaces), lost) == (2, ["Room"])
-    assert "space Shades: no surface bounds it" in " ".join(p.what for p in found.problems)
+    assert [i.where for i in of_code(found, "space-without-surfaces")] == ["Shades"]
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("Meters", 0.2), ("Feet", 0.2 * 0.3048)])
@@ -179,7 +180,7 @@ def test_a_window_type_of_noughts_states_nothing(tmp_path):
     found = read_gbxml(written(tmp_path, text))
     (window,) = found.windows
     assert (window.u_value, window.g_value, window.visible_transmittance) == (None, None, None)
-    assert "window type Unit: its U and g are 0" in [p.what for p in found.problems]
+    assert [i.values["type"] for i in of_code(found, "window-type-of-zeros")] == ["Unit"]
 
 
 def test_a_material_without_resistance_is_left_out(tmp_path):
@@ -187,7 +188,7 @@ def test_a_material_without_resistance_is_left_out(tmp_path):
     found = read_gbxml(written(tmp_path, text))
     south = next(f for f in found.spaces[0].faces if f.name == "Office-south")
     assert [layer.name for layer in south.construction.layers] == ["Brick"]
-    assert any("material Wool: states neither" in p.what for p in found.problems)
+    assert [i.values["material"] for i in of_code(found, "resistance-missing")] == ["Wool"]
 
 
 def test_north_is_turned(tmp_path):

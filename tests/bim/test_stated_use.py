@@ -13,8 +13,10 @@ from test_read_gbxml import two_rooms as gbxml_rooms
 from bim.gbxml.building import read_gbxml
 from bim.honeybee.building import read_honeybee
 from bim.honeybee.use import sensible_heat
+from bim.report.issue import Phrase
 from bim.use import KINDS, YearSchedule, day_of_year, hourly_means
 from mitsuba_cfs.errors import DataError
+from tests.issues import of_code
 
 
 def of_day(schedule: YearSchedule, month: int, day: int, kind: str) -> np.ndarray:
@@ -84,9 +86,10 @@ def test_loads_are_those_of_the_room_else_of_its_program(building):
 def test_a_room_without_a_system_is_not_kept_at_its_set_points(building):
     hall = building.uses["Hall"]
     assert hall.heating_c is None and hall.cooling_c is None and not hall.ventilation_m3_s.peak
-    said = {p.what: p.consequence for p in building.problems if p.kind == "not used"}
-    assert said["set points (Hall)"] == "not used: the room has no system"
-    assert said["service hot water (Office)"] == "not used"
+    (points,) = of_code(building, "set-points-without-system")
+    assert points.values["rooms"] == ("Hall",)
+    (water,) = (i for i in of_code(building, "load-not-used") if i.values["rooms"] == ("Office",))
+    assert water.values["load"] == Phrase("service_hot_water")
 
 
 def test_dry_heat_of_people_is_energyplus_own():
