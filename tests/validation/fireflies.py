@@ -37,9 +37,9 @@ from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.methods.coefficients import group_coefficients
 from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.methods.point_in_time import path_picture
+from scenes.chosen_rooms import chosen_spaces
 from scenes.cost import room as box
-from scenes.run.building import read_building
-from scenes.run.inputs import chosen_spaces
+from scenes.input_files import read_building
 from tests.validation import geneva_scene as geneva
 
 LIMIT = 1.5  # times the brightest of the neighbourhood
