@@ -14,9 +14,9 @@ whole window below a slab ("overhang"); the transmittance of a pane beyond the l
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,17 +180,12 @@ def draw(name: str, file: Path) -> str:
     return f"{name}: {said}"
 
 
-def main(arguments: list[str] | None = None) -> None:
+def main(
+    *,
+    out: Annotated[Path, "folder of the pictures"],
+    only: Annotated[Sequence[str], (*PAIRS, *CURVES)] = (*PAIRS, *CURVES),
+) -> None:
     """Draw the pictures."""
-    names = [*PAIRS, *CURVES]
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, required=True, help="folder of the pictures")
-    parser.add_argument("--only", nargs="+", choices=names, default=names)
-    options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
-    for name in options.only:
-        print(draw(name, options.out / f"office_{name}.png"), flush=True)
-
-
-if __name__ == "__main__":
-    main()
+    out.mkdir(parents=True, exist_ok=True)
+    for name in only:
+        print(draw(name, out / f"office_{name}.png"), flush=True)
