@@ -18,7 +18,6 @@ from .model import (
     Element as Element,
     Face as Face,
     MaterialLayer as MaterialLayer,
-    Problem as Problem,
     Room as Room,
     Space as Space,
     Window as Window,
@@ -33,6 +32,13 @@ from .radiance.scene import (
     RadianceObject as RadianceObject,
     RadianceScene as RadianceScene,
     read_radiance as read_radiance,
+)
+from .report.issue import (
+    Effect as Effect,
+    Issue as Issue,
+    IssueText as IssueText,
+    Phrase as Phrase,
+    issue_text as issue_text,
 )
 from .sensors import sensor_grid as sensor_grid, view_point as view_point
 from .shell import open_edges as open_edges

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from bim.colours import GREY, Colour
 from bim.defaults import FRAME_FRACTION
-from bim.model import Problem
 from bim.planes import Plane, area_vectors, plane_through, polygons_of, without_slits
 from bim.rays import RayMesh, ray_mesh
+from bim.report.issue import Effect, Issue, Phrase
 
 FLAT = 0.95  # cosine: panes within 18 degrees of the main direction are in its plane
 SMALLEST_PANE = 0.01  # less glass than this is a spy hole, not a window [m2]
@@ -79,17 +79,17 @@ class Aperture:
         )
 
 
-def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
+def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Issue]]:
     """The filling in its plane (None if it has no extent), and what had to be assumed."""
-    problems: list[Problem] = []
+    issues: list[Issue] = []
     clear = filling.triangles[filling.transparent]
     source = clear if len(clear) else filling.triangles
     if filling.opening is not None and not len(clear) and not len(source):
         source = filling.opening
     direction = _looking(filling, source)
     if direction is None:
-        what = f"{filling.name}: has no extent"
-        return None, [Problem(filling.guid, what, "left out", "window")]
+        values = {"element": filling.name}
+        return None, [Issue("window-without-extent", filling.guid, values, Effect("window"))]
     facing = _facing(source, direction)
     areas = np.linalg.norm(area_vectors(source), axis=1)
     depth = source.mean(axis=1) @ direction
@@ -97,26 +97,24 @@ def aperture_of(filling: Filling) -> tuple[Aperture | None, list[Problem]]:
     plane = plane_through(source[0, 0] + (middle - source[0, 0] @ direction) * direction, direction)
     if filling.opening is not None:
         plane, more = _in_its_opening(filling, plane)
-        problems += more
+        issues += more
     opening = _filled(
         shadow(filling.triangles if filling.opening is None else filling.opening, plane)
     )
     if opening.area < SMALLEST_PANE:
-        what = f"{filling.name}: opening has no area"
-        return None, [Problem(filling.guid, what, "left out", "window")]
+        values = {"element": filling.name}
+        return None, [Issue("opening-without-area", filling.guid, values, Effect("window"))]
     if filling.opening is None and filling.ifc_class.startswith("IfcWindow"):
-        problems.append(
-            Problem(filling.guid, f"{filling.name}: is hosted by no opening", "its outline is used")
-        )
+        issues.append(Issue("window-without-opening", filling.guid, {"element": filling.name}))
     if len(clear):
         glass, more = _drawn_glass(filling, clear, facing, plane, opening)
-        problems += more
+        issues += more
     elif filling.is_door:
         glass = shapely.Polygon()
     else:
         glass, more = _assumed_glass(filling, plane, opening)
-        problems += more
-    return Aperture(filling, plane, opening, glass), problems
+        issues += more
+    return Aperture(filling, plane, opening, glass), issues
 
 
 def framed_by(apertures: Sequence[Aperture]) -> list[Aperture | None]:
@@ -224,18 +222,18 @@ def _breadth(triangles: NDArray[np.float64], way: NDArray[np.float64]) -> float:
     return shapely.convex_hull(shapely.multipoints(flat)).area
 
 
-def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Problem]]:
+def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Issue]]:
     """The glazing plane, moved to the middle of the opening where it was far off."""
     heights = plane.to_plane(filling.opening)[..., 2]
     off = max(heights.min(), -heights.max(), 0.0)
     if off < OUT_OF_WALL:
         return plane, []
-    what = f"{filling.name}: its glass lies {off * 1000:.0f} mm out of its opening in the wall"
+    values = {"element": filling.name, "offset_mm": 1000 * off}
     if off < ASTRAY:
-        return plane, [Problem(filling.guid, what, "kept where it is drawn")]
+        return plane, [Issue("glass-out-of-opening", filling.guid, values)]
     middle = 0.5 * (heights.min() + heights.max())
     moved = Plane(plane.origin + middle * plane.normal, plane.axes)
-    return moved, [Problem(filling.guid, what, "moved to the middle of the opening")]
+    return moved, [Issue("glass-moved-into-opening", filling.guid, values)]
 
 
 def _drawn_glass(
@@ -244,39 +242,38 @@ def _drawn_glass(
     facing: NDArray[np.bool_],
     plane: Plane,
     opening: shapely.Geometry,
-) -> tuple[shapely.Geometry, list[Problem]]:
+) -> tuple[shapely.Geometry, list[Issue]]:
     """Outline of the transparent panes, clipped to the opening."""
-    problems = []
+    issues = []
     total = np.linalg.norm(area_vectors(clear), axis=1)
     if total[~facing].sum() > 0.3 * total[facing].sum():
-        what = f"{filling.name}: glass in several planes"
-        problems.append(Problem(filling.guid, what, "flattened onto the biggest one"))
+        issues.append(Issue("glass-in-several-planes", filling.guid, {"element": filling.name}))
     drawn = shadow(clear[facing], plane)
     glass = drawn.intersection(opening)
     if glass.area < 0.95 * drawn.area:
-        what = f"{filling.name}: {drawn.area - glass.area:.2f} m2 of its glass outside its opening"
-        problems.append(Problem(filling.guid, what, "clipped to the opening"))
+        values = {"element": filling.name, "area": drawn.area - glass.area}
+        issues.append(Issue("glass-clipped", filling.guid, values))
     glass = _polygonal(glass)
-    return (glass if glass.area >= SMALLEST_PANE else shapely.Polygon()), problems
+    return (glass if glass.area >= SMALLEST_PANE else shapely.Polygon()), issues
 
 
 def _assumed_glass(
     filling: Filling, plane: Plane, opening: shapely.Geometry
-) -> tuple[shapely.Geometry, list[Problem]]:
+) -> tuple[shapely.Geometry, list[Issue]]:
     """The opening less a frame of the stated, the drawn or the default size."""
     if filling.glazed_fraction is not None and 0 < filling.glazed_fraction <= 1:
         glass = inset_to_fraction(opening, filling.glazed_fraction)
-        source = f"GlazingAreaFraction {filling.glazed_fraction:.2f}"
+        source = Phrase("glazing-area-fraction", {"fraction": filling.glazed_fraction})
     elif (free := _left_free(filling, plane, opening)).area > LEAST_WITHIN * opening.area:
-        glass, source = free, "what its drawn frame leaves free"
+        glass, source = free, Phrase("free-of-frame")
     elif filling.frame_width is not None and opening.buffer(-filling.frame_width).area > 0:
         glass = opening.buffer(-filling.frame_width, join_style="mitre")
-        source = f"frame {filling.frame_width * 1000:.0f} mm wide as stated"
+        source = Phrase("stated-frame", {"width_mm": 1000 * filling.frame_width})
     else:
         glass = inset_to_fraction(opening, 1 - FRAME_FRACTION)
-        source = f"default frame fraction {FRAME_FRACTION}"
-    what = f"{filling.name}: no transparent pane drawn"
-    return _polygonal(glass), [Problem(filling.guid, what, f"glass from {source}")]
+        source = Phrase("default-frame", {"fraction": FRAME_FRACTION})
+    values = {"element": filling.name, "source": source}
+    return _polygonal(glass), [Issue("window-without-glass", filling.guid, values)]
 
 
 def _left_free(filling: Filling, plane: Plane, opening: shapely.Geometry) -> shapely.Geometry:

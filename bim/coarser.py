@@ -13,29 +13,30 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Element, Problem
+from bim.model import Element
 from bim.planes import area_vectors
+from bim.report.issue import Issue
 
 FINE = 5_000  # triangles of one element, above which it is made coarser
 STEPS = (0.002, 0.005, 0.01, 0.02)  # of the grids [m]
 KEPT_AREA = 0.9  # share of the surface that has to be left: slats and bars must not vanish
 
 
-def coarser(elements: list[Element]) -> tuple[list[Element], list[Problem]]:
+def coarser(elements: list[Element]) -> tuple[list[Element], list[Issue]]:
     """The elements, those of many triangles made coarser, and how far vertices were moved."""
-    result, problems = [], []
+    result, issues = [], []
     for element in elements:
         triangles, error = coarser_mesh(element.triangles)
         if len(triangles) < len(element.triangles):
-            what = (
-                f"{element.ifc_class} {element.name}: {len(element.triangles)} triangles are finer"
-                f" than light needs"
-            )
-            done = f"{len(triangles)} are traced, vertices moved by {1000 * error:.0f} mm or less"
-            problems.append(Problem(element.guid, what, done, kind="finer than light needs"))
+            values = {
+                "element": f"{element.ifc_class} {element.name}",
+                "before": len(element.triangles), "after": len(triangles),
+                "moved_mm": 1000 * error,
+            }  # fmt: skip
+            issues.append(Issue("mesh-simplified", element.guid, values))
             element = replace(element, triangles=triangles)
         result.append(element)
-    return result, problems
+    return result, issues
 
 
 def coarser_mesh(

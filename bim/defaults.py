@@ -8,7 +8,7 @@ Solar reflectance equals the visible one where nothing is known; emissivity 0.9 
 for ordinary building surfaces.
 
 Layers: design values of EN ISO 10456:2007, table 3.  Thicknesses are ours: a heavy building with
-insulation of the first energy standards; each use is reported as a problem of the model.
+insulation of the first energy standards; each use is reported as a issue of the model.
 """
 
 from __future__ import annotations

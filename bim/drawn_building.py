@@ -10,10 +10,11 @@ from pathlib import Path
 from bim.account import Account, StoreyAccount
 from bim.coarser import coarser
 from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE
-from bim.model import Building, Element, Problem, Space
+from bim.model import Building, Element, Space
 from bim.names import JOINT, found_by_name, label_of
 from bim.outdoors import shut_in_area, unblinded
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, space_of
+from bim.report.issue import Effect, Issue
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError, RoomError
 
@@ -27,7 +28,7 @@ class DrawnModel:
     rooms: tuple[DrawnRoom, ...]
     elements: tuple[Element, ...] = ()  # shades and context
     furniture: Mapping[str, tuple[Element, ...]] = field(default_factory=dict)  # by room
-    problems: tuple[Problem, ...] = ()
+    issues: tuple[Issue, ...] = ()
     latitude_deg: float | None = None
     longitude_deg: float | None = None
     elevation: float = 0.0  # [m]
@@ -45,28 +46,29 @@ def drawn_building(
     rooms = list(model.rooms)
     for text in join:
         rooms = _joined(rooms, text, model.path)
-    problems = list(model.problems)
+    issues = list(model.issues)
     spaces: list[Space] = []
     for room in rooms:
         try:
             space, more = space_of(room)
         except RoomError as error:
             label = label_of(room.name, room.long_name, room.guid)
-            what = f"room {label}: its boundary cannot be built"
-            problems.append(Problem(room.guid, what, f"left out: {error}", "room", _glass(room)))
+            values = {"room": label, "reason": str(error)}
+            effect = Effect("room", _glass(room))
+            issues.append(Issue("room-not-closed", room.guid, values, effect))
             continue
-        problems += more
+        issues += more
         spaces.append(space)
     spaces, more = _furnished(spaces, model, furniture)
-    problems += more
+    issues += more
     elements = [*_envelope(rooms, spaces), *model.elements]
     outdoors = unblinded(elements, spaces)
     traced, fine = coarser(list(outdoors.elements))
-    problems += [*outdoors.problems, *fine]
+    issues += [*outdoors.issues, *fine]
     return Building(
-        model.name, tuple(spaces), tuple(traced), tuple(dict.fromkeys(problems)),
+        model.name, tuple(spaces), tuple(traced), tuple(dict.fromkeys(issues)),
         model.latitude_deg, model.longitude_deg, model.elevation, model.path,
-        _account(model, rooms, spaces, problems),
+        _account(model, rooms, spaces, issues),
     )  # fmt: skip
 
 
@@ -75,11 +77,11 @@ def _joined(rooms: Sequence[DrawnRoom], text: str, path: Path) -> list[DrawnRoom
     names = [name.strip() for name in text.split("+") if name.strip()]
     if len(names) < 2:
         message = f"expected rooms with a plus between them, as 'Hall + Living', got {text!r}"
-        raise DataError(message, field="--join")
+        raise DataError(message, field="join")
     try:
         own = [found_by_name([_Labelled(room) for room in rooms], name, "room") for name in names]
     except (KeyError, ValueError) as error:
-        raise DataError(str(error.args[0]), file=path, field="--join") from None
+        raise DataError(str(error.args[0]), file=path, field="join") from None
     chosen = {one.guid: one.room for one in own}
     first = own[0].room
     faces = tuple(
@@ -135,15 +137,13 @@ class _Labelled:
 
 def _furnished(
     spaces: Sequence[Space], model: DrawnModel, wanted: bool
-) -> tuple[list[Space], list[Problem]]:
+) -> tuple[list[Space], list[Issue]]:
     count = sum(len(model.furniture.get(space.guid, ())) for space in spaces)
     if not count or not wanted:
-        left = Problem(
-            "furniture", f"{count} piece(s) of furniture", "left out; --furniture counts them"
-        )
+        left = Issue("furniture-left-out", "furniture", {"count": count})
         return list(spaces), [left] if count else []
     found = [replace(s, furniture=tuple(model.furniture.get(s.guid, ()))) for s in spaces]
-    return found, [Problem("furniture", f"{count} piece(s) of furniture", "in light and views")]
+    return found, [Issue("furniture-included", "furniture", {"count": count})]
 
 
 def _envelope(rooms: Sequence[DrawnRoom], spaces: Sequence[Space]) -> list[Element]:
@@ -184,10 +184,10 @@ def _account(
     model: DrawnModel,
     rooms: Sequence[DrawnRoom],
     spaces: Sequence[Space],
-    problems: Sequence[Problem],
+    issues: Sequence[Issue],
 ) -> Account:
     """What of the file's rooms and glass came through."""
-    failed = {problem.where for problem in problems if problem.lost == "room"}
+    failed = {issue.where for issue in issues if issue.effect.lost == "room"}
     drawn = Counter(room.storey for room in model.rooms)
     # a joined room is as many rooms as the file had of it
     lost = Counter(room.storey for room in rooms if room.guid in failed)
@@ -216,5 +216,5 @@ def _account(
             label_of(room.name, room.long_name, room.guid) for room in rooms if room.guid in failed
         ),
         leaking=tuple(space.label for space in spaces if open_edges(space.shell)),
-        shut_in=shut_in_area(problems),
+        shut_in=shut_in_area(issues),
     )

@@ -19,9 +19,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from bim.model import Building, Element, Problem, Window
+from bim.model import Building, Element, Window
 from bim.names import plain_text
 from bim.planes import plane_through
+from bim.report.issue import Issue
 
 SHADES = "IfcShadingDevice"
 NAMED = ("IfcBuildingElementProxy", "IfcCovering")  # shades where their name says so
@@ -37,8 +38,8 @@ COVERS = 0.3  # share of the glass
 
 def without_drawn_shades(
     building: Building, shaded: Collection[str]
-) -> tuple[Building, tuple[Problem, ...]]:
-    """The building without the drawn shades of windows, and a problem for each with its area.
+) -> tuple[Building, tuple[Issue, ...]]:
+    """The building without the drawn shades of windows, and a issue for each with its area.
 
     Args: shaded: GUIDs of the windows whose BSDF holds a shade.
     """
@@ -47,7 +48,7 @@ def without_drawn_shades(
     for element in building.elements:
         if _is_shade(element) and not element.is_kept:
             devices.setdefault(element.guid, []).append(element)
-    problems = []
+    issues = []
     for guid, parts in devices.items():
         triangles = np.concatenate([part.triangles for part in parts])
         outlines = [(window, _outline(triangles, window)) for window in windows]
@@ -55,19 +56,17 @@ def without_drawn_shades(
         if not own:
             continue
         area = max(outline.area for _, outline in own)
-        names = ", ".join(dict.fromkeys(window.name or window.guid for window, _ in own))
-        what = (
-            f"{parts[0].ifc_class} {parts[0].name}: its {area:.2f} m2 are the shade that the BSDF "
-            f"of window {names} holds already"
-        )
-        done = f"left out of the tracing; keep = ['{guid}'] in the model's corrections keeps it"
-        problems.append(Problem(guid, what, done))
-    gone = {problem.where for problem in problems}
+        values = {
+            "element": f"{parts[0].ifc_class} {parts[0].name}", "area": area,
+            "windows": tuple(dict.fromkeys(window.name or window.guid for window, _ in own)),
+        }  # fmt: skip
+        issues.append(Issue("shade-drawn-and-in-system", guid, values))
+    gone = {issue.where for issue in issues}
     if not gone:
         return building, ()
     kept = tuple(element for element in building.elements if element.guid not in gone)
-    found = tuple(problems)
-    return replace(building, elements=kept, problems=(*building.problems, *found)), found
+    found = tuple(issues)
+    return replace(building, elements=kept, issues=(*building.issues, *found)), found
 
 
 def is_named_shade(name: str) -> bool:

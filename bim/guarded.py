@@ -14,8 +14,8 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.apertures import shadow
-from bim.model import Problem
 from bim.planes import Plane, plane_through
+from bim.report.issue import Issue
 from bim.rooms import Attachment, Piece, RoomSolid, room_pieces, room_solid
 from bim.solids import PackedSolid, Solid, packed, prism, solid_of, triangles_of, union, unpacked
 from mitsuba_cfs.errors import RoomError
@@ -35,7 +35,7 @@ class RoomBoundary:
 
     pieces: list[Piece]
     volume: float  # of the air with the recesses of its windows [m3]
-    problems: list[Problem]
+    issues: list[Issue]
 
 
 def room_boundaries(
@@ -103,8 +103,7 @@ def _space(body: Body) -> Packed | None:
         return solid
     plane = plane_through(np.array([*body[0, 0, :2], low]), np.array([0.0, 0.0, 1.0]))
     outline = prism(shadow(body, plane), plane, 0.0, high - low)
-    done = "replaced by its outline extruded over its height"
-    return None if outline is None else (packed(outline), done)
+    return None if outline is None else (packed(outline), "outline-extruded")
 
 
 def _shared(item: tuple[PackedSolid, list[PackedSolid]]) -> list[float]:

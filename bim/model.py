@@ -20,6 +20,7 @@ from bim.fenestration import ShadingState
 from bim.georeference import Georeference
 from bim.held_sensors import HeldGrid, HeldView
 from bim.names import found_by_name, label_of
+from bim.report.issue import Issue
 from bim.use import StatedUse
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import Gloss
@@ -28,27 +29,8 @@ FACE_KINDS = ("floor", "ceiling", "roof", "wall", "door", "window frame", "revea
 # Sides of a box-shaped room as seen from outdoors in front of it, and the other kinds of its faces
 BOX_SIDES = ("front", "right", "back", "left", "floor", "ceiling")
 BOX_PARTS = (*BOX_SIDES, "wall", "window frame", "reveal")
-JOINED = "joined as one"  # kind of a problem: rooms that their openings made one
-SHUT_ADVICE = "cfs run --inner-glass lets daylight through"  # glass and doorways as they are read
-NOT_USED = "not used"  # kind of a problem: what the file states and no result depends on
-TREES = "trees"  # kind of a problem: trees outdoors, and how much light passes them by month
 COLOURS = ("red", "green", "blue")  # bands of colour pictures
 ADJACENCIES = ("outside", "ground", "space", "adiabatic", "unknown")
-
-
-CUT_OFF = "cut off"  # kind of the problem of a file that has lost its end
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One fault of the input: where it is, what it is, what it means and what was done."""
-
-    where: str  # GUID or name of the element, or the file
-    what: str
-    consequence: str  # for the simulation, with the repair if there was one
-    lost: str = ""  # "room" or "window" where one is left out for it
-    glass: float = 0.0  # area of the glass that it concerns [m2]
-    kind: str = ""  # problems of one kind are counted together; "" where the texts tell
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +236,7 @@ class Building:
     name: str
     spaces: tuple[Space, ...]
     elements: tuple[Element, ...] = ()
-    problems: tuple[Problem, ...] = ()
+    issues: tuple[Issue, ...] = ()
     latitude_deg: float | None = None
     longitude_deg: float | None = None  # east positive
     elevation: float = 0.0  # above the sea [m]

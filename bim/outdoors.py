@@ -11,9 +11,10 @@ from trimesh.intersections import slice_faces_plane
 
 from bim.defaults import CLEAR_GLAZING, GLASS_REFLECTANCE
 from bim.guarded import Outline, opened
-from bim.model import Element, Problem, Space, Window
+from bim.model import Element, Space, Window
 from bim.planes import area_vectors, merged_polygons, plane_through
 from bim.rays import hemisphere, ray_mesh
+from bim.report.issue import Effect, Issue
 from mitsuba_cfs.processes import ProcessEnded
 
 COVERED = 0.9  # share of rays stopped at once that makes a window blind
@@ -24,7 +25,7 @@ RAYS = 36
 FACE = 0.99  # cosine to the biggest part of a pane from which another is of its faces
 BEFORE_GLASS = 0.5  # what is nearer to a window's plane is of its own facade [m]
 FARTHEST = 50e3  # from the rooms, of what counts as their surroundings [m]
-SHUT_IN = "shut in"  # kind of the problem of a window before which hardly anything is open
+SHUT_IN = "window-shut-in"  # code of the issue
 LEAST_OPEN = 0.02  # share of the half space before glass, by cosine: less is as good as nothing
 WINDOWS_AT_ONCE = 256  # that the faces of a pane are held against
 NOTHING = np.empty((0, 3, 3))
@@ -37,12 +38,12 @@ class Outdoors:
     """Elements that no window is blinded by, and what had to be cut or left out for that."""
 
     elements: tuple[Element, ...]
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
 
 
 def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
     """Elements with holes cut, or left out, where they lie on the glass of a window."""
-    elements, problems = _within_reach(elements, spaces)
+    elements, issues = _within_reach(elements, spaces)
     used = {window.guid for space in spaces for window in space.windows}
     for _ in range(3 if elements else 0):  # a second element may lie behind the first
         near = _Near(elements, used)
@@ -58,29 +59,32 @@ def unblinded(elements: Sequence[Element], spaces: Sequence[Space]) -> Outdoors:
         cut = dict(zip(covers, bodies, strict=True))
         for index in sorted(covers, reverse=True):
             element, body = elements[index], cut[index]
-            what = (
-                f"{element.ifc_class} {element.name}: covers the glass of "
-                f"{len(covers[index])} window(s)"
-            )
+            values = {
+                "element": f"{element.ifc_class} {element.name}", "count": len(covers[index]),
+            }  # fmt: skip
             if isinstance(body, np.ndarray):
-                elements[index], done = replace(element, triangles=body), "cut open there"
+                elements[index] = replace(element, triangles=body)
+                issues.append(Issue("element-cut-open", element.guid, values))
+                continue
+            del elements[index]
+            if body is None:
+                issues.append(Issue("element-covers-window", element.guid, values))
             else:
-                del elements[index]
-                done = "left out" if body is None else f"left out: {body}"
-            problems.append(Problem(element.guid, what, done))
-    problems += _shut_in(elements, spaces)
-    return Outdoors(tuple(elements), tuple(problems))
+                values["reason"] = str(body)
+                issues.append(Issue("element-not-cut-open", element.guid, values))
+    issues += _shut_in(elements, spaces)
+    return Outdoors(tuple(elements), tuple(issues))
 
 
 def _within_reach(
     elements: Sequence[Element], spaces: Sequence[Space]
-) -> tuple[list[Element], list[Problem]]:
+) -> tuple[list[Element], list[Issue]]:
     """The elements without those that stand beyond every horizon, as strays of a file do."""
     if not spaces:
         return list(elements), []
     corners = np.concatenate([space.shell.reshape(-1, 3) for space in spaces])
     low, high = corners.min(axis=0), corners.max(axis=0)
-    kept, problems = [], []
+    kept, issues = [], []
     for element in elements:
         points = element.triangles.reshape(-1, 3)
         gap = np.maximum(points.min(axis=0, initial=np.inf) - high, 0.0)
@@ -89,36 +93,34 @@ def _within_reach(
         if away <= FARTHEST:
             kept.append(element)
             continue
-        what = (
-            f"{element.ifc_class} {element.name}: stands {away / 1000:.0f} km away from every room"
-        )
-        problems.append(Problem(element.guid, what, "left out"))
-    return kept, problems
+        label = f"{element.ifc_class} {element.name}"
+        values = {"element": label, "distance_km": away / 1000}
+        issues.append(Issue("element-far-away", element.guid, values))
+    return kept, issues
 
 
-def shut_in_area(problems: Iterable[Problem]) -> float:
-    """Area of the windows that problems say have nothing open before them [m2]."""
-    parts = {(p.where, round(p.glass, 6)) for p in problems if p.kind == SHUT_IN}
+def shut_in_area(issues: Iterable[Issue]) -> float:
+    """Area of the windows that issues say have nothing open before them [m2]."""
+    parts = {(i.where, round(i.effect.glass, 6)) for i in issues if i.code == SHUT_IN}
     return sum(area for _, area in parts)  # a window may be before two rooms
 
 
-def _shut_in(elements: Sequence[Element], spaces: Sequence[Space]) -> list[Problem]:
+def _shut_in(elements: Sequence[Element], spaces: Sequence[Space]) -> list[Issue]:
     """Windows before which hardly anything is open, such as those to a porch that is no space."""
     if not elements:
         return []
-    near, problems = _Near(elements, {w.guid for space in spaces for w in space.windows}), []
+    near, issues = _Near(elements, {w.guid for space in spaces for w in space.windows}), []
     for space in spaces:
         own = {window.guid for window in space.windows}
         for window in space.windows:
             free = near.open_share(window, own)
             if free < LEAST_OPEN:
-                what = (
-                    f"{window.name}: before {window.area:.2f} m2 of glass of room {space.label} "
-                    f"{100 * free:.0f} % is open to sky and ground"
-                )
-                done = "kept: its light is what the surfaces and panes before it reflect"
-                problems.append(Problem(window.guid, what, done, glass=window.area, kind=SHUT_IN))
-    return problems
+                values = {
+                    "window": window.name, "room": space.label, "area": window.area,
+                    "open_percent": 100 * free,
+                }  # fmt: skip
+                issues.append(Issue(SHUT_IN, window.guid, values, Effect(glass=window.area)))
+    return issues
 
 
 def before_windows(elements: Sequence[Element], windows: Sequence[Window]) -> NDArray[np.float64]:
@@ -149,7 +151,7 @@ def beyond(
 
 def mirrors_in_view(
     elements: Sequence[Element], windows: Sequence[Window]
-) -> tuple[list[Element], list[Problem]]:
+) -> tuple[list[Element], list[Issue]]:
     """Elements of which the default's panes mirror where a window may see them, and what that is.
 
     The rest, such as edges of panes and panes beside the window in its own facade, reflect as much
@@ -176,8 +178,8 @@ def mirrors_in_view(
             result.append(replace(element, triangles=rest, gloss=None, **plain))
     if not seen:
         return result, []
-    what = f"{len(seen)} panes outdoors before a window (first {seen[0].name}): no style says GLASS"
-    return result, [Problem(seen[0].guid, what, "mirror as clear double glazing, 15 % straight on")]
+    values = {"count": len(seen), "element": seen[0].name}
+    return result, [Issue("panes-assumed-mirroring", seen[0].guid, values)]
 
 
 def _faces_in_view(
@@ -299,9 +301,9 @@ def _holes(windows: Sequence[Window]) -> list[Outline]:
 
 def lifted_sites(
     elements: Sequence[Element], windows: Sequence[Window]
-) -> tuple[list[Element], list[Problem]]:
+) -> tuple[list[Element], list[Issue]]:
     """Elements without the terrain that buries the middle of a window; such terrain is reported."""
-    kept, problems = [], []
+    kept, issues = [], []
     for element in elements:
         if not element.ifc_class.startswith(SITE_CLASSES):
             kept.append(element)
@@ -311,9 +313,9 @@ def lifted_sites(
         if not buried:
             kept.append(element)
             continue
-        what = f"terrain {element.name}: lies above the middle of {len(buried)} window(s)"
-        problems.append(Problem(element.guid, what, "left out"))
-    return kept, problems
+        values = {"element": element.name, "count": len(buried)}
+        issues.append(Issue("terrain-above-window", element.guid, values))
+    return kept, issues
 
 
 def _below(mesh, window: Window) -> bool:

@@ -20,10 +20,11 @@ from bim.boundaries import floor_area
 from bim.defaults import EMISSIVITY, GLASS_REFLECTANCE, ROOM_REFLECTANCE, default_construction
 from bim.fenestration import ShadingState
 from bim.mesh_repair import wound_alike
-from bim.model import Construction, Face, MaterialLayer, Problem, Space, Window
+from bim.model import Construction, Face, MaterialLayer, Space, Window
 from bim.planes import Facet, Plane, newell_normal, plane_through, polygons_of, triangulated
+from bim.report.issue import Effect, Issue
 from bim.shell import conforming_triangles, enclosed_volume, open_edges, welded
-from bim.soundness import soundness_problems
+from bim.soundness import soundness_issues
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.gloss import Gloss
 
@@ -120,16 +121,16 @@ class _Part:
     opening: DrawnOpening | None = None
 
 
-def space_of(room: DrawnRoom) -> tuple[Space, list[Problem]]:
+def space_of(room: DrawnRoom) -> tuple[Space, list[Issue]]:
     """The room with its faces and windows, and what had to be changed.
 
     Raises: `RoomError` where its polygons enclose nothing.
     """
-    problems: list[Problem] = []
-    parts = [part for face in _joined_corners(room.faces) for part in _parts(face, problems)]
+    issues: list[Issue] = []
+    parts = [part for face in _joined_corners(room.faces) for part in _parts(face, issues)]
     if len(parts) < 4:
         raise RoomError(f"room {room.name}: {len(parts)} polygons enclose nothing")
-    meshes = _wound(room, conforming_triangles([part.facet for part in parts]), problems)
+    meshes = _wound(room, conforming_triangles([part.facet for part in parts]), issues)
     if not sum(map(len, meshes)):
         raise RoomError(f"room {room.name}: its polygons have no area")
     faces, windows = _faces_and_windows(parts, meshes)
@@ -141,7 +142,7 @@ def space_of(room: DrawnRoom) -> tuple[Space, list[Problem]]:
         room.guid, room.name, room.storey, volume, floor_area(faces), tuple(faces),
         tuple(windows), volume, room.stated_area, room.stated_volume, room.long_name,
     )  # fmt: skip
-    return space, [*problems, *_assumptions(space, room), *soundness_problems(space)]
+    return space, [*issues, *_assumptions(space, room), *soundness_issues(space)]
 
 
 def _joined_corners(faces: Sequence[DrawnFace]) -> list[DrawnFace]:
@@ -155,11 +156,11 @@ def _joined_corners(faces: Sequence[DrawnFace]) -> list[DrawnFace]:
     return [replace(face, rings=rings) for face, rings in zip(faces, moved, strict=True)]
 
 
-def _parts(face: DrawnFace, problems: list[Problem]) -> list[_Part]:
+def _parts(face: DrawnFace, issues: list[Issue]) -> list[_Part]:
     """The face's polygons without its openings, then these."""
     vector = newell_normal(face.rings[0])
     if not np.linalg.norm(vector) > 0:
-        problems.append(Problem(face.guid, f"{face.name}: has no area", "left out"))
+        issues.append(Issue("face-without-area", face.guid, {"element": face.name}))
         return []
     plane = plane_through(face.rings[0].mean(axis=0), vector)
     flat = [plane.to_plane(ring) for ring in face.rings]
@@ -174,21 +175,21 @@ def _parts(face: DrawnFace, problems: list[Problem]) -> list[_Part]:
         near = np.abs(own[:, 2]).max() < OFF_THE_WALL
         polygons = polygons_of(inside) if near else []
         if not polygons:
-            problems.append(_lost(opening, face))
+            issues.append(_lost(opening, face))
             continue
         beside = outline.area - inside.area
         if beside > MOST_OUTSIDE * outline.area:
-            what = f"{opening.name}: {beside:.2f} m2 of it lie beside {face.name} or on another"
-            problems.append(Problem(opening.guid, what, "cut off"))
+            values = {"element": opening.name, "area": beside, "face": face.name}
+            issues.append(Issue("opening-beside-face", opening.guid, values))
         rest = shapely.difference(rest, shapely.union_all(polygons))
         cut += [_Part(Facet(plane, polygon), face, opening) for polygon in polygons]
     return [*(_Part(Facet(plane, polygon), face) for polygon in polygons_of(rest)), *cut]
 
 
-def _lost(opening: DrawnOpening, face: DrawnFace) -> Problem:
-    what = f"{opening.name}: does not lie in {face.name}, which it belongs to"
-    is_glass = opening.glazing is not None
-    return Problem(opening.guid, what, "left out", "window" * is_glass, opening.area * is_glass)
+def _lost(opening: DrawnOpening, face: DrawnFace) -> Issue:
+    values = {"element": opening.name, "face": face.name}
+    effect = Effect() if opening.glazing is None else Effect("window", opening.area)
+    return Issue("opening-not-in-face", opening.guid, values, effect)
 
 
 def flat_polygon(rings: Iterable[NDArray[np.float64]]) -> shapely.Geometry:
@@ -226,7 +227,7 @@ def _bent(
 
 
 def _wound(
-    room: DrawnRoom, meshes: list[NDArray[np.float64]], problems: list[Problem]
+    room: DrawnRoom, meshes: list[NDArray[np.float64]], issues: list[Issue]
 ) -> list[NDArray[np.float64]]:
     """The parts' triangles with their normals out of the room."""
     shell = np.concatenate(meshes)
@@ -238,8 +239,8 @@ def _wound(
         flips = [bool(part.sum() * 2 > len(part)) for part in np.split(turned, ends)]
         again = [m[:, ::-1] if flip else m for m, flip in zip(meshes, flips, strict=True)]
         if open_edges(np.concatenate(again)) < open_edges(shell):
-            what = f"room {room.name}: {sum(flips)} polygon(s) are drawn inside out"
-            problems.append(Problem(room.guid, what, "turned"))
+            values = {"room": room.name, "count": sum(flips)}
+            issues.append(Issue("polygons-inside-out", room.guid, values))
             meshes = again
     if len(shell) and enclosed_volume(np.concatenate(meshes)) < 0:
         meshes = [mesh[:, ::-1] for mesh in meshes]
@@ -307,26 +308,22 @@ def _window(parts: Sequence[tuple[_Part, NDArray[np.float64]]]) -> Window:
     )  # fmt: skip
 
 
-def _assumptions(space: Space, room: DrawnRoom) -> list[Problem]:
+def _assumptions(space: Space, room: DrawnRoom) -> list[Issue]:
     """How many polygons of a room say nothing of their reflectance or construction."""
     opaque = [
         one.finish
         for face in room.faces
         for one in (face, *(o for o in face.openings if o.glazing is None))
     ]
-    texts = (
-        ("visible", "reflectance", "default reflectance of floor, wall, ceiling"),
-        ("construction", "construction", "default construction"),
-    )
-    found = []
-    for field, what, done in texts:
+    codes = {"visible": "reflectance-assumed", "construction": "construction-assumed"}
+    issues = []
+    for field, code in codes.items():
         count = sum(getattr(finish, field) is None for finish in opaque)
         if count:
-            text = f"room {space.label}: {count} face(s) without a {what}"
-            found.append(Problem(space.guid, text, done))
+            issues.append(Issue(code, space.guid, {"room": space.label, "count": count}))
     open_to = [face for face in room.faces if face.is_open]
     if open_to:
         area = sum(float(np.linalg.norm(newell_normal(face.rings[0]))) for face in open_to)
-        what = f"room {space.label}: {area:.1f} m2 of its boundary are open to another room"
-        found.append(Problem(space.guid, what, "taken as walls; --join makes the rooms one"))
-    return found
+        values = {"room": space.label, "area": area}
+        issues.append(Issue("room-boundary-open", space.guid, values))
+    return issues

@@ -32,7 +32,7 @@ Body = NDArray[np.float64]  # [N, 3, 3] triangles [m]
 
 
 def raised_body(rooms: Sequence[Body], lids: Sequence[Body], tell: Told) -> Body | str:
-    """The room with the air above its top, up to what covers it; else why it stays as it is.
+    """The room with the air above its top, up to what covers it; else a phrase that says why not.
 
     Args:
         rooms: the room, then the other rooms of the building.
@@ -41,19 +41,19 @@ def raised_body(rooms: Sequence[Body], lids: Sequence[Body], tell: Told) -> Body
     """
     own, *others = (_solid(body) for body in rooms)
     if own is None:
-        return "its body is no closed solid"
+        return "body-not-closed"
     room = room_solid("", "", own)
     top, outline = level_top(room)
     if outline.is_empty:
-        return "its top is not level"
+        return "top-not-level"
     over = [lid for lid in map(_solid, lids) if lid is not None and _is_over(lid, top, outline)]
     if not over:
-        return "nothing covers it"
+        return "not-covered"
     plane = plane_through(np.array([0.0, 0.0, top]), np.array([0.0, 0.0, 1.0]))
     highest = max(lid.bounding_box()[5] for lid in over)
     column = prism(outline, plane, OVERLAP, highest - top)
     if column is None:
-        return "its top has no area"
+        return "top-without-area"
     beside = [other for other in others if other is not None and _is_over(other, top, outline)]
     for piece in (column - union([*over, *beside])).decompose():
         if _is_open_to(piece, top) and _is_covered(piece, lids, top):
@@ -61,7 +61,7 @@ def raised_body(rooms: Sequence[Body], lids: Sequence[Body], tell: Told) -> Body
             join = manifold3d.Manifold.extrude(piece.slice(top + 1.5 * OVERLAP), 3 * OVERLAP)
             whole = union([own, join.translate((0.0, 0.0, top - OVERLAP)), piece])
             return triangles_of(whole.simplify(FINEST).as_original())[0]
-    return "no roof or ceiling closes the air above it, or its ceiling is drawn"
+    return "no-ceiling-above"
 
 
 def level_top(room: RoomSolid) -> tuple[float, shapely.Geometry]:

@@ -11,8 +11,8 @@ import shapely
 from numpy.typing import NDArray
 
 from bim.apertures import Aperture
-from bim.model import Problem
 from bim.planes import GRID, Facet, Plane, planar_facets, polygons_of, without_slits
+from bim.report.issue import Issue
 from bim.solids import prism, triangles_of, union
 
 REACH = 1.0  # a room's face this far inside the glazing plane still belongs to the window [m]
@@ -165,14 +165,14 @@ def _seen_from(aperture: Aperture, facet: Facet) -> tuple[float, float, shapely.
 
 def room_pieces(
     room: RoomSolid, attachments: Sequence[Attachment]
-) -> tuple[list[Piece], float, list[Problem]]:
+) -> tuple[list[Piece], float, list[Issue]]:
     """Pieces that close the room's air, its volume [m3], and what had to be changed.
 
     A slit as thin as rounding in a region, as faces leave it that meet behind one window, is
     closed: the union of solids has lost the half of the glass beside one.
     """
     attachments = [replace(a, region=without_slits(a.region, SLIT)) for a in attachments]
-    problems: list[Problem] = []
+    issues: list[Issue] = []
     recesses: dict[int, Attachment] = {}
     painted: list[Attachment] = []
     solids = [room.manifold]
@@ -180,8 +180,9 @@ def room_pieces(
         filling = attachment.aperture.filling
         exterior_glass = attachment.neighbour is None and not attachment.glass.is_empty
         if attachment.nearest > FLUSH and exterior_glass:
-            what = f"{filling.name}: {attachment.nearest * 1000:.0f} mm inside room {room.name}"
-            problems.append(Problem(filling.guid, what, "glass moved to the room's face"))
+            depth = 1000 * attachment.nearest
+            values = {"element": filling.name, "depth_mm": depth, "room": room.name}
+            issues.append(Issue("glass-inside-room", filling.guid, values))
         recess = None
         if exterior_glass and attachment.recessed:
             bottom = attachment.deepest - OVERLAP
@@ -202,7 +203,7 @@ def room_pieces(
             pieces += _cap(facet, attachment)
         else:
             pieces.append(Piece(facet, "reveal", attachment))
-    return pieces, air.volume(), problems
+    return pieces, air.volume(), issues
 
 
 def _is_cap(facet: Facet, attachment: Attachment) -> bool:

@@ -36,21 +36,21 @@ def solid_of(triangles: NDArray[np.float64]) -> Solid | None:
     """
     if len(triangles) < 4:
         return None
-    for repair in ("", "welded", "faces turned", "holes capped"):
+    for repair in ("", "welded", "faces-turned", "holes-capped"):
         for distance in WELD_STEPS if repair else WELD_STEPS[:1]:
             vertices, faces = welded_mesh(triangles, distance)
             if len(faces) < 4:
                 continue
-            if repair in ("faces turned", "holes capped"):
+            if repair in ("faces-turned", "holes-capped"):
                 faces = wound_alike(vertices, faces)
-            if repair == "holes capped":
+            if repair == "holes-capped":
                 faces = wound_alike(vertices, capped(vertices, faces))
             manifold = _manifold(vertices, faces)
             if manifold is None:
                 continue
             if manifold.volume() < 0:
                 manifold = _manifold(vertices, faces[:, ::-1])
-                repair = repair or "turned inside out"
+                repair = repair or "turned-inside-out"
             if manifold is not None and manifold.volume() > SMALLEST_VOLUME:
                 return Solid(manifold, repair)
     return None

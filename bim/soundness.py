@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from bim.model import Problem, Space
+from bim.model import Space
 from bim.planes import SMALLEST_AREA
+from bim.report.issue import Issue
 from bim.shell import enclosed_volume, open_edges
 
 AGREES = 0.02  # drawn and stated quantities may differ by this share before it is reported
@@ -14,31 +15,28 @@ def agree(drawn: float, stated: float) -> bool:
     return abs(drawn - stated) <= AGREES * stated
 
 
-def soundness_problems(space: Space) -> list[Problem]:
-    """Problems of the finished shell: open edges, a volume that its faces do not enclose."""
-    problems = []
+def soundness_issues(space: Space) -> list[Issue]:
+    """Issues of the finished shell: open edges, a volume that its faces do not enclose."""
+    issues = []
     leaks = open_edges(space.shell)
     if leaks:
-        what = f"room {space.label}: {leaks} open edges are left"
-        problems.append(Problem(space.guid, what, "light may leak there"))
+        values = {"room": space.label, "count": leaks}
+        issues.append(Issue("room-with-open-edges", space.guid, values))
     enclosed = enclosed_volume(space.shell)
     if space.area_to_middles is not None:
-        what = (
-            f"room {space.label}: states {space.stated_area:.2f} m2 floor area, which is that to"
-            f" the middle of its walls ({space.area_to_middles:.2f} m2 drawn)"
-        )
-        done = f"the {space.floor_area:.2f} m2 between the walls are used"
-        problems.append(Problem(space.guid, what, done))
-    for what, stated, drawn, unit in (
-        ("floor area", space.stated_area, space.area_as_stated, "m2"),
-        ("volume", space.stated_volume, space.drawn_volume, "m3"),
+        values = {
+            "room": space.label, "stated": space.stated_area, "drawn": space.area_to_middles,
+            "used": space.floor_area,
+        }  # fmt: skip
+        issues.append(Issue("area-to-wall-middles", space.guid, values))
+    for code, stated, drawn in (
+        ("floor-area-differs", space.stated_area, space.area_as_stated),
+        ("volume-differs", space.stated_volume, space.drawn_volume),
     ):
         if stated is not None and not agree(drawn, stated):
-            text = (
-                f"room {space.label}: states {stated:.2f} {unit} {what}, drawn {drawn:.2f} {unit}"
-            )
-            problems.append(Problem(space.guid, text, "the drawn one is used"))
+            values = {"room": space.label, "stated": stated, "drawn": drawn}
+            issues.append(Issue(code, space.guid, values))
     if abs(enclosed - space.volume) > 1e-3 * space.volume + SMALLEST_AREA:
-        what = f"room {space.label}: faces enclose {enclosed:.3f} m3 of {space.volume:.3f} m3"
-        problems.append(Problem(space.guid, what, "its boundary is not sound"))
-    return problems
+        values = {"room": space.label, "enclosed": enclosed, "volume": space.volume}
+        issues.append(Issue("room-not-sound", space.guid, values))
+    return issues

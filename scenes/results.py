@@ -1,4 +1,4 @@
-"""What a run yields for each room: arrays and tables, before any file or figure is made."""
+"""Results of each room: arrays and tables, before files and figures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.picture_year.year import PictureYear
@@ -23,13 +24,13 @@ class LuminancePicture:
     luminance: NDArray[np.float32]  # [ny, nx] [cd/m2]
     # dgp, dgp_standard_error, ev [lx], dgi, ugr, vcp, cgi, sources (a count)
     glare: dict[str, float]
-    # [n, ny, nx] boolean masks are big: the pixels of all glare sources together
+    # the pixels of all glare sources; [n, ny, nx] masks of each would be large
     source_mask: NDArray[np.bool_] | None = None  # [ny, nx]
 
 
 @dataclass(frozen=True, slots=True)
 class ColourPicture:
-    """One of the luminance pictures in its colours."""
+    """One of the luminance pictures in colour."""
 
     hour: int  # index into the times of the result
     radiance: NDArray[np.float32]  # [ny, nx, 3] linear sRGB [W/m2/sr]
@@ -37,24 +38,24 @@ class ColourPicture:
 
 @dataclass(frozen=True, slots=True)
 class GridDaylight:
-    """Daylight of a sensor grid that the building's file holds."""
+    """Daylight of a sensor grid of the building's file."""
 
     name: str
     directions: NDArray[np.float64]  # [S, 3] of its sensors
-    sensor_metrics: pd.DataFrame  # as of `DaylightResult`, with relative_standard_error
+    sensor_metrics: pd.DataFrame  # columns of `DaylightResult`, and relative_standard_error
     metrics: dict[str, float]  # of the grid, by the names of a room's
 
 
 @dataclass(frozen=True, slots=True)
 class DaylightResult:
-    """Work-plane illuminance of a year and the metrics drawn from it."""
+    """Work-plane illuminance of a year and its metrics."""
 
     points: NDArray[np.float64]  # [S, 3] sensors [m]
     illuminance: NDArray[np.float32]  # [H, S] [lx]
     relative_error: NDArray[np.float64]  # [S] standard error of the annual mean, from the tracing
     sensor_metrics: pd.DataFrame  # by sensor: x, y, z, da300, cda300, udi..., daylight_factor
     room_metrics: dict[str, float]  # sda, ase, en17037..., by name; percentages as 0..100
-    grids: tuple[GridDaylight, ...] = ()  # of the building's file, beside the work plane
+    grids: tuple[GridDaylight, ...] = ()  # of the building's file, besides the work plane
 
     @property
     def sda(self) -> float:
@@ -68,7 +69,7 @@ class DaylightResult:
 
     @property
     def ase(self) -> float | None:
-        """Annual sunlight exposure ASE1000/250h (LM-83) [%]; None where the sun is not apart."""
+        """Annual sunlight exposure ASE1000/250h (LM-83) [%]; None with the three-phase method."""
         share = self.room_metrics.get("ase1000_250")
         return None if share is None else float(share)
 
@@ -79,14 +80,14 @@ class GlareResults:
 
     view: View
     pictures: tuple[LuminancePicture, ...]
-    rule: str = ""  # what their glare sources are
-    colour: ColourPicture | None = None  # of the hour with most light at the eye, where asked for
+    rule: str = ""  # for recognising glare sources
+    colour: ColourPicture | None = None  # of the hour with the most light at the eye
 
     @property
     def worst(self) -> float:
         """The highest DGP of the pictures.
 
-        Raises: `ValueError` where none was made.
+        Raises: `ValueError` without pictures.
         """
         if not self.pictures:
             raise ValueError("no picture was made, so none is the worst")
@@ -101,7 +102,7 @@ class ThermalResult:
     gains: pd.DataFrame  # [H] index time: incident_w, transmitted_w, absorbed_outer_w, ...
     comfort: pd.DataFrame  # [H] index time: occupied, comfort_c, within_80, within_90, ... (bool)
     comfort_summary: dict[str, float]  # by name; percentages as 0..100
-    # one entry a system: its name; u_value, g_value, transmittances, ... at normal incidence
+    # by system: name; u_value, g_value, transmittances, ... at normal incidence
     fenestration: tuple[dict[str, float | str], ...]
 
     @property
@@ -122,17 +123,17 @@ class ThermalResult:
 
 @dataclass(frozen=True, slots=True)
 class OperationResult:
-    """What a room's operation did: shading, heating, cooling, lamps."""
+    """Shading states, heating, cooling and lamps of an operated room."""
 
     states: tuple[str, ...]  # names of the shading states, from open to closed
     hours: pd.DataFrame  # [H] index time: shading_state, heating_w, cooling_w, lighting_w
     summary: dict[str, float]  # heating_kwh, cooling_kwh, lighting_kwh, peaks
-    rule: str  # of the shading control, in words
+    rule: str  # of the shading control
 
 
 @dataclass(frozen=True, slots=True)
 class ExploredRoom:
-    """A room in every hour and every shading state, for the explorer."""
+    """A room in every lit hour and every shading state, for the explorer."""
 
     states: tuple[str, ...]  # [J] names, from open to closed
     operated: NDArray[np.int64]  # [H] state of each hour of the year
@@ -154,20 +155,19 @@ class RoomYear:
     glare: GlareResults
     heat: ThermalResult
     seconds: dict[str, float]  # by stage
-    operation: OperationResult | None = None  # None: one state all year, floating freely
+    operation: OperationResult | None = None  # None: first shading state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
-    dgp: AnnualGlare | None = None  # [n] by the metric and in the hours asked for
-    problems: tuple[Problem, ...] = ()  # that tracing found
-    explored: ExploredRoom | None = None  # where the explorer was asked for
-    template: str = ""  # name of the equal room that was computed; "": this one
-    borrowed: str = ""  # how much of its daylight comes through glass of other rooms; "": none does
+    dgp: AnnualGlare | None = None  # [n] by the metric and in the hours of `rate`
+    issues: tuple[Issue, ...] = ()  # of the traced model
+    explored: ExploredRoom | None = None  # for the explorer
+    template: str = ""  # name of the equal room that was computed; "": this room
+    borrowed: str = ""  # note on the daylight through inner glass; "": none
 
     @property
     def hours(self) -> pd.DataFrame:
         """Every hour [H]: mean illuminance [lx], temperatures [degC], gains [W], comfort.
 
-        Shading state and loads are with them where the room is operated, glare where every hour
-        was rated.
+        With an operation also shading state and loads, with annual glare also the ratings.
         """
         heat = self.heat
         mean = self.daylight.illuminance.mean(axis=1, dtype=float)
@@ -182,13 +182,13 @@ class RoomYear:
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """A run: the building, its rooms, and how it was made."""
+    """A run: the building, the years of its rooms, notes and manifest."""
 
     building: Building
     times: pd.DatetimeIndex  # [H] middle of each interval, local standard time
     sun: NDArray[np.float64]  # [H, 3] direction to the sun
     spaces: Sequence[RoomYear]
-    problems: tuple[Problem, ...]
-    manifest: dict  # what run.json holds: inputs with hashes, options, versions, seed, timings
-    notes: tuple[str, ...] = field(default=())  # plain sentences the reader must know
+    issues: tuple[Issue, ...]
+    manifest: dict  # of run.json: inputs with hashes, options, versions, seed, timings
+    notes: tuple[str, ...] = field(default=())  # sentences for the head of the results
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS

@@ -13,7 +13,7 @@ from bim.polygon_rooms import triangles_of_rings
 TERRAINS = ("TINRelief", "Road", "LandUse", "WaterBody", "Railway", "TransportSquare", "Square",
             "PlantCover")  # fmt: skip
 FINEST = 3.0  # level of detail below which geometry is taken: 2.2 is, 3 (with openings) is not
-NO_GEOMETRY = "object(s) without geometry below LoD 3"
+NO_GEOMETRY = "objects-without-geometry"  # code of the issue
 
 
 def city_object(name: str, kind: str, triangles: NDArray[np.float64]) -> ContextObject:

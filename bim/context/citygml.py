@@ -28,7 +28,7 @@ POLYGONS = ("Polygon", "PolygonPatch", "Triangle", "Rectangle")
 KINDS = ("Solid", "MultiSurface", "Surface", "Geometry", "RoofEdge", "FootPrint")
 NAMED = re.compile(rf"lod(\d)({'|'.join(KINDS)})")
 BOUNDARY = re.compile(r"\w+Surface|(?:Auxiliary)?TrafficArea")  # parts of an object's hull
-NOT_FOUND = "surface(s) that an xlink names outside of their object"
+NOT_FOUND = "surfaces-not-in-object"  # code of the issue
 
 Element = ElementTree.Element
 Rings = list[NDArray[np.float64]]

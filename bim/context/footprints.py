@@ -48,7 +48,7 @@ def read_footprints(path: Path) -> ContextFile:
     if not objects:
         message = f"no polygon states a height ({', '.join(HEIGHTS[:3])}, or {LEVELS[0]})"
         raise DataError(message, file=path, field="properties")
-    left_out = (("feature(s) without a polygon or a height", without),) if without else ()
+    left_out = (("features-without-height", without),) if without else ()
     return ContextFile(path, tuple(objects), crs, True, left_out)
 
 

@@ -37,7 +37,7 @@ class ContextFile:
     objects: tuple[ContextObject, ...]
     crs: str | None = None  # None: a local system in metres
     from_ground: bool = False  # heights start at the ground, not at the sea
-    left_out: tuple[tuple[str, int], ...] = ()  # what, and how many of it
+    left_out: tuple[tuple[str, int], ...] = ()  # codes of issues, and how many there are of each
     on_own_map: bool = False  # that of the building, which the file does not name
     crowns: tuple[tuple[str, Foliage], ...] = ()  # objects of other files that are crowns
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from calendar import month_name
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -27,8 +26,9 @@ from bim.context.terrain import graded, read_terrain
 from bim.context.trees import monthly_transmittance, read_trees
 from bim.defaults import FACADE_REFLECTANCE, SITE_REFLECTANCE
 from bim.georeference import LONGITUDE_LATITUDE, local_metres, transformed
-from bim.model import TREES, Building, Element, Problem
+from bim.model import Building, Element
 from bim.outdoors import lifted_sites, shut_in_area, unblinded
+from bim.report.issue import Issue, Phrase
 from mitsuba_cfs.errors import DataError
 
 READ = (*SUFFIXES, ".city.json", *CITYGML, ".geojson", ".json", ".csv", ".toml", *GRIDS)
@@ -65,13 +65,13 @@ def with_surroundings(
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
     elements: list[Element] = []
     trees: list[tuple[ContextObject, str]] = []  # each with its GUID
-    problems: list[Problem] = []
+    issues: list[Issue] = []
     named = _named_crowns([Path(file) for file in files])
     for file in map(Path, files):
         if _is_horizon(file):
             walls, radius = horizon_wall(read_horizon(file), centre, size)
-            what = f"horizon of {file.name}"
-            problems.append(Problem(file.name, what, f"a wall {radius:.0f} m away stands for it"))
+            values = {"file": file.name, "radius": radius}
+            issues.append(Issue("horizon-as-wall", file.name, values))
             elements.append(_element(ContextObject("horizon", walls), file, len(elements)))
             continue
         context = read_context(file)
@@ -83,22 +83,22 @@ def with_surroundings(
         trees += [(one, f"{file.stem}-tree-{n}") for n, one in enumerate(crowns)]
         placed = [one for one in placed if one.foliage is None]
         placed, more = _meshed(placed, centre, file)
-        problems += more
+        issues += more
         kept, more = _beside(placed, context, building, centre)
-        problems += more
+        issues += more
         kept, more = _as_seen(kept, centre, size, file)
-        problems += more
+        issues += more
         elements += [_element(one, file, len(elements) + n) for n, one in enumerate(kept)]
     windows = list(building.windows)
     free, more = lifted_sites(elements, windows)
     outdoors = unblinded([*building.elements, *free], building.spaces)
     leaves, told = _leaves(trees, building, centre, size)
-    problems += [*more, *outdoors.problems, *told]
-    found = tuple(dict.fromkeys((*building.problems, *problems)))
+    issues += [*more, *outdoors.issues, *told]
+    found = tuple(dict.fromkeys((*building.issues, *issues)))
     return replace(
         building,
         elements=(*outdoors.elements, *leaves),
-        problems=found,
+        issues=found,
         account=building.account and replace(building.account, shut_in=shut_in_area(found)),
     )
 
@@ -121,7 +121,7 @@ def read_context(path: Path) -> ContextFile:
         return read_trees(path)
     if ending in GRIDS:
         return read_terrain(path)
-    raise DataError(f"expected a file of {', '.join(READ)}", file=path, field="--surroundings")
+    raise DataError(f"expected a file of {', '.join(READ)}", file=path, field="surroundings")
 
 
 def _named_crowns(files: Sequence[Path]) -> dict[str, Foliage]:
@@ -135,7 +135,7 @@ def _named_crowns(files: Sequence[Path]) -> dict[str, Foliage]:
         known = {one.name for file in bodies for one in read_context(file).objects}
         missing = next((name for name in found if name not in known), None)
         if missing is not None:
-            message = f"{missing!r} is no object of the other files of --surroundings"
+            message = f"{missing!r} is no object of the other files of surroundings"
             raise DataError(message, file=lists[0], field="object")
     return found
 
@@ -145,7 +145,7 @@ def _leaves(
     building: Building,
     centre: NDArray[np.float64],
     size: float,
-) -> tuple[list[Element], list[Problem]]:
+) -> tuple[list[Element], list[Issue]]:
     """The leaves of crowns, and what is to be said of them at the head of every result."""
     elements: list[Element] = []
     stated: list[tuple[float, ...]] = []
@@ -159,27 +159,29 @@ def _leaves(
         shares = monthly_transmittance(one.foliage or (), building.latitude_deg)
         elements += crown_elements(one, shares, guid, max(gap, 0.0))
         stated.append(shares)
-    problems = []
+    issues = []
     if far:
-        what = f"{far} tree(s) further than {FARTHEST / 1000:.0f} km"
-        problems.append(Problem(trees[0][0].name, what, "left out: is the file placed rightly?"))
+        values = {"count": far, "limit_km": FARTHEST / 1000}
+        issues.append(Issue("trees-far-away", trees[0][0].name, values))
     for shares in dict.fromkeys(stated):
-        what = f"{stated.count(shares)} tree(s) outdoors"
-        done = f"of the sun {_by_month(shares)} passes their crowns, traced by month as leaves"
-        problems.append(Problem(trees[0][0].name, what, done, kind=TREES))
-    return elements, problems
+        values = {"count": stated.count(shares), "shares": _by_month(shares)}
+        issues.append(Issue("trees-by-month", trees[0][0].name, values))
+    return elements, issues
 
 
-def _by_month(shares: Sequence[float]) -> str:
-    """Transmittances of the months [12] in words: 3 % from May to October, 46 % from ..."""
+def _by_month(shares: Sequence[float]) -> tuple[Phrase, ...]:
+    """Transmittances of the months [12] as phrases: 3 % from May to October, 46 % from ..."""
     if len(set(shares)) == 1:
-        return f"{100 * shares[0]:.0f} %"
+        return (Phrase("share-all-year", {"percent": 100 * shares[0]}),)
     starts = [month for month in range(12) if shares[month] != shares[month - 1]]
     ends = [(month - 1) % 12 for month in (*starts[1:], starts[0])]
-    return ", ".join(
-        f"{100 * shares[first]:.0f} % from {month_name[first + 1]} to {month_name[last + 1]}"
+    return tuple(
+        Phrase("share-of-months", {
+            "percent": 100 * shares[first],
+            "first": Phrase(f"month-{first + 1}"), "last": Phrase(f"month-{last + 1}"),
+        })
         for first, last in zip(starts, ends, strict=True)
-    )
+    )  # fmt: skip
 
 
 def _is_horizon(path: Path) -> bool:
@@ -197,11 +199,11 @@ def _placed(
         moved = np.asarray(offset, dtype=float)
         return [_each(one, lambda points: points + moved) for one in context.objects]
     if context.on_own_map and building.georeference is None:
-        message = "lies on a map, and the building has none: give --surroundings-offset"
+        message = "lies on a map, and the building has none: give the offset of the surroundings"
         raise DataError(message, file=context.path)
     own = building.georeference.crs if building.georeference is not None else None
     if context.crs not in (None, own) and not re.fullmatch(r"[A-Za-z]+:\w+", context.crs):
-        message = f"{context.crs[:80]!r} is no EPSG code: give --surroundings-offset"
+        message = f"{context.crs[:80]!r} is no EPSG code: give the offset of the surroundings"
         raise DataError(message, file=context.path, field="coordinate system")
     if context.crs is None and not context.on_own_map:
         return list(context.objects)
@@ -225,20 +227,20 @@ def _each(
 
 def _meshed(
     objects: Sequence[ContextObject], centre: NDArray[np.float64], file: Path
-) -> tuple[list[ContextObject], list[Problem]]:
+) -> tuple[list[ContextObject], list[Issue]]:
     """Grids as triangles, the further the coarser."""
-    found, problems = [], []
+    found, issues = [], []
     for one in objects:
         if one.nodes is not None:
             triangles, worst = graded(one.nodes, centre, TERRAIN_DEG)
             count = int(np.isfinite(one.nodes[..., 2]).sum())
             one = replace(one, triangles=triangles, nodes=None)
-            done = f"{len(triangles)} triangles, heights moved by {worst:.2f} degrees at the most"
-            problems.append(Problem(file.name, f"{count} heights", f"{done} as seen from here"))
+            values = {"count": count, "after": len(triangles), "moved_deg": worst}
+            issues.append(Issue("terrain-simplified", file.name, values))
             if not len(triangles):
                 continue
         found.append(one)
-    return found, problems
+    return found, issues
 
 
 def _to_world(
@@ -255,7 +257,7 @@ def _to_world(
     if building.latitude_deg is None or building.longitude_deg is None:
         message = (
             f"lies on the map {context.crs}, and the building has neither a map conversion nor"
-            " latitude and longitude: give --surroundings-offset"
+            " latitude and longitude: give the offset of the surroundings"
         )
         raise DataError(message, file=context.path)
     degrees = transformed(points[:, :2], context.crs, LONGITUDE_LATITUDE, file=file)
@@ -269,7 +271,7 @@ def _beside(
     context: ContextFile,
     building: Building,
     centre: NDArray[np.float64],
-) -> tuple[list[ContextObject], list[Problem]]:
+) -> tuple[list[ContextObject], list[Issue]]:
     """The objects that are not the building itself and not beyond all sight."""
     rooms = [
         (shapely.MultiPoint(s.shell.reshape(-1, 3)[:, :2]).convex_hull, s.shell.reshape(-1, 3))
@@ -284,17 +286,14 @@ def _beside(
             own.append(one.name)
         else:
             kept.append(one)
-    problems = [
-        Problem(context.path.name, f"{count} {what}", "left out")
-        for what, count in context.left_out
-    ]
+    issues = [Issue(code, context.path.name, {"count": count}) for code, count in context.left_out]
     if own:
-        what = f"{', '.join(own[:3])}: {len(own)} object(s) where rooms of the building are"
-        problems.append(Problem(context.path.name, what, "left out as the building itself"))
+        values = {"count": len(own), "objects": tuple(own)}
+        issues.append(Issue("objects-of-building", context.path.name, values))
     if far:
-        what = f"{far} object(s) further than {FARTHEST / 1000:.0f} km"
-        problems.append(Problem(context.path.name, what, "left out: is the file placed rightly?"))
-    return kept, problems
+        values = {"count": far, "limit_km": FARTHEST / 1000}
+        issues.append(Issue("objects-far-away", context.path.name, values))
+    return kept, issues
 
 
 def _is_building_itself(
@@ -315,7 +314,7 @@ def _is_building_itself(
 
 def _as_seen(
     objects: Sequence[ContextObject], centre: NDArray[np.float64], size: float, file: Path
-) -> tuple[list[ContextObject], list[Problem]]:
+) -> tuple[list[ContextObject], list[Issue]]:
     """Objects of many triangles with corners merged as far as it cannot be seen."""
     kept, before, after, worst = [], 0, 0, 0.0
     for one in objects:
@@ -332,9 +331,8 @@ def _as_seen(
         kept.append(one)
     if not before:
         return kept, []
-    what = f"{before} triangles of far objects"
-    done = f"{after} are traced, corners moved by {worst:.2f} degrees or less as seen from here"
-    return kept, [Problem(file.name, what, done)]
+    values = {"before": before, "after": after, "moved_deg": worst}
+    return kept, [Issue("far-objects-simplified", file.name, values)]
 
 
 def _element(one: ContextObject, file: Path, number: int) -> Element:

@@ -21,9 +21,11 @@ from bim.drawn_building import DrawnModel, drawn_building
 from bim.gbxml.constructions import Constructions
 from bim.gbxml.document import Document, read_document
 from bim.gbxml.use import UseReader
-from bim.model import Building, Element, Problem
+from bim.model import Building, Element
 from bim.planes import newell_normal
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, triangles_of_rings
+from bim.report.issue import Effect, Issue
+from mitsuba_cfs.surfaces import triangle_areas
 
 KINDS = {  # of a surface: kind of the face of its first room, and what lies beyond with one room
     "InteriorWall": ("wall", "adiabatic"),
@@ -59,7 +61,7 @@ def read_gbxml(
         furniture: not in gbXML.
 
     Raises: `DataError` that names file, element and field; what the model lacks is in the
-        building's `problems`.
+        building's `issues`.
     """
     path = Path(path)
     document = read_document(path)
@@ -67,7 +69,7 @@ def read_gbxml(
     reader = UseReader(document)
     uses = {space.guid: reader.use(space) for space in building.spaces}
     known = {guid: use for guid, use in uses.items() if use is not None}
-    return replace(building, uses=known, problems=(*building.problems, *reader.problems))
+    return replace(building, uses=known, issues=(*building.issues, *reader.issues))
 
 
 class _Reader:
@@ -76,7 +78,7 @@ class _Reader:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.constructions = Constructions(document)
-        self.problems: list[Problem] = []
+        self.issues: list[Issue] = []
         self.level: Counter[str] = Counter()  # surfaces that lie level, by the type of wall named
         self.turn = self._turn()
 
@@ -98,14 +100,15 @@ class _Reader:
             elif kind not in KINDS:
                 unplaced[kind] += 1
             else:
+                self._note_inner_glass(surface, beside)
                 for number, guid in enumerate(beside):
                     faces[guid].append(self._face(surface, ring @ self.turn.T, beside, number))
-        self.problems += [
-            Problem(document.file.name, f"{n} surface(s) of type {k!r:.40}", "left out")
+        self.issues += [
+            Issue("surfaces-of-unknown-type", document.file.name, {"count": n, "type": k[:40]})
             for k, n in unplaced.items()
         ]
-        self.problems += [
-            Problem(document.file.name, f"{n} surface(s) of type {k} lie level", "no walls")
+        self.issues += [
+            Issue("walls-level", document.file.name, {"count": n, "type": k})
             for k, n in self.level.items()
         ]
         storeys = {
@@ -120,7 +123,7 @@ class _Reader:
         name = "" if campus is None else _name(campus)
         return DrawnModel(
             document.file, name or document.file.stem, rooms, tuple(elements),
-            problems=(*self.problems, *self.constructions.problems),
+            issues=(*self.issues, *self.constructions.issues),
             latitude_deg=self._location("Latitude", 90.0),
             longitude_deg=self._location("Longitude", 180.0),
             elevation=(self._location("Elevation", 1e5) or 0.0) * document.length,
@@ -137,9 +140,8 @@ class _Reader:
         azimuth = self._location("CADModelAzimuth", 360.0)
         if not azimuth:
             return np.eye(3)
-        what = f"CADModelAzimuth {azimuth:g}"
-        done = f"the model's y axis is turned {azimuth:g} degrees from north to east"
-        self.problems.append(Problem(self.document.file.name, what, done))
+        values = {"azimuth": azimuth}
+        self.issues.append(Issue("model-turned", self.document.file.name, values))
         c, s = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -152,6 +154,21 @@ class _Reader:
             if name not in spaces:
                 raise self.document.fault(f"no Space {name!r:.60}", surface, "AdjacentSpaceId")
         return list(dict.fromkeys(named))[:2]
+
+    def _note_inner_glass(self, surface: ElementTree.Element, beside: Sequence[str]) -> None:
+        """Report the glass of a surface that has the same room on both sides: it lights nothing."""
+        if len(beside) == 2 or KINDS[surface.get("surfaceType", "")][1] == "outside":
+            return
+        for opening in surface.iterfind("Opening"):
+            ring = self.document.ring(opening)
+            if opening.get("openingType", "") in GLAZED and ring is not None:
+                area = float(triangle_areas(triangles_of_rings((ring,))).sum())
+                values = {"element": _name(opening), "surface": _name(surface)}
+                self.issues.append(
+                    Issue(
+                        "glass-within-room", opening.get("id", ""), values, Effect("window", area)
+                    )
+                )
 
     def _face(
         self,
@@ -189,8 +206,8 @@ class _Reader:
         kind = opening.get("openingType", "")
         if ring is None or kind == "Air":
             if not number:
-                what = f"{_name(opening)}: " + ("has no polygon" if ring is None else "is open air")
-                self.problems.append(Problem(guid, what, "closed"))
+                code = "opening-without-polygon" if ring is None else "opening-of-air"
+                self.issues.append(Issue(code, guid, {"element": _name(opening)}))
             return None
         guid = f"{guid}-2" if number else guid
         ring = ring @ self.turn.T
@@ -213,8 +230,8 @@ class _Reader:
         """Whether a space that no surface bounds is none: OpenStudio writes groups of shades so."""
         if any(space.find(field) is not None for field in ("Area", "Volume", "ShellGeometry")):
             return False
-        what = f"space {_name(space)}: no surface bounds it, and it states neither area nor volume"
-        self.problems.append(Problem(space.get("id", ""), what, "taken as no room"))
+        values = {"room": _name(space)}
+        self.issues.append(Issue("space-without-surfaces", space.get("id", ""), values))
         return True
 
     def _room(

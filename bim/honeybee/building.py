@@ -17,7 +17,7 @@ from bim.defaults import FACADE_REFLECTANCE
 from bim.drawn_building import DrawnModel, drawn_building
 from bim.fenestration import ShadingState
 from bim.honeybee.energy import EnergyLibrary, OpaqueValues
-from bim.honeybee.library import OUTDOORS, PARTS, listed
+from bim.honeybee.library import OUTDOORS, PARTS
 from bim.honeybee.radiance import ModifierLibrary
 from bim.honeybee.schema import (
     Condition,
@@ -30,9 +30,9 @@ from bim.honeybee.schema import (
     ShadeMesh,
     read_model,
 )
-from bim.honeybee.sensors import SensorReader, shade_problems
+from bim.honeybee.sensors import SensorReader, shade_issues
 from bim.honeybee.use import UseLibrary
-from bim.model import NOT_USED, Building, Element, Problem
+from bim.model import Building, Element
 from bim.planes import newell_normal
 from bim.polygon_rooms import (
     DrawnFace,
@@ -42,6 +42,7 @@ from bim.polygon_rooms import (
     SurfaceFinish,
     triangles_of_rings,
 )
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import pane_shares
 
@@ -62,7 +63,7 @@ def read_honeybee(
         furniture: whether indoor shades are in the rooms' light and views.
 
     Raises: `DataError` that names file, object and field; what the model lacks is in the
-        building's `problems`.
+        building's `issues`.
     """
     path = Path(path)
     model = read_model(path)
@@ -77,8 +78,8 @@ def _used(building: Building, model: HoneybeeModel, path: Path) -> Building:
     uses = {s.guid: library.use(rooms[s.guid], s) for s in building.spaces}
     known = {guid: use for guid, use in uses.items() if use is not None}
     grids, views = sensors.grids(), sensors.views()
-    problems = (*building.problems, *library.problems, *sensors.problems)
-    return replace(building, uses=known, grids=grids, views=views, problems=problems)
+    issues = (*building.issues, *library.issues, *sensors.issues)
+    return replace(building, uses=known, grids=grids, views=views, issues=issues)
 
 
 class _Reader:
@@ -88,7 +89,7 @@ class _Reader:
         self.model, self.path, self.scale = model, path, model.scale
         self.energy = EnergyLibrary(model.properties.energy, path)
         self.light = ModifierLibrary(model.properties.radiance, path)
-        self.problems: list[Problem] = []
+        self.issues: list[Issue] = []
         self.rooms = {room.identifier for room in model.rooms or ()}
         self.groups: dict[str, list[str]] = {}  # dynamic ones, with their apertures
 
@@ -107,21 +108,18 @@ class _Reader:
         furniture = {
             room.identifier: tuple(self._shades(_indoor(room), room)) for room in model.rooms or ()
         }
-        for kind in ("orphaned_apertures", "orphaned_doors"):
-            count = len(getattr(model, kind) or ())
+        for kind in ("apertures", "doors"):
+            count = len(getattr(model, f"orphaned_{kind}") or ())
             if count:
-                what = f"{count} {kind.replace('_', ' ')}, which belong to no room"
-                self.problems.append(Problem(self.path.name, what, "left out"))
-        many = [room.label for room in model.rooms or () if room.multiplier > 1]
+                issue = Issue(f"{kind}-without-room", self.path.name, {"count": count})
+                self.issues.append(issue)
+        many = tuple(room.label for room in model.rooms or () if room.multiplier > 1)
         if many:
-            what = f"multipliers of {', '.join(many[:4])}"
-            self.problems.append(
-                Problem(self.path.name, what, "each such room is counted once", kind=NOT_USED)
-            )
-        self.problems += shade_problems(model, self.path)
-        self._group_problems()
+            self.issues.append(Issue("room-multipliers", self.path.name, {"rooms": many}))
+        self.issues += shade_issues(model, self.path)
+        self._group_issues()
         return DrawnModel(
-            self.path, model.label, rooms, tuple(elements), furniture, tuple(self.problems)
+            self.path, model.label, rooms, tuple(elements), furniture, tuple(self.issues)
         )
 
     def _room(self, room: HoneybeeRoom) -> DrawnRoom:
@@ -153,8 +151,7 @@ class _Reader:
         others = [name for name in condition.boundary_condition_objects if name in self.rooms]
         if others:
             return adjacency, others[-1]
-        what = f"{face.label}: lies towards a room that is not in the file"
-        self.problems.append(Problem(face.identifier, what, "taken as adiabatic"))
+        self.issues.append(Issue("neighbour-missing", face.identifier, {"element": face.label}))
         return "adiabatic", None
 
     def _finish(
@@ -194,8 +191,8 @@ class _Reader:
         height = float(np.ptp(rings[0][:, 2])) or float(np.sqrt(_area(rings[0])))
         values = None if name is None else self.energy.window(name, height)
         if name is not None and self.energy.has_shade(name):
-            what = f"{one.label}: shades and states of construction {name} are not read"
-            self.problems.append(Problem(one.identifier, what, "its glazing without them"))
+            known = {"element": one.label, "construction": name}
+            self.issues.append(Issue("construction-shade-not-read", one.identifier, known))
         field = f"{fields}_modifier"
         modifier = self.light.objects.name(own.radiance, of_room.radiance, part, field)
         glazing = self._by_modifier(one, values or GlazingValues(name=name or ""), modifier)
@@ -212,8 +209,8 @@ class _Reader:
         if material is None or material.kind == "BSDF":
             return values
         if material.kind != "glass":
-            what = f"{one.label}: its modifier {modifier} is {material.kind}, not glass"
-            self.problems.append(Problem(one.identifier, what, "its construction's values hold"))
+            known = {"element": one.label, "modifier": modifier, "type": material.kind}
+            self.issues.append(Issue("modifier-not-glass", one.identifier, known))
             return values
         tau, _ = pane_shares(1.0, material.index, material.transmissivity)
         return GlazingValues(
@@ -242,20 +239,16 @@ class _Reader:
         if found and isinstance(group, str):
             self.groups.setdefault(group, []).append(one.label)
         if missing:
-            what = f"{one.label}: {missing} of its states are neither a BSDF nor a pane of glass"
-            self.problems.append(
-                Problem(one.identifier, what, "left out; --operation gives some", kind=NOT_USED)
-            )
+            known = {"element": one.label, "count": missing}
+            self.issues.append(Issue("states-not-optical", one.identifier, known))
         if any(state.get("shades") for state in held):
-            what = f"{one.label}: its states have shades of their own"
-            self.problems.append(Problem(one.identifier, what, "left out", kind=NOT_USED))
+            self.issues.append(Issue("states-with-shades", one.identifier, {"element": one.label}))
         return tuple(found) if found and found[0].name == "" else ()
 
-    def _group_problems(self) -> None:
+    def _group_issues(self) -> None:
         if len(self.groups) > 1:
-            what = f"{len(self.groups)} dynamic groups of apertures: {listed(list(self.groups))}"
-            done = "their states change together, by number"
-            self.problems.append(Problem(self.path.name, what, done, kind=NOT_USED))
+            known = {"count": len(self.groups), "groups": tuple(self.groups)}
+            self.issues.append(Issue("dynamic-groups", self.path.name, known))
 
     def _orphan(self, face: RoomFace, kind: str) -> Iterator[Element]:
         rings = face.geometry.rings(self.scale)
@@ -291,8 +284,8 @@ class _Reader:
         material = None if modifier is None else self.light.material(modifier)
         value, gloss = FACADE_REFLECTANCE, None
         if material is not None and material.kind in ("glass", "trans", "BSDF"):
-            what = f"{name}: lets light through ({material.name})"
-            self.problems.append(Problem(guid, what, "taken as opaque"))
+            known = {"element": name, "material": material.name}
+            self.issues.append(Issue("shade-taken-as-opaque", guid, known))
             value = material.diffuse
         elif material is not None:
             value, gloss = material.diffuse, material.gloss

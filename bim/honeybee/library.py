@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -80,9 +80,3 @@ class NamedObjects:
             if not isinstance(one, dict) or not isinstance(one.get("identifier"), str):
                 raise DataError("expected objects with an identifier", file=self.file, field=kind)
         return {one["identifier"]: one for one in listed}
-
-
-def listed(names: Sequence[str]) -> str:
-    """The first few names, and how many more there are."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more

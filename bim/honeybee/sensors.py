@@ -9,19 +9,18 @@ from typing import Any
 import numpy as np
 
 from bim.held_sensors import HeldGrid, HeldView
-from bim.honeybee.library import listed
 from bim.honeybee.schema import HoneybeeModel, Shade, ShadeMesh
-from bim.model import NOT_USED, Problem
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.view import KINDS, View
 
 
 class SensorReader:
-    """The grids and views of a model; what cannot be one is in the problems."""
+    """The grids and views of a model; what cannot be one is in the issues."""
 
     def __init__(self, model: HoneybeeModel, file: Path) -> None:
         self.radiance, self.scale, self.file = model.properties.radiance, model.scale, file
-        self.problems: list[Problem] = []
+        self.issues: list[Issue] = []
 
     def grids(self) -> tuple[HeldGrid, ...]:
         """The sensor grids [m].
@@ -44,30 +43,28 @@ class SensorReader:
         return tuple(found)
 
     def views(self) -> tuple[HeldView, ...]:
-        """The views [m] that can be made; the others are named in the problems."""
+        """The views [m] that can be made; the others are named in the issues."""
         found = []
         for view in _objects(self.radiance, "views"):
             name = str(view.get("display_name") or view["identifier"])
             made = view_of(view, self.scale)
             if made is None:
-                what = f"view {name}: its fields give no view"
-                self.problems.append(Problem(self.file.name, what, "left out", kind=NOT_USED))
+                self.issues.append(Issue("view-unreadable", self.file.name, {"view": name}))
             else:
                 found.append(HeldView(name, made))
         return tuple(found)
 
 
-def shade_problems(model: HoneybeeModel, file: Path) -> Iterator[Problem]:
-    """Problems that name shades with states, and shades that let light through by a schedule."""
+def shade_issues(model: HoneybeeModel, file: Path) -> Iterator[Issue]:
+    """Issues that name shades with states, and shades that let light through by a schedule."""
     shades = [s for s in _shades(model) if s.properties.radiance.get("states")]
     if shades:
-        what = f"{len(shades)} shade(s) with states: {listed([s.label for s in shades])}"
-        yield Problem(file.name, what, "their own modifier holds all year", kind=NOT_USED)
+        values = {"count": len(shades), "shades": tuple(s.label for s in shades)}
+        yield Issue("shades-with-states", file.name, values)
     seasonal = [s for s in _shades(model) if s.properties.energy.get("transmittance_schedule")]
     if seasonal:
-        what = f"{len(seasonal)} shade(s) let light through by a schedule"
-        what = f"{what}: {listed([s.label for s in seasonal])}"
-        yield Problem(file.name, what, "opaque", kind=NOT_USED)
+        values = {"count": len(seasonal), "shades": tuple(s.label for s in seasonal)}
+        yield Issue("shades-by-schedule", file.name, values)
 
 
 def view_of(view: Mapping[str, Any], scale: float) -> View | None:

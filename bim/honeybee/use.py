@@ -8,27 +8,26 @@ Reference, "People": the dry share of a person's heat.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bim.honeybee.library import NamedObjects, listed
+from bim.honeybee.library import NamedObjects
 from bim.honeybee.schedules import ScheduleLibrary
 from bim.honeybee.schema import HoneybeeRoom
-from bim.model import NOT_USED, Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue, Phrase
 from bim.use import ALWAYS, ScheduledValue, StatedUse, YearSchedule, vapour_g_h
 
 LOADS = ("people", "lighting", "electric_equipment", "gas_equipment", "infiltration",
          "ventilation", "setpoint")  # fmt: skip
-PASSED_OVER = {  # of a room's extension of energy, in words
-    "service_hot_water": "service hot water",
-    "process_loads": "process loads",
-    "internal_masses": "internal masses",
-    "window_vent_control": "opening of windows",
-    "fans": "fans",
-}
+NOT_READ = (  # fields of a room's extension of energy
+    "service_hot_water", "process_loads", "internal_masses", "window_vent_control", "fans",
+)  # fmt: skip
 INDOORS = 24.0  # at which a person's heat is split [degC]
 SEATED = 120.0  # heat of a person at light office work, which honeybee-energy takes [W]
 IDEAL = "IdealAirSystem"
@@ -40,15 +39,14 @@ class UseLibrary:
     def __init__(self, energy: Mapping[str, Any], file: Path) -> None:
         self.objects = NamedObjects(energy, ("program_types", "hvacs"), "construction", file)
         self.schedules = ScheduleLibrary(energy, file)
-        self._said: dict[tuple[str, str], list[str]] = {}  # what and what was done: its rooms
+        self._rooms: dict[Issue, list[str]] = {}  # labels of the rooms of each issue
 
     @property
-    def problems(self) -> tuple[Problem, ...]:
+    def issues(self) -> tuple[Issue, ...]:
         """What of the uses is not used, each once with its rooms."""
-        name = self.objects.file.name
         return tuple(
-            Problem(name, f"{what} ({listed(rooms)})", done, kind=NOT_USED)
-            for (what, done), rooms in self._said.items()
+            replace(issue, values=issue.values | {"rooms": tuple(rooms)})
+            for issue, rooms in self._rooms.items()
         )
 
     def use(self, room: HoneybeeRoom, space: Space) -> StatedUse | None:
@@ -57,9 +55,9 @@ class UseLibrary:
         program = self._program(room)
         loads = {kind: own.get(kind) or program.get(kind) for kind in LOADS}
         loads = {kind: one for kind, one in loads.items() if isinstance(one, dict)}
-        for field, words in PASSED_OVER.items():
+        for field in NOT_READ:
             if own.get(field) or program.get(field):
-                self._say(room, words, "not used")
+                self._report(room, "load-not-used", load=Phrase(field))
         if not loads and not program:
             return None
         parts = _Parts(self, room, space, loads)
@@ -71,7 +69,7 @@ class UseLibrary:
             return name
         found = self.objects.find("program_types", str(name)) if name else None
         if name and found is None:
-            self._say(room, f"program {name} is not in the file", "its loads are not known")
+            self._report(room, "program-missing", program=str(name))
         return found or {}
 
     def hvac(self, room: HoneybeeRoom) -> Mapping[str, Any] | None:
@@ -81,8 +79,9 @@ class UseLibrary:
             return name
         return (self.objects.find("hvacs", str(name)) or {"type": str(name)}) if name else None
 
-    def _say(self, room: HoneybeeRoom, what: str, done: str) -> None:
-        rooms = self._said.setdefault((what, done), [])
+    def _report(self, room: HoneybeeRoom, code: str, **values: str | float | Phrase) -> None:
+        issue = Issue(code, self.objects.file.name, {**values, "rooms": ()})
+        rooms = self._rooms.setdefault(issue, [])
         if room.label not in rooms:
             rooms.append(room.label)
 
@@ -95,7 +94,7 @@ class _Parts:
     ) -> None:
         self.library, self.room, self.space, self.loads = library, room, space, loads
         self.number = library.objects.number
-        self.say: Callable[[str, str], None] = lambda what, done: library._say(room, what, done)
+        self.report = partial(library._report, room)
 
     def use(self) -> StatedUse:
         """All of them as a use; a load that neither room nor program has is none."""
@@ -136,11 +135,11 @@ class _Parts:
         power = self.number(lamps, "watts_per_area", 0.0) * self.space.floor_area
         yield "lighting_w", ScheduledValue(power, self._share("lighting"))
         if self.number(lamps, "return_air_fraction", 0.0, most=1.0):
-            self.say("heat of lamps that goes with the return air", "stays in the room")
+            self.report("return-air-heat")
         control = self.room.properties.energy.get("daylighting_control")
         if isinstance(control, dict):
             yield "lighting_target_lx", self.number(control, "illuminance_setpoint", 300.0, least=1)
-            self.say("daylighting control", "dims by the mean of the work plane down to nothing")
+            self.report("daylighting-control")
 
     def _equipment(self) -> Iterator[tuple[str, Any]]:
         kinds = [k for k in ("electric_equipment", "gas_equipment") if self._of(k)]
@@ -151,7 +150,7 @@ class _Parts:
                 self.number(one, f, 0.0, most=1.0) for f in ("latent_fraction", "lost_fraction")
             )
             if away:
-                self.say(f"{kind}: {100 * away:g} % is vapour or lost", "left out with its power")
+                self.report("gain-lost", load=Phrase(kind), percent=100 * away)
             power = self.number(one, "watts_per_area", 0.0) * self.space.floor_area
             part = self._share(kind).times(power * max(1.0 - away, 0.0))
             found = part if found is None else found.plus(part)
@@ -172,7 +171,7 @@ class _Parts:
         if system is None:
             yield "ventilation_m3_s", ScheduledValue(0.0)
             if fan:
-                self.say("outdoor air of a fan", "not used: the room has no system")
+                self.report("fan-without-system")
             return
         people = self.number(self._of("people"), "people_per_area", 0.0) * space.floor_area
         flow = (
@@ -190,13 +189,13 @@ class _Parts:
         points, system = self._of("setpoint"), self.library.hvac(self.room)
         if system is None:
             if points:
-                self.say("set points", "not used: the room has no system")
+                self.report("set-points-without-system")
             return
         kind = str(system.get("type", ""))
         if not kind.startswith(IDEAL):
-            self.say(f"system {kind}", "an ideal one holds the set points")
+            self.report("system-taken-as-ideal", system=kind)
         elif system.get("economizer_type", "DifferentialDryBulb") != "NoEconomizer":
-            self.say("economizer of the system", "not used: outdoor air is the least that is asked")
+            self.report("economizer")
         for limit in ("heating", "cooling"):
             if isinstance(system.get(f"{limit}_limit"), int | float):
                 yield f"{limit}_limit_w", self.number(system, f"{limit}_limit", least=1e-3)
@@ -208,7 +207,7 @@ class _Parts:
             if schedule is None:
                 continue
             if np.ptp(schedule.values) > 0:
-                self.say(f"{field} set point that changes", "its mean holds")
+                self.report("humidity-set-point-varies", field=Phrase(field))
             yield target, float(schedule.values.mean())
 
     def _radiant(self) -> float | None:

@@ -11,10 +11,11 @@ from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms
 from bim.ifc.project import storey_of
 from bim.ifc.source import Source
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
-from bim.ifc.transparent import PHANTOM
-from bim.model import CUT_OFF, Problem, Space
+from bim.ifc.transparent import NO_GLASS
+from bim.model import Space
 from bim.names import label_of
 from bim.outdoors import shut_in_area
+from bim.report.issue import Issue
 from bim.shell import open_edges
 
 
@@ -23,7 +24,7 @@ def account_of(
     read: Sequence[SpaceRecord],
     built: Sequence[Space],
     glass: GlassOfRooms,
-    problems: Sequence[Problem],
+    issues: Sequence[Issue],
     *,
     repeated: Sequence[str] = (),
 ) -> Account:
@@ -35,7 +36,7 @@ def account_of(
         repeated: GUIDs of spaces that draw a room again: not counted, nor are such windows.
     """
     drawn = [s for s in source.model.by_type("IfcSpace") if s.GlobalId not in repeated]
-    failed = {p.where for p in problems if p.lost == "room"}
+    failed = {p.where for p in issues if p.effect.lost == "room"}
     kept = [record for record in read if record.guid not in failed]
     guids = {record.guid.split("-")[0] for record in kept}
     found = not any(space.GlobalId in guids for space in drawn) and bool(kept)
@@ -43,7 +44,7 @@ def account_of(
     used: Counter[str] = Counter()
     for window in (window for space in built for window in space.windows):
         used[window.guid] += window.area
-    again = {p.where for p in problems if p.kind == DRAWN_TWICE}
+    again = {p.where for p in issues if p.code == DRAWN_TWICE}
     panes = [
         one for one in glass.glass if one.out > 0 and (used[one.guid] or one.guid not in again)
     ]
@@ -56,16 +57,20 @@ def account_of(
         sum(min(used[one.guid], one.out) for one in panes if one.assumed),
         sum(area for guid, area in lost.items() if guid in low),
         sum(area for guid, area in lost.items() if guid not in low),
-        sum(p.glass for p in problems if p.kind.startswith(PHANTOM)),
+        sum(p.effect.glass for p in issues if p.code in NO_GLASS),
         glass.closed,
-        tuple(p.what for p in problems if p.kind == OVERLAPPING),
+        tuple(
+            f"{p.values['room']} + {p.values['other']} ({p.values['volume']:.2f} m3)"
+            for p in issues
+            if p.code == OVERLAPPING
+        ),
         tuple(sorted({one.low.label for one in panes if one.low is not None})),
         tuple(label_of(s.Name or "", s.LongName or "", s.GlobalId) for s in missing),
         tuple(space.label for space in built if open_edges(space.shell)),
         found,
-        any(p.kind == CUT_OFF for p in problems),
+        any(p.code == "file-cut-off" for p in issues),
         tuple(space.label for space in built if space.raised),
-        shut_in_area(problems),
+        shut_in_area(issues),
     )
 
 

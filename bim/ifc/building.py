@@ -1,4 +1,4 @@
-"""A building from an IFC file: rooms that are closed, windows that look out, problems named."""
+"""A building from an IFC file: rooms that are closed, windows that look out, issues named."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ from bim.ifc.raised_rooms import raised_rooms
 from bim.ifc.schemes import one_of_each
 from bim.ifc.shapes import Shape, mesh_of
 from bim.ifc.source import Progress, Source, read_source
-from bim.ifc.space_boundaries import boundary_problems
+from bim.ifc.space_boundaries import boundary_issues
 from bim.ifc.spaces import SpaceRecord, enclosed_spaces, read_spaces
-from bim.model import Building, Element, Problem, Space
+from bim.model import Building, Element, Space
 from bim.outdoors import lifted_sites, mirrors_in_view, unblinded
 from bim.rays import RayMesh, ray_mesh
+from bim.report.issue import Effect, Issue
 from bim.solids import triangles_of
-from bim.soundness import agree, soundness_problems
+from bim.soundness import agree, soundness_issues
 from bim.surroundings import Beyond, Surroundings, cut_by_neighbours, what_lies_beyond
 from bim.wall_middles import area_to_wall_middles
 from mitsuba_cfs.errors import RoomError
@@ -63,27 +64,27 @@ def read_ifc(
         furniture: whether what stands in the rooms is in their light and views.
         progress: called with the stage's name and the fraction of it that is done.
     Raises: `DataError` where the file is missing or is no readable IFC; faults inside the model are
-        the building's `problems`.
+        the building's `issues`.
     """
     tell = progress or (lambda stage, fraction: None)
     corrections = corrections_beside(path, join) if corrections is None else corrections
     source = read_source(path, corrections, tell)
     tell("rooms", 0.0)
     mesh = mesh_of(source.walls)
-    rooms, problems = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
+    rooms, issues = _rooms(source, mesh, lambda part: tell("rooms", SEARCH * part))
     records = rooms.records
-    problems = [*source.problems, *model_defects(source.model, source.elements), *problems]
+    issues = [*source.issues, *model_defects(source.model, source.elements), *issues]
     apertures, more = apertures_in(source)
-    problems += more
+    issues += more
     glass = glass_of_rooms(source, apertures, records, mesh)
     records, more = raised_rooms(source, records, glass)
-    problems += more
+    issues += more
     if any(record.raised for record in records):
         glass = glass_of_rooms(source, apertures, records, mesh)
     elements, finishes, faults = bounding_elements(
         source.model, source.walls, source.placed.rotation
     )
-    problems += [*glass.problems, *faults]
+    issues += [*glass.issues, *faults]
     around = _surroundings(mesh, source.walls, records, source.ground)
     attached = [*glass.attachments, *(side for way in rooms.passages for side in way.sides)]
     own = [[a for a in attached if a.room == r.guid] for r in records]
@@ -93,21 +94,21 @@ def read_ifc(
         tell("rooms", SEARCH + (1 - SEARCH) * index / len(records))
         found, more = _space(index, boundary, records, around, elements=elements, finishes=finishes)
         spaces += found
-        problems += more
-    again = {problem.where for problem in problems if problem.kind == DRAWN_TWICE}
-    problems += lost_glass(attached, spaces, again)
-    problems += boundary_problems(source, spaces)
+        issues += more
+    again = {issue.where for issue in issues if issue.code == DRAWN_TWICE}
+    issues += lost_glass(attached, spaces, again)
+    issues += boundary_issues(source, spaces)
     spaces, more = furnished(source, spaces, wanted=furniture)
-    problems += more
+    issues += more
     tell("surroundings", 0.0)
     outside, more = _outdoors(source, spaces)
     tell("surroundings", 1.0)
-    problems += more
+    issues += more
     return Building(
-        source.name, tuple(spaces), outside, tuple(dict.fromkeys(problems)),
+        source.name, tuple(spaces), outside, tuple(dict.fromkeys(issues)),
         source.latitude_deg, source.longitude_deg, source.elevation, Path(path),
         account_of(
-            source, rooms.read, spaces, glass, problems, repeated=[r.guid for r in rooms.repeated]
+            source, rooms.read, spaces, glass, issues, repeated=[r.guid for r in rooms.repeated]
         ),
         map_georeference(source.model, source.placed),
         source.placed.matrix(),
@@ -124,30 +125,29 @@ class _Rooms:
 
 def _rooms(
     source: Source, mesh: RayMesh, tell: Callable[[float], None]
-) -> tuple[_Rooms, list[Problem]]:
+) -> tuple[_Rooms, list[Issue]]:
     """The spaces that are rooms; found from geometry where the file has none."""
-    records, problems = read_spaces(source.model, source.shapes, source.quantity_scales())
+    records, issues = read_spaces(source.model, source.shapes, source.quantity_scales())
     records, repeated, more = one_of_each(source.model, records)
-    problems += more
+    issues += more
     read, more = enclosed_spaces(records, mesh)
-    problems += more
+    issues += more
     apertures = open_apertures(source, read, mesh.triangles)
     records, ways, more = joined_rooms(source, read, apertures, mesh.triangles)
-    problems += more
+    issues += more
     if not records:
         read, more = found_rooms(source, tell)
         records = read
-        problems += more
-    return _Rooms(read, records, repeated, ways), problems
+        issues += more
+    return _Rooms(read, records, repeated, ways), issues
 
 
-def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Problem]]:
+def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, ...], list[Issue]]:
     """What stands outdoors, free of what would blind a window."""
     windows = [window for space in spaces for window in space.windows]
-    problems = []
+    issues = []
     if not windows:
-        what = "no window belongs to a room"
-        problems.append(Problem(source.path.name, what, "no daylight"))
+        issues.append(Issue("no-window", source.path.name))
     elements = outdoor_elements(
         source.model,
         source.elements,
@@ -155,11 +155,11 @@ def _outdoors(source: Source, spaces: Sequence[Space]) -> tuple[tuple[Element, .
         kept=source.corrections.kept(source.model),
         panes=CLEAR_GLAZING,
     )
-    elements, problems_of_panes = mirrors_in_view(elements, windows)
+    elements, issues_of_panes = mirrors_in_view(elements, windows)
     elements, more = lifted_sites(elements, windows)
     outdoors = unblinded(elements, spaces)
     traced, fine = coarser(list(outdoors.elements))
-    return tuple(traced), [*problems, *problems_of_panes, *more, *outdoors.problems, *fine]
+    return tuple(traced), [*issues, *issues_of_panes, *more, *outdoors.issues, *fine]
 
 
 def _surroundings(
@@ -187,17 +187,17 @@ def _space(
     records: Sequence[SpaceRecord],
     around: Surroundings,
     **bounding: Any,
-) -> tuple[list[Space], list[Problem]]:
+) -> tuple[list[Space], list[Issue]]:
     """The room of a record, none where its boundary cannot be built; as `_closed_space`."""
     try:
         if isinstance(boundary, RoomError):
             raise boundary
-        space, problems = _closed_space(index, boundary, records, around, **bounding)
+        space, issues = _closed_space(index, boundary, records, around, **bounding)
     except RoomError as error:
         solid = records[index].solid
-        what = f"room {solid.name}: its boundary cannot be built"
-        return [], [Problem(solid.guid, what, f"left out: {error}", "room")]
-    return [space], problems
+        values = {"room": solid.name, "reason": str(error)}
+        return [], [Issue("room-not-closed", solid.guid, values, Effect("room"))]
+    return [space], issues
 
 
 def _closed_space(
@@ -208,7 +208,7 @@ def _closed_space(
     *,
     elements: Sequence[ElementRecord],
     finishes: Finishes,
-) -> tuple[Space, list[Problem]]:
+) -> tuple[Space, list[Issue]]:
     """The room of a record with its faces and windows, checked to be closed."""
     record = records[index]
     others = [other.solid for other in records]
@@ -233,19 +233,13 @@ def _closed_space(
         record.volume, record.stated_area, record.stated_volume, record.long_name, middles,
         record.type_name, record.raised,
     )  # fmt: skip
-    return space, boundary.problems + _assumptions(record, assumed) + soundness_problems(space)
+    return space, boundary.issues + _assumptions(record, assumed) + soundness_issues(space)
 
 
-def _assumptions(record: SpaceRecord, assumed: Counter) -> list[Problem]:
-    texts = {
-        "reflectance": ("face(s) without a colour", "default reflectance of floor, wall, ceiling"),
-        "construction": ("face(s) without a construction", "default construction"),
-        "element": ("face(s) without a building element behind", "default properties"),
-        "adjacency": ("face(s) towards an enclosed void without a space", "taken as adiabatic"),
-    }
+def _assumptions(record: SpaceRecord, assumed: Counter) -> list[Issue]:
+    guid, name = record.solid.guid, record.solid.name
     return [
-        Problem(record.solid.guid, f"room {record.solid.name}: {count} {texts[key][0]}",
-                texts[key][1])
+        Issue(f"{key}-assumed", guid, {"room": name, "count": count})
         for key, count in sorted(assumed.items())
         if count
-    ]  # fmt: skip
+    ]

@@ -137,7 +137,7 @@ def corrections_beside(model_path: str | Path, join: Sequence[str] = ()) -> Corr
     for text, group in zip(named, groups, strict=True):
         if len(group) < 2:
             message = f"expected rooms with a plus between them, as 'Hall + Living', got {text!r}"
-            raise DataError(message, field="--join")
+            raise DataError(message, field="join")
     joined = (*corrections.join, *groups)
     return replace(corrections, join=joined, join_open=len(named) < len(join))
 

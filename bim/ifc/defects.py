@@ -11,12 +11,12 @@ import numpy as np
 from bim.apertures import main_direction
 from bim.guarded import gaps_between, solids_of
 from bim.ifc.shapes import Shape
-from bim.model import Problem
 from bim.planes import area_vectors
+from bim.report.issue import Issue, Phrase
 from bim.solids import PackedSolid, Solid, packed
 from mitsuba_cfs.processes import ProcessEnded
 
-DRAWN_TWICE = "drawn twice"  # kind of a problem
+DRAWN_TWICE = "element-drawn-twice"  # code of the issue
 SAME_PLACE = 0.002  # boxes that agree to this are one element drawn twice [m]
 SAME_AREA = 0.3  # if their surfaces agree to this share: only one may have its openings cut
 FLAT, UPRIGHT = 0.5, 1.5  # a slab is lower than this, a wall higher [m]
@@ -26,7 +26,7 @@ SOLID_CLASSES = ("IfcWall", "IfcSlab", "IfcRoof")
 Solids = Mapping[int, Solid | ProcessEnded | None]  # by STEP number
 
 
-def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Problem]:
+def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Issue]:
     """Repeated GlobalIds, elements without a body, drawn twice, of a wrong class, open, apart."""
     checked = [shape for shape in shapes if shape.ifc_class.startswith(SOLID_CLASSES)]
     found = solids_of([shape.triangles for shape in checked])
@@ -41,30 +41,32 @@ def model_defects(model: ifcopenshell.file, shapes: Sequence[Shape]) -> list[Pro
     ]
 
 
-def repeated_guids(model: ifcopenshell.file) -> list[Problem]:
+def repeated_guids(model: ifcopenshell.file) -> list[Issue]:
     """GlobalIds that more than one entity has."""
     counts = Counter(root.GlobalId for root in model.by_type("IfcRoot"))
     return [
-        Problem(guid, f"GlobalId is used {count} times", "entities are told apart by STEP number")
+        Issue("guid-repeated", guid, {"count": count})
         for guid, count in counts.items()
         if count > 1
     ]
 
 
-def without_body(model: ifcopenshell.file) -> list[Problem]:
+def without_body(model: ifcopenshell.file) -> list[Issue]:
     """Walls, slabs and roofs that are neither drawn nor made of parts."""
     return [
-        Problem(one.GlobalId, f"{one.is_a()} {one.Name or ''}: has no geometry", "left out")
+        Issue(
+            "element-without-geometry", one.GlobalId, {"element": f"{one.is_a()} {one.Name or ''}"}
+        )
         for name in SOLID_CLASSES
         for one in model.by_type(name)
         if one.Representation is None and not one.IsDecomposedBy
     ]
 
 
-def drawn_twice(shapes: Sequence[Shape]) -> list[Problem]:
+def drawn_twice(shapes: Sequence[Shape]) -> list[Issue]:
     """Elements of one class with the same box and about the same surface."""
     seen: dict[str, list[tuple[Shape, np.ndarray, float]]] = defaultdict(list)
-    problems = []
+    issues = []
     for shape in shapes:
         corners = shape.triangles.reshape(-1, 3)
         area = float(np.linalg.norm(area_vectors(shape.triangles), axis=1).sum())
@@ -73,51 +75,51 @@ def drawn_twice(shapes: Sequence[Shape]) -> list[Problem]:
         for other, theirs, their_area in bucket:
             same = np.abs(box - theirs).max() < SAME_PLACE
             if same and abs(area - their_area) < SAME_AREA * area:
-                what = f"{shape.ifc_class} {shape.name}: lies where {other.guid} lies"
-                done = f"{DRAWN_TWICE}: both are kept"
-                problems.append(Problem(shape.guid, what, done, kind=DRAWN_TWICE))
+                values = {"element": f"{shape.ifc_class} {shape.name}", "other": other.guid}
+                issues.append(Issue(DRAWN_TWICE, shape.guid, values))
                 break
         bucket.append((shape, box, area))
-    return problems
+    return issues
 
 
-def wrong_classes(shapes: Sequence[Shape]) -> list[Problem]:
+def wrong_classes(shapes: Sequence[Shape]) -> list[Issue]:
     """Walls that lie flat and slabs that stand upright."""
-    problems = []
+    issues = []
     for shape in shapes:
         size = np.ptp(shape.triangles.reshape(-1, 3), axis=0)
         vectors = area_vectors(shape.triangles)
         level = np.abs(vectors[:, 2]).sum() / max(np.linalg.norm(vectors, axis=1).sum(), 1e-12)
         wall = shape.ifc_class.startswith("IfcWall")
         if wall and size[2] < FLAT and min(size[:2]) > UPRIGHT and level > 0.8:
-            what = f"{shape.ifc_class} {shape.name}: lies flat like a slab"
+            code = "wall-lies-flat"
         elif shape.ifc_class.startswith("IfcSlab") and size[2] > UPRIGHT and level < 0.2:
-            what = f"{shape.ifc_class} {shape.name}: stands upright like a wall"
+            code = "slab-stands-upright"
         else:
             continue
-        problems.append(Problem(shape.guid, what, "faces are named by their slope, not by class"))
-    return problems
+        issues.append(Issue(code, shape.guid, {"element": f"{shape.ifc_class} {shape.name}"}))
+    return issues
 
 
-def open_bodies(shapes: Sequence[Shape], solids: Solids) -> list[Problem]:
+def open_bodies(shapes: Sequence[Shape], solids: Solids) -> list[Issue]:
     """Walls, slabs and roofs whose body is not a closed solid, or only after a repair."""
-    problems = []
+    issues = []
     for shape in shapes:
         if shape.step_id not in solids:
             continue
         solid = solids[shape.step_id]
         label = f"{shape.ifc_class} {shape.name}"
-        if solid is None or isinstance(solid, ProcessEnded):
-            why = " is no closed solid" if solid is None else f": {solid}"
-            what = f"{label}: its body{why}"
-            problems.append(Problem(shape.guid, what, "its surfaces are used as they are"))
+        if solid is None:
+            issues.append(Issue("body-not-closed", shape.guid, {"element": label}))
+        elif isinstance(solid, ProcessEnded):
+            values = {"element": label, "reason": str(solid)}
+            issues.append(Issue("body-not-computed", shape.guid, values))
         elif solid.repair not in ("", "welded"):
-            what = f"{label}: its body is not sound ({solid.repair})"
-            problems.append(Problem(shape.guid, what, "its surfaces are used as they are"))
-    return problems
+            values = {"element": label, "repair": Phrase(solid.repair)}
+            issues.append(Issue("body-not-sound", shape.guid, values))
+    return issues
 
 
-def walls_apart(shapes: Sequence[Shape], solids: Solids) -> list[Problem]:
+def walls_apart(shapes: Sequence[Shape], solids: Solids) -> list[Issue]:
     """Walls across each other that nearly meet; leaves of one wall, side by side, are none."""
     walls = []
     for shape in shapes:
@@ -138,21 +140,20 @@ def walls_apart(shapes: Sequence[Shape], solids: Solids) -> list[Problem]:
         ]
         if others:
             near.append((one, body, others))
-    return _gap_problems(near)
+    return _gap_issues(near)
 
 
-def _gap_problems(near: Sequence[tuple[Shape, PackedSolid, list]]) -> list[Problem]:
+def _gap_issues(near: Sequence[tuple[Shape, PackedSolid, list]]) -> list[Issue]:
     """Walls, each with its neighbours: those that do not meet."""
     bodies = [(body, [its_body for _, its_body in others]) for _, body, others in near]
-    problems = []
+    issues = []
     for (one, _, others), gaps in zip(near, gaps_between(bodies, WIDEST_JOINT), strict=True):
         if isinstance(gaps, ProcessEnded):
-            what = f"{one.ifc_class} {one.name}: its distance to other walls: {gaps}"
-            problems.append(Problem(one.guid, what, "not measured"))
+            values = {"element": f"{one.ifc_class} {one.name}", "reason": str(gaps)}
+            issues.append(Issue("wall-distance-not-computed", one.guid, values))
             continue
         for (other, _), gap in zip(others, gaps, strict=True):
             if CLOSEST < gap < WIDEST_JOINT:
-                what = f"walls {one.name} and {other.name} do not meet: {gap * 1000:.0f} mm apart"
-                done = "harmless to rooms drawn as spaces; closed where rooms have to be found"
-                problems.append(Problem(one.guid, what, done))
-    return problems
+                values = {"wall": one.name, "other": other.name, "gap_mm": 1000 * gap}
+                issues.append(Issue("walls-do-not-meet", one.guid, values))
+    return issues

@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 
 from bim.boundaries import ElementRecord, Finishes
 from bim.colours import GREY
-from bim.defaults import FACADE_REFLECTANCE, GLASS_REFLECTANCE, SITE_REFLECTANCE
+from bim.defaults import (
+    FACADE_REFLECTANCE,
+    GLASS_REFLECTANCE,
+    HIGHEST_REFLECTANCE,
+    LOWEST_REFLECTANCE,
+    SITE_REFLECTANCE,
+)
 from bim.ifc.materials import MaterialReader, materials_of
 from bim.ifc.project import storey_of
 from bim.ifc.shapes import Shape
-from bim.model import Element, Problem
+from bim.model import Element
+from bim.report.issue import Issue
 from mitsuba_cfs.gloss import Gloss
 
 SITE = ("IfcSite", "IfcGeographicElement")
@@ -24,14 +31,14 @@ SITE = ("IfcSite", "IfcGeographicElement")
 
 def bounding_elements(
     model: ifcopenshell.file, shapes: Sequence[Shape], rotation: NDArray[np.float64]
-) -> tuple[list[ElementRecord], Finishes, list[Problem]]:
-    """Record of each shape, what their triangles reflect, problems.
+) -> tuple[list[ElementRecord], Finishes, list[Issue]]:
+    """Record of each shape, what their triangles reflect, issues.
 
     Args: shapes: in world axes; rotation: [3, 3] from model axes to the world.
     """
     reader = MaterialReader(model)
     records = [_record(model.by_id(shape.step_id), shape, reader, rotation) for shape in shapes]
-    faults: dict[str, Problem] = {}
+    faults: dict[str, Issue] = {}
     values, gloss, hues = [], [], []
     for shape in shapes:
         glosses = np.array([*(look.gloss for look in shape.looks), None], dtype=object)
@@ -39,8 +46,13 @@ def bounding_elements(
         hue = np.array([*(GREY if look.is_glass else look.hue for look in shape.looks), GREY])
         for i, look in enumerate(shape.looks):
             by_look[i] = GLASS_REFLECTANCE if look.is_glass else look.reflectances
-            if look.fault and not look.is_glass:
-                faults.setdefault(look.name, Problem(look.name, "surface style", look.fault))
+            if look.stated is not None and not look.is_glass:
+                values_of_style = {
+                    "style": look.name, "stated": look.stated,
+                    "used": min(max(look.stated, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE),
+                }  # fmt: skip
+                issue = Issue("surface-style-bounded", look.name, values_of_style)
+                faults.setdefault(look.name, issue)
         stated = reader.reflectances_of(model.by_id(shape.step_id))
         if stated is not None and not shape.transparent.any() and not shape.is_painted:
             mirrored = np.array([0.0 if g is None else g.at_normal for g in glosses])
@@ -48,13 +60,13 @@ def bounding_elements(
         values.append(by_look[shape.look])
         gloss.append(glosses[shape.look])
         hues.append(hue[shape.look])
-    problems = [*reader.problems.values(), *faults.values()]
+    issues = [*reader.issues.values(), *faults.values()]
     finishes = Finishes(
         np.concatenate(values or [np.empty((0, 2))]),
         np.concatenate([np.empty(0, object), *gloss]),
         np.concatenate(hues or [np.empty((0, 3))]),
     )
-    return records, finishes, problems
+    return records, finishes, issues
 
 
 def _record(

@@ -16,8 +16,8 @@ from bim.apertures import BESIDE, Filling
 from bim.colours import GREY
 from bim.ifc.project import definitions_of, psets_of
 from bim.ifc.shapes import Shape
-from bim.model import Problem
 from bim.planes import area_vectors
+from bim.report.issue import Effect, Issue
 
 PANELS = (
     "IfcPlate",
@@ -34,9 +34,9 @@ LEAST_GLASS = 0.05  # transparent area that makes a panel a window [m2]
 
 def read_fillings(
     model: ifcopenshell.file, shapes: dict[int, Shape]
-) -> tuple[list[Filling], list[Problem]]:
+) -> tuple[list[Filling], list[Issue]]:
     """Every window and door, and every other element with transparent parts (curtain panels)."""
-    problems: list[Problem] = []
+    issues: list[Issue] = []
     fillings = []
     scale = _length_scale(model)
     for element in [*model.by_type("IfcWindow"), *model.by_type("IfcDoor")]:
@@ -46,12 +46,12 @@ def read_fillings(
         opening, host = _opening_and_host(element)
         body = None if opening is None else shapes.get(opening.id())
         if shape is None and body is None:
-            what = f"{element.is_a()} {element.Name or ''}: has no geometry and no opening"
-            problems.append(Problem(element.GlobalId, what, "left out", "window"))
+            code, values = "window-without-geometry-and-opening", {"element": _label(element)}
+            issues.append(Issue(code, element.GlobalId, values, Effect("window")))
             continue
         if shape is None:
-            what = f"{element.is_a()} {element.Name or ''}: has no geometry"
-            problems.append(Problem(element.GlobalId, what, "drawn as its opening"))
+            values = {"element": _label(element)}
+            issues.append(Issue("window-without-geometry", element.GlobalId, values))
         one = _filling(element, shape or body, body, host, scale)
         wall = None if host is None else shapes.get(host.id())
         fillings.append(replace(one, beside=beside_opening(wall, body)))
@@ -63,15 +63,20 @@ def read_fillings(
                     continue
                 fillings.append(panel)
                 if class_name in ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering"):
-                    what = f"{element.is_a()} {element.Name or ''}: is transparent"
-                    problems.append(Problem(element.GlobalId, what, "taken as a window"))
-    return fillings, problems
+                    values = {"element": _label(element)}
+                    issue = Issue("transparent-element-as-window", element.GlobalId, values)
+                    issues.append(issue)
+    return fillings, issues
+
+
+def _label(element: ifcopenshell.entity_instance) -> str:
+    return f"{element.is_a()} {element.Name or ''}"
 
 
 def _length_scale(model: ifcopenshell.file) -> float:
     try:
         return float(ifcopenshell.util.unit.calculate_unit_scale(model))
-    except Exception:  # broken unit assignment: reported by length_problems
+    except Exception:  # broken unit assignment: reported by length_issues
         return 1.0
 
 

@@ -19,7 +19,7 @@ from bim.guarded import solids_of
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
-from bim.model import Problem
+from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import room_solid
 from bim.solids import Solid
 from mitsuba_cfs.processes import ProcessEnded, answer_apart
@@ -45,7 +45,7 @@ Body = NDArray[np.float64]
 Tell = Callable[[float], None]
 
 
-def found_rooms(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Problem]]:
+def found_rooms(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Issue]]:
     """Rooms between the building elements, and what had to be closed to find them.
 
     Args: tell: is told the fraction done.
@@ -53,7 +53,8 @@ def found_rooms(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Pro
     bodies = _uncut_bodies(source)
     where, lacks = source.path.name, _lack_of_spaces(source)
     if not bodies:
-        return [], [Problem(where, f"{lacks} and no walls", "no room is found", "room")]
+        values = {"lack": lacks}
+        return [], [Issue("no-walls-for-rooms", where, values, Effect("room"))]
     search = _Search([(shape.guid, label, body) for shape, label, body in bodies], tell)
     upright = [b for shape, _, b in bodies if shape.ifc_class.startswith(("IfcWall", "IfcCurtain"))]
     meshes = [body for *_, body in bodies]
@@ -62,29 +63,28 @@ def found_rooms(source: Source, tell: Tell) -> tuple[list[SpaceRecord], list[Pro
     floor = _slab(low, high, wall_low[2] - CAP)
     roof = _slab(low, high, wall_high[2])
     attempts = (
-        ([], GAP, ""),
-        ([], WIDER, f"gaps up to {WIDER * 1000:.0f} mm closed"),
-        ([floor], GAP, "a floor put under the walls"),
-        ([floor, roof], GAP, "a floor and a flat roof put to the walls"),
+        ([], GAP, Phrase("joined-by-openings")),
+        ([], WIDER, Phrase("gaps-closed", {"gap_mm": 1000 * WIDER})),
+        ([floor], GAP, Phrase("floor-added")),
+        ([floor, roof], GAP, Phrase("floor-and-roof-added")),
     )
     number, rooms = search.rooms([(more, gap) for more, gap, _ in attempts])
     repair = attempts[number][2]
     if not rooms:
-        what = f"{lacks}, and its walls enclose nothing"
-        done = f"no room is found; gaps up to {WIDER} m were closed"
-        return [], [*search.problems, Problem(where, what, done, "room")]
+        values = {"lack": lacks, "gap": WIDER}
+        issue = Issue("walls-enclose-nothing", where, values, Effect("room"))
+        return [], [*search.issues, issue]
     levels = _storeys(source)
     records = [_record(source, number, room, levels) for number, room in enumerate(rooms, 1)]
-    what = f"{lacks}: {len(rooms)} room(s) found between its walls and slabs"
-    done = repair or "rooms joined by openings without doors are one"
-    return records, [*search.problems, Problem(where, what, done)]
+    values = {"lack": lacks, "count": len(rooms), "repair": repair}
+    return records, [*search.issues, Issue("rooms-from-geometry", where, values)]
 
 
 class _Search:
     """Asks for the enclosed rooms in a process apart; what ends that process is left out."""
 
     def __init__(self, bodies: list[tuple[str, str, Body]], tell: Tell) -> None:
-        self.problems: list[Problem] = []
+        self.issues: list[Issue] = []
         self._bodies, self._tell = bodies, tell
         self._until = time.monotonic() + LIMIT_S
 
@@ -116,27 +116,28 @@ class _Search:
         """Name what was in work, and take it out; False where that was no single element."""
         index = int(error.last.split()[0]) if error.last else len(self._bodies)
         if index >= len(self._bodies) or time.monotonic() >= self._until:
-            what = f"the search for rooms between its walls: {error}"
-            self.problems.append(Problem("IfcSpace", what, "no room is found this way", "room"))
+            values = {"reason": str(error)}
+            issue = Issue("room-search-failed", "IfcSpace", values, Effect("room"))
+            self.issues.append(issue)
             return False
         guid, label, _ = self._bodies.pop(index)
-        done = "left out of the search for rooms"
-        self.problems.append(Problem(guid, f"{label}: {error}", done))
+        values = {"element": label, "reason": str(error)}
+        self.issues.append(Issue("element-not-in-room-search", guid, values))
         return True
 
     def _say_what_is_less(self, found: Enclosed) -> None:
-        for count, what, done in (
-            (found.not_widened, "small elements: too many to be widened", "gaps there stay open"),
-            (found.hulls, "flat element(s) without a closed body", "their hulls bound the rooms"),
-            (found.kept_small, "room(s) of too many faces to be widened", "end before their walls"),
+        for count, code in (
+            (found.not_widened, "small-elements-not-widened"),
+            (found.hulls, "flat-elements-as-hulls"),
+            (found.kept_small, "found-rooms-not-widened"),
         ):
             if count and found.rooms:
-                self.problems.append(Problem("IfcSpace", f"{count} {what}", done))
+                self.issues.append(Issue(code, "IfcSpace", {"count": count}))
 
 
-def _lack_of_spaces(source: Source) -> str:
+def _lack_of_spaces(source: Source) -> Phrase:
     drawn = len(source.model.by_type("IfcSpace"))
-    return f"none of its {drawn} space(s) is a room" if drawn else "has no spaces"
+    return Phrase("no-space-is-room", {"count": drawn}) if drawn else Phrase("no-spaces")
 
 
 def _uncut_bodies(source: Source) -> list[tuple[Shape, str, Body]]:

@@ -20,9 +20,10 @@ from bim.defaults import FURNITURE_REFLECTANCE
 from bim.drawn_shades import hangs_at, is_named_shade
 from bim.ifc.shapes import Shape, read_shapes
 from bim.ifc.source import Source, painted
-from bim.model import Element, Problem, Space
+from bim.model import Element, Space
 from bim.planes import area_vectors
 from bim.rays import RayMesh, ray_mesh
+from bim.report.issue import Issue
 
 FURNITURE = "IfcFurnishingElement"  # IfcFurniture and IfcSystemFurnitureElement are kinds of it
 ASKED = 64  # corners of a piece that are asked for their room
@@ -31,7 +32,7 @@ MOST = 0.5  # share of them in a room from which the piece stands in it
 
 def furnished(
     source: Source, spaces: Sequence[Space], *, wanted: bool
-) -> tuple[list[Space], list[Problem]]:
+) -> tuple[list[Space], list[Issue]]:
     """The rooms with their furniture where it is wanted, and what became of each piece."""
     pieces = [one for one in source.model.by_type(FURNITURE) if one.Representation is not None]
     gone = source.corrections.removed(source.model)
@@ -39,11 +40,10 @@ def furnished(
     if not pieces or not spaces:
         return list(spaces), []
     if not wanted:
-        what = f"{len(pieces)} piece(s) of furniture"
-        return list(spaces), [Problem(FURNITURE, what, "left out; --furniture counts them")]
+        return list(spaces), [Issue("furniture-left-out", FURNITURE, {"count": len(pieces)})]
     everything = {one.id() for one in source.model.by_type("IfcProduct")}
     ids = {one.id() for one in pieces}
-    shapes, problems = read_shapes(source.model, without=everything - ids, skipped=())
+    shapes, issues = read_shapes(source.model, without=everything - ids, skipped=())
     for step_id, (visible, solar) in source.corrections.painted(source.model).items():
         if step_id in shapes:
             shapes[step_id] = painted(shapes[step_id], visible, solar)
@@ -51,16 +51,16 @@ def furnished(
     found: dict[int, list[Element]] = {}
     for shape in shapes.values():
         shape = replace(shape, triangles=source.placed.to_world(shape.triangles))
-        place, problem = _placed(shape, spaces, meshes)
-        problems += [] if problem is None else [problem]
+        place, issue = _placed(shape, spaces, meshes)
+        issues += [] if issue is None else [issue]
         if place is not None:
             pieces, more = coarser(_elements(shape))
             found.setdefault(place, []).extend(pieces)
-            problems += more
+            issues += more
     result = _with(spaces, found)
     count = sum(len({e.guid for e in space.furniture}) for space in result)
-    problems.append(Problem(FURNITURE, f"{count} piece(s) of furniture", "in light and views"))
-    return result, problems
+    issues.append(Issue("furniture-included", FURNITURE, {"count": count}))
+    return result, issues
 
 
 def _with(spaces: Sequence[Space], found: Mapping[int, list[Element]]) -> list[Space]:
@@ -71,26 +71,25 @@ def _with(spaces: Sequence[Space], found: Mapping[int, list[Element]]) -> list[S
 
 def _placed(
     shape: Shape, spaces: Sequence[Space], meshes: Sequence[RayMesh]
-) -> tuple[int | None, Problem | None]:
+) -> tuple[int | None, Issue | None]:
     """Index of the room that a piece stands in, or what there is to say of it."""
     label = f"{shape.ifc_class} {shape.name}"
     if is_named_shade(shape.name):
         for space in spaces:
             for window in space.windows:
                 if hangs_at(shape.triangles, window):
-                    what = f"{label}: hangs at window {window.name or window.guid}"
-                    done = (
-                        "left out: what fills the window stands for it"
-                        f" (cfs ifc attach --window {window.guid} --bsdf ...)"
-                    )
-                    return None, Problem(shape.guid, what, done, kind="curtain")
+                    values = {
+                        "element": label, "window": window.name or window.guid,
+                        "window_guid": window.guid,
+                    }  # fmt: skip
+                    return None, Issue("curtain-at-window", shape.guid, values)
     corners = shape.triangles.reshape(-1, 3)
     corners = corners[np.linspace(0, len(corners) - 1, min(ASKED, len(corners))).astype(int)]
     inside = corners + 0.01 * (corners.mean(axis=0) - corners)  # off the floor and the wall
     shares = [_share_inside(inside, mesh) for mesh in meshes]
     best = int(np.argmax(shares))
     if shares[best] < MOST:
-        return None, Problem(shape.guid, f"{label}: stands in no room", "left out", kind="outside")
+        return None, Issue("furniture-in-no-room", shape.guid, {"element": label})
     return best, None
 
 

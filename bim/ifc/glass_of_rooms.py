@@ -22,11 +22,12 @@ from bim.ifc.fillings import read_fillings, unfilled_openings
 from bim.ifc.project import storey_of
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
-from bim.ifc.transparent import PHANTOM, is_phantom
-from bim.model import SHUT_ADVICE, Problem, Space
+from bim.ifc.transparent import is_phantom
+from bim.model import Space
 from bim.names import plain_text
 from bim.planes import plane_through, polygons_of, triangulated
 from bim.rays import RayMesh
+from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import Attachment, attachments_of
 from bim.surroundings import is_open
 
@@ -60,16 +61,16 @@ class GlassOfRooms:
     attachments: tuple[Attachment, ...]
     glass: tuple[GlassAccount, ...]
     closed: float  # openings to the outdoors closed without glass [m2]
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
 
 
-def apertures_in(source: Source) -> tuple[list[Aperture], list[Problem]]:
+def apertures_in(source: Source) -> tuple[list[Aperture], list[Issue]]:
     """The windows, doors and glazed panels of a file, each in its plane."""
-    fillings, problems = read_fillings(source.model, source.shapes)
+    fillings, issues = read_fillings(source.model, source.shapes)
     apertures = []
     for filling in fillings:
         aperture, more = aperture_of(filling)
-        problems += more
+        issues += more
         apertures += [] if aperture is None else [aperture]
     kept = []
     for aperture, other in zip(apertures, framed_by(apertures), strict=True):
@@ -77,10 +78,10 @@ def apertures_in(source: Source) -> tuple[list[Aperture], list[Problem]]:
             kept.append(aperture)
             continue
         filling = aperture.filling
-        what = f"{filling.ifc_class} {filling.name}: lies where {other.filling.name} lies"
-        done = "its frame: the glass is counted once"
-        problems.append(Problem(filling.guid, what, done, kind="frame of a window"))
-    return kept, problems
+        label = f"{filling.ifc_class} {filling.name}"
+        values = {"element": label, "other": other.filling.name}
+        issues.append(Issue("frame-of-window", filling.guid, values))
+    return kept, issues
 
 
 def glass_of_rooms(
@@ -95,32 +96,32 @@ def glass_of_rooms(
     """
     attachments: list[Attachment] = []
     glass: list[GlassAccount] = []
-    problems: list[Problem] = []
+    issues: list[Issue] = []
     for aperture in apertures:
-        found = _real(attachments_of(aperture, [r.solid for r in records]), problems)
+        found = _real(attachments_of(aperture, [r.solid for r in records]), issues)
         attachments += found
         if not records or aperture.glass.is_empty:
             continue
         one = _account(aperture, found, source, records, building)
         glass.append(one)
-        problems += _said(aperture, found, one, records)
+        issues += _said(aperture, found, one, records)
     unfilled = _unfilled(source, records, building, attachments)
     return GlassOfRooms(
         (*attachments, *unfilled.attachments), (*glass, *unfilled.glass), unfilled.closed,
-        (*problems, *unfilled.problems),
+        (*issues, *unfilled.issues),
     )  # fmt: skip
 
 
 def lost_glass(
     attachments: Sequence[Attachment], spaces: Sequence[Space], repeated: Collection[str]
-) -> list[Problem]:
+) -> list[Issue]:
     """Glass before a room that is no window of the finished room; rooms left out say so themselves.
 
     None is known: the last net under the cutting of solids.
 
     Args: repeated: GUIDs of windows that are drawn again, of which one counts.
     """
-    problems = []
+    issues = []
     for space in spaces:
         windows: dict[str, float] = {}
         for window in space.windows:
@@ -131,13 +132,13 @@ def lost_glass(
             filling, area = one.aperture.filling, one.glass.area
             lost = area - windows.get(filling.guid, 0.0)
             if lost > LEAST_LOST * area and filling.guid not in repeated:
-                what = f"{filling.ifc_class} {filling.name}: {lost:.2f} m2 before {space.label}"
-                done = "are no window of it: that part gives no daylight"
-                problems.append(Problem(filling.guid, what, done, glass=lost, kind="lost glass"))
-    return problems
+                label = f"{filling.ifc_class} {filling.name}"
+                values = {"element": label, "area": lost, "room": space.label}
+                issues.append(Issue("glass-lost", filling.guid, values, Effect(glass=lost)))
+    return issues
 
 
-def _real(found: list[Attachment], problems: list[Problem]) -> list[Attachment]:
+def _real(found: list[Attachment], issues: list[Issue]) -> list[Attachment]:
     """Attachments without the glass of floors: walls and slabs that face down."""
     real = []
     for one in found:
@@ -145,11 +146,9 @@ def _real(found: list[Attachment], problems: list[Problem]) -> list[Attachment]:
         if not is_phantom(filling.ifc_class, one.aperture.plane.normal):
             real.append(one)
         elif one.neighbour is None:
-            what = f"{filling.ifc_class} {filling.name}: is transparent and faces down"
-            done = "no glass: taken as opaque"
-            problems.append(
-                Problem(filling.guid, what, done, glass=one.glass.area, kind=f"{PHANTOM} down")
-            )
+            values = {"element": f"{filling.ifc_class} {filling.name}"}
+            effect = Effect(glass=one.glass.area)
+            issues.append(Issue("transparent-facing-down", filling.guid, values, effect))
     return real
 
 
@@ -228,38 +227,32 @@ def _said(
     found: Sequence[Attachment],
     one: GlassAccount,
     records: Sequence[SpaceRecord],
-) -> list[Problem]:
+) -> list[Issue]:
     """What there is to say of a filling's glass and the rooms beside it."""
     filling = aperture.filling
     label = f"{filling.ifc_class} {filling.name}"
     names = {record.solid.guid: record.solid.name for record in records}
-    problems = []
+    issues = []
     lost = one.out - one.used
     if one.low is not None and lost > 0:
-        room = one.low.label
-        what = f"{label}: {lost:.2f} m2 lie above the top of room {room}, which is too low"
-        done = "gives no daylight to any room"
-        kept = "window" if one.used == 0 else ""
-        problems.append(Problem(filling.guid, what, done, kept, lost, f"above room {room}"))
+        values = {"element": label, "area": lost, "room": one.low.label}
+        effect = Effect("window" if one.used == 0 else "", lost)
+        issues.append(Issue("glass-above-room", filling.guid, values, effect))
     elif not found:
-        what = f"{label}: no room behind it"
-        done = "gives no daylight to any room"
-        problems.append(Problem(filling.guid, what, done, "window", lost, f"no room {lost > 0}"))
+        values, effect = {"element": label}, Effect("window", max(lost, 0.0))
+        issues.append(Issue("window-without-room", filling.guid, values, effect))
     elif lost > 0:
-        what = f"{label}: no room behind {lost:.2f} m2 of it"
-        problems.append(Problem(filling.guid, what, "that part gives no daylight", glass=lost))
+        values, effect = {"element": label, "area": lost}, Effect(glass=lost)
+        issues.append(Issue("window-partly-without-room", filling.guid, values, effect))
     inner = sorted({names[a.room] for a in found if a.neighbour is not None})
     if inner:
-        what = f"{label}: glass between {' and '.join(inner)}"
-        kind = "glass between rooms"
-        done = f"taken as opaque; {SHUT_ADVICE}"
-        problems.append(Problem(filling.guid, what, done, "window", kind=kind))
+        values, effect = {"element": label, "rooms": tuple(inner)}, Effect("window")
+        issues.append(Issue("glass-between-rooms", filling.guid, values, effect))
     rooms = sorted({names[a.room] for a in found if a.neighbour is None})
     if len(rooms) > 1:
-        what = f"{filling.name}: lies before the rooms {', '.join(rooms)}"
-        kind = "lies before several rooms"
-        problems.append(Problem(filling.guid, what, "each gets its part", kind=kind))
-    return problems
+        values = {"element": filling.name, "rooms": tuple(rooms)}
+        issues.append(Issue("window-of-several-rooms", filling.guid, values))
+    return issues
 
 
 def _unfilled(
@@ -269,7 +262,7 @@ def _unfilled(
     filled: Sequence[Attachment],
 ) -> GlassOfRooms:
     """Openings to the outdoors that nothing fills: glazed, or closed as doors."""
-    attachments, glass, problems, closed = [], [], [], 0.0
+    attachments, glass, issues, closed = [], [], [], 0.0
     solids = [record.solid for record in records]
     lows = {record.solid.guid: float(record.solid.low[2]) for record in records}
     panes = [a.aperture.plane.to_world(shapely.get_coordinates(a.region)) for a in filled]
@@ -295,16 +288,14 @@ def _unfilled(
         named = DOOR_NAME.search(plain_text(opening.Name or "")) is not None
         if named or _is_door(found[0], lows[found[0].room]):
             closed += area
-            why = "its name calls it a door" if named else "it reaches the floor like a door"
-            what = f"{label}: nothing fills it, and {why}"
-            done, kind = "closed, without glass", "opening closed"
+            reason = Phrase("called-door" if named else "reaches-floor")
+            code, values = "opening-closed", {"element": label, "reason": reason}
         else:
             attachments += found
             glass.append(GlassAccount(filling.guid, storey_of(host), area, area, True))
-            what = f"{label}: nothing fills it, and it leads outdoors"
-            done, kind = "taken as a window with the default frame", "opening glazed"
-        problems.append(Problem(filling.guid, what, done, glass=area, kind=kind))
-    return GlassOfRooms(tuple(attachments), tuple(glass), closed, tuple(problems))
+            code, values = "opening-glazed", {"element": label}
+        issues.append(Issue(code, filling.guid, values, Effect(glass=area)))
+    return GlassOfRooms(tuple(attachments), tuple(glass), closed, tuple(issues))
 
 
 def _pane_of(source: Source, opening, host) -> Filling | None:

@@ -15,8 +15,8 @@ from bim.ifc.corrections import corrections_file
 from bim.ifc.passages import LARGEST_DOOR, Passage, passages
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
-from bim.model import JOINED, SHUT_ADVICE, Problem
 from bim.names import JOINT, found_by_name
+from bim.report.issue import Issue, Phrase
 from bim.rooms import room_solid
 from bim.solids import packed, unpacked
 from mitsuba_cfs.errors import DataError, RoomError
@@ -27,87 +27,89 @@ def joined_rooms(
     records: Sequence[SpaceRecord],
     apertures: Sequence[Aperture],
     bodies: NDArray[np.float64],
-) -> tuple[list[SpaceRecord], list[Passage], list[Problem]]:
+) -> tuple[list[SpaceRecord], list[Passage], list[Issue]]:
     """Rooms with those of the corrections' `join` made one, and the passages left between rooms.
 
     Args: apertures, bodies: see `bim.ifc.passages`.
     """
     ways = passages(apertures, records, bodies)
-    records, problems = list(records), []
+    records, issues = list(records), []
     for names in source.corrections.join:
         parts = list({r.guid: r for r in (_named(records, n, source) for n in names)}.values())
         one, why = _one_room(parts, ways)
         if one is None:
-            what = f"rooms {', '.join(names)}: {why}"
-            problems.append(Problem(source.corrections.file or "join", what, "not joined"))
+            values = {"rooms": tuple(names), "reason": why}
+            issues.append(Issue("rooms-not-joined", source.corrections.file or "join", values))
             continue
         records = [r for r in records if r not in parts] + [one]
         ways = passages(apertures, records, bodies)
-        problems.append(Problem(one.solid.guid, f"rooms {', '.join(names)}", "joined as asked for"))
+        issues.append(Issue("rooms-joined", one.solid.guid, {"rooms": tuple(names)}))
     if source.corrections.join_open:
         records, more = _joined_by_size(records, ways)
-        problems += more
+        issues += more
         ways = passages(apertures, records, bodies)
-    return records, ways, [*problems, *_open_pairs(records, ways, source)]
+    return records, ways, [*issues, *_open_pairs(records, ways, source)]
 
 
 def _open_pairs(
     records: Sequence[SpaceRecord], ways: Sequence[Passage], source: Source
-) -> list[Problem]:
+) -> list[Issue]:
     """What there is to say of each pair of rooms that stay open to each other, once."""
     by_pair: dict[frozenset[str], list[Passage]] = {}
     for way in ways:
         by_pair.setdefault(way.rooms, []).append(way)
     named = {record.guid: record for record in records}
-    problems = []
+    issues = []
     for rooms, own in by_pair.items():
         pair = sorted((named[guid] for guid in rooms), key=lambda room: room.label)
-        labels = " and ".join(room.label for room in pair)
-        what = f"rooms {labels} are open to each other by {sum(way.area for way in own):.1f} m2"
-        what += f" in {len(own)} openings" if len(own) > 1 else ""
-        how = _how_to_join(pair, records, source)
-        if any(way.is_large for way in own):
-            how += f"; --join open joins all that open by more than a door ({LARGEST_DOOR:g} m2)"
-        problems.append(Problem(own[0].opening, what, how, kind="open to each other"))
-    return problems
+        names = _names_to_join(pair, records)
+        values = {
+            "rooms": tuple(room.label for room in pair),
+            "area": sum(way.area for way in own), "count": len(own),
+            "names": " + ".join(names), "quoted": ", ".join(f'"{name}"' for name in names),
+            "file": corrections_file(source.path).name, "limit": LARGEST_DOOR,
+        }  # fmt: skip
+        issues.append(Issue("rooms-open-to-each-other", own[0].opening, values))
+    return issues
 
 
 def _joined_by_size(
     records: list[SpaceRecord], ways: Sequence[Passage]
-) -> tuple[list[SpaceRecord], list[Problem]]:
+) -> tuple[list[SpaceRecord], list[Issue]]:
     """Rooms with those made one that openings larger than a door lead between."""
     large = [way for way in ways if way.is_large]
     number = {record.guid: i for i, record in enumerate(records)}
     rows, columns = np.array([[number[r] for r in way.rooms] for way in large]).reshape(-1, 2).T
     links = coo_array((np.ones(len(large)), (rows, columns)), shape=(len(records),) * 2)
     _, group = connected_components(links, directed=False)
-    rooms, problems = [], []
+    rooms, issues = [], []
     for members in (np.flatnonzero(group == i) for i in np.unique(group)):
         parts = [records[i] for i in members]
         if len(parts) == 1:
             rooms += parts
             continue
         one, why = _one_room(parts, large)
-        names = ", ".join(part.label for part in parts)
+        names = tuple(part.label for part in parts)
         widest = max(way.area for way in large if way.rooms <= {part.guid for part in parts})
-        what = f"Rooms {names}: open to each other by up to {widest:.1f} m2"
+        values = {"rooms": names, "area": widest, "limit": LARGEST_DOOR, "reason": why}
         if one is None:
-            problems.append(Problem(parts[0].guid, what, f"not joined: {why}"))
+            issues.append(Issue("rooms-not-joined-by-size", parts[0].guid, values))
             rooms += parts
             continue
         rooms.append(one)
-        done = f"joined as one room: larger than a door ({LARGEST_DOOR:g} m2)"
-        problems.append(Problem(one.guid, what, done, kind=JOINED))
-    return rooms, problems
+        issues.append(Issue("rooms-joined-by-size", one.guid, values))
+    return rooms, issues
 
 
-def _one_room(parts: list[SpaceRecord], ways: Sequence[Passage]) -> tuple[SpaceRecord | None, str]:
+def _one_room(
+    parts: list[SpaceRecord], ways: Sequence[Passage]
+) -> tuple[SpaceRecord | None, Phrase | str]:
     """One room of several, or why there is none."""
     try:
         one = _joined(parts, ways) if len(parts) > 1 else None
     except RoomError as error:
         return None, str(error)
-    return one, "" if one is not None else "nothing opens between them"
+    return one, "" if one is not None else Phrase("no-opening-between")
 
 
 def _named(records: Sequence[SpaceRecord], name: str, source: Source) -> SpaceRecord:
@@ -119,22 +121,14 @@ def _named(records: Sequence[SpaceRecord], name: str, source: Source) -> SpaceRe
         raise DataError(str(error.args[0]), file=file, field="join") from None
 
 
-def _how_to_join(
-    pair: Sequence[SpaceRecord], records: Sequence[SpaceRecord], source: Source
-) -> str:
-    """What becomes of the passage between two rooms, and what makes one room of them."""
-    # the shortest that means one room and holds no plus, at which --join divides
+def _names_to_join(pair: Sequence[SpaceRecord], records: Sequence[SpaceRecord]) -> list[str]:
+    """The shortest name of each room that is unique and has no plus, which divides names."""
     names = []
     for room in pair:
         own = [room.name, room.label]
         good = (n for n in own if "+" not in n and _is_unique(records, n))
         names.append(next(good, room.guid))
-    listed = ", ".join(f'"{name}"' for name in names)
-    file = corrections_file(source.path).name
-    return (
-        f"closed by a wall face; {SHUT_ADVICE}; one room with "
-        f"--join '{' + '.join(names)}', or join = [[{listed}]] in {file}"
-    )
+    return names
 
 
 def _is_unique(records: Sequence[SpaceRecord], name: str) -> bool:

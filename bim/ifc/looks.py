@@ -24,7 +24,7 @@ class Look:
     name: str
     reflectance: float  # diffuse, visible
     transparency: float  # 0 opaque to 1 clear
-    fault: str = ""  # what is wrong with the file's value, "" if nothing
+    stated: float | None = None  # reflectance that the file states, where it is out of bounds
     solar: float | None = None  # diffuse, solar; None: as visible
     gloss: Gloss | None = None  # what it reflects like a mirror besides
     hue: Colour = GREY  # of the diffuse part: linear sRGB of luminance 1
@@ -64,10 +64,10 @@ def look_of(
         transparency = transparency if given is None else float(given)
     value = luminance(linear)
     bounded = min(max(value, LOWEST_REFLECTANCE), HIGHEST_REFLECTANCE)
-    fault = "" if bounded == value else f"reflects {value:.2f}: taken as {bounded:.2f}"
+    stated = None if bounded == value else value
     transparency = min(max(float(transparency), 0.0), 1.0)
     diffuse, gloss = _gloss(shading, bounded, transparency > CLEAR)
-    return Look(label, diffuse, transparency, fault, None, gloss, hue_of(linear))
+    return Look(label, diffuse, transparency, stated, None, gloss, hue_of(linear))
 
 
 def _gloss(shading, reflectance: float, clear: bool) -> tuple[float, Gloss | None]:

@@ -43,7 +43,7 @@ def _metres(model: ifcopenshell.file, unit: ifcopenshell.entity_instance | None)
     if unit is None:
         try:
             return float(ifcopenshell.util.unit.calculate_unit_scale(model))
-        except Exception:  # broken unit assignment: reported by length_problems
+        except Exception:  # broken unit assignment: reported by length_issues
             return 1.0
     if unit.is_a("IfcConversionBasedUnit"):
         return float(unit.ConversionFactor.ValueComponent.wrappedValue)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import ifcopenshell
 import ifcopenshell.util.element
@@ -13,8 +14,9 @@ import ifcopenshell.util.unit
 import numpy as np
 
 from bim.defaults import MATERIALS, UNKNOWN_MATERIAL
-from bim.model import MaterialLayer, Problem
+from bim.model import MaterialLayer
 from bim.names import plain_text
+from bim.report.issue import Issue, Phrase
 
 PHYSICAL = {  # name -> lowest and highest value of any building material
     "conductivity": (0.005, 500.0),
@@ -47,7 +49,7 @@ class MaterialReader:
     """Reads each material once and gathers what is missing."""
 
     model: ifcopenshell.file
-    problems: dict[str, Problem] = field(default_factory=dict)
+    issues: dict[str, Issue] = field(default_factory=dict)
     scale: float = 1.0
     _aspects: dict[int, str] = field(default_factory=dict)  # names of representation items' aspects
     _contradicting: int = 0  # bodies whose aspect and style name two materials
@@ -55,7 +57,7 @@ class MaterialReader:
     _optical: dict[int, dict[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        with contextlib.suppress(Exception):  # reported by length_problems
+        with contextlib.suppress(Exception):  # reported by length_issues
             self.scale = float(ifcopenshell.util.unit.calculate_unit_scale(self.model))
         for kind in (
             "IfcMaterialProperties",
@@ -161,8 +163,8 @@ class MaterialReader:
             found[item], known = self.layer(material, 1.0)
             stated &= known
         if self._contradicting:
-            what = f"{self._contradicting} bodies: shape aspect and style name two materials"
-            self.problems["shape aspects"] = Problem("", what, "that of the style is taken")
+            values = {"count": self._contradicting}
+            self.issues["shape aspects"] = Issue("aspect-contradicts-style", "", values)
         return found, stated
 
     def _constituents(self, element: ifcopenshell.entity_instance) -> dict:
@@ -194,18 +196,23 @@ class MaterialReader:
         slip = given.get("heat_capacity", 0.0) * 1000.0
         if "heat_capacity" not in values and _is_physical("heat_capacity", slip):
             values["heat_capacity"] = slip
-            what = f"material {name}: specific heat capacity of {slip / 1000:g} J/(kg K)"
-            self.problems.setdefault(f"{name} kJ", Problem(name, what, "taken as kJ/(kg K)"))
+            issue = Issue(
+                "heat-capacity-in-kilojoules", name, {"material": name, "stated": slip / 1000}
+            )
+            self.issues.setdefault(f"{name} kJ", issue)
         wrong = sorted(set(given) - set(values))
         missing = sorted(set(NAMES) - set(values))
         if missing:
             default = default_material(name)
-            what = f"material {name}: no {', '.join(missing)}"
-            if wrong:
-                what += f" ({', '.join(f'{k} {given[k]:g} is impossible' for k in wrong)})"
-            self.problems.setdefault(
-                f"{name}", Problem(name, what, f"taken from {default.name} (EN ISO 10456)")
-            )
+            known: dict[str, Any] = {
+                "material": name, "missing": tuple(map(Phrase, missing)), "default": default.name,
+                "impossible": tuple(
+                    Phrase("impossible-value", {"name": Phrase(k), "value": given[k]})
+                    for k in wrong
+                ),
+            }  # fmt: skip
+            code = "material-impossible" if wrong else "material-incomplete"
+            self.issues.setdefault(name, Issue(code, name, known))
             values = {k: values.get(k, getattr(default, k)) for k in NAMES}
         return MaterialLayer(name, thickness, **values), not missing
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.ifc.shapes import Shape
-from bim.model import Problem
+from bim.report.issue import Issue
 
 FAR_OFF = 5000.0  # coordinates beyond this cost precision [m]
 STOREY_HEIGHTS = (1.2, 60.0)  # of rooms and walls that a building may have [m]
@@ -27,7 +27,7 @@ class Placed:
     rotation: NDArray[np.float64]  # [3, 3]
     scale: float
     offset: NDArray[np.float64]  # [3] [m]
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
 
     def to_world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Model points [..., 3] [m] in the world."""
@@ -42,26 +42,26 @@ class Placed:
 
 def in_world(shapes: dict[int, Shape], rotation: NDArray[np.float64]) -> Placed:
     """Shapes turned to true north, scaled if the unit is plainly wrong, moved near the origin."""
-    problems: list[Problem] = []
+    issues: list[Issue] = []
     scale = _unit_slip(shapes)
     if scale != 1.0:
         height = _typical_height(shapes)
-        what = f"rooms and walls are {height:.3g} m tall: wrong length unit"
-        problems.append(Problem("project", what, f"all lengths multiplied by {scale:g}"))
+        values = {"height": height, "scale": scale}
+        issues.append(Issue("length-unit-wrong", "project", values))
     offset = np.zeros(3)
     boxes = [shape.triangles.reshape(-1, 3) for shape in shapes.values()]
     if boxes:
         middle = scale * np.median([points.mean(axis=0) for points in boxes], axis=0) @ rotation.T
         if np.abs(middle[:2]).max() > FAR_OFF:
             offset = np.array([*np.round(middle[:2], -1), 0.0])
-            what = f"model lies {np.hypot(*middle[:2]) / 1000:.0f} km from its origin"
-            done = f"moved by ({-offset[0]:.0f}, {-offset[1]:.0f}) m"
-            problems.append(Problem("project", what, done))
+            distance, (east, north) = float(np.hypot(*middle[:2])), -offset[:2]
+            moved = {"distance_km": distance / 1000, "east": float(east), "north": float(north)}
+            issues.append(Issue("model-far-from-origin", "project", moved))
     world = {
         key: replace(shape, triangles=scale * shape.triangles @ rotation.T - offset)
         for key, shape in shapes.items()
     }
-    return Placed(world, rotation, scale, offset, tuple(problems))
+    return Placed(world, rotation, scale, offset, tuple(issues))
 
 
 def _typical_height(shapes: dict[int, Shape]) -> float:
@@ -91,7 +91,7 @@ def ground_level(model: ifcopenshell.file, placed: Placed) -> float:
     """Height [m] in the world of the storey nearest to elevation zero, else of the lowest one."""
     try:
         unit = float(ifcopenshell.util.unit.calculate_unit_scale(model))
-    except Exception:  # broken unit assignment: reported by length_problems
+    except Exception:  # broken unit assignment: reported by length_issues
         unit = 1.0
     levels: list[tuple[float, float]] = []
     for storey in model.by_type("IfcBuildingStorey"):

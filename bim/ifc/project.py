@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.ifc.head import SCHEMAS, ZIPPED, check_head, model_name
-from bim.model import CUT_OFF, Problem
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 
 END = 4096  # bytes in which the end of a STEP file is looked for
@@ -70,13 +70,12 @@ def _mend_stars(model: ifcopenshell.file) -> None:
                 product[index] = None
 
 
-def ending_problems(path: str | Path) -> list[Problem]:
-    """A problem where a STEP file has lost its end."""
+def ending_issues(path: str | Path) -> list[Issue]:
+    """A issue where a STEP file has lost its end."""
     path = Path(path)
     if b"END-ISO-10303-21" in _end(path):
         return []
-    what = "file ends without END-ISO-10303-21: cut off"
-    return [Problem(path.name, what, "what could be read is used", kind=CUT_OFF)]
+    return [Issue("file-cut-off", path.name)]
 
 
 def _end(path: Path) -> bytes:
@@ -92,12 +91,12 @@ def _end(path: Path) -> bytes:
         return stream.read()
 
 
-def length_problems(model: ifcopenshell.file) -> list[Problem]:
-    """A problem where the file states no length unit."""
+def length_issues(model: ifcopenshell.file) -> list[Issue]:
+    """A issue where the file states no length unit."""
     with contextlib.suppress(Exception):
         if ifcopenshell.util.unit.get_project_unit(model, "LENGTHUNIT") is not None:
             return []
-    return [Problem("project", "states no length unit", "lengths taken as metres")]
+    return [Issue("length-unit-missing", "project")]
 
 
 def area_scale(model: ifcopenshell.file, kind: str) -> float:
@@ -118,7 +117,7 @@ def length_scale(model: ifcopenshell.file) -> float:
         return 1.0
 
 
-def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[Problem]]:
+def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[Issue]]:
     """Rotation [3, 3] about z from model axes to x east, y north; and what is odd about it.
 
     TrueNorth is the direction of north in the model's own axes.  Without it the map conversion's
@@ -131,9 +130,8 @@ def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[
         ratios = [float(value) for value in north.DirectionRatios]
         if len(ratios) == 2 and math.hypot(*ratios) > 1e-9:
             return _turned(ratios[0], ratios[1]), []
-        where = f"TrueNorth {tuple(ratios)}"
         return np.eye(3), [
-            Problem(where, "is not a direction in the plane", "north taken as the model's +y")
+            Issue("true-north-invalid", "project", {"direction": str(tuple(ratios))})
         ]
     conversions = [] if model.schema == "IFC2X3" else model.by_type("IfcMapConversion")
     for conversion in conversions:
@@ -141,9 +139,8 @@ def north_rotation(model: ifcopenshell.file) -> tuple[NDArray[np.float64], list[
         if x is not None and y is not None and math.hypot(x, y) > 1e-9:
             # the model's x axis has map coordinates (x, y): the model is turned by their angle
             north = (y / math.hypot(x, y), x / math.hypot(x, y))
-            note = Problem("IfcMapConversion", "TrueNorth is missing", "grid north taken as north")
-            return _turned(*north), [note]
-    return np.eye(3), [Problem("project", "states no TrueNorth", "north taken as the model's +y")]
+            return _turned(*north), [Issue("true-north-from-map", "IfcMapConversion")]
+    return np.eye(3), [Issue("true-north-missing", "project")]
 
 
 def _turned(x: float, y: float) -> NDArray[np.float64]:
@@ -155,43 +152,24 @@ def _turned(x: float, y: float) -> NDArray[np.float64]:
 
 def site_location(
     model: ifcopenshell.file,
-) -> tuple[float | None, float | None, float, list[Problem]]:
+) -> tuple[float | None, float | None, float, list[Issue]]:
     """Latitude and longitude (east positive) [deg], elevation [m], and what is wrong with them."""
     for site in model.by_type("IfcSite"):
         latitude, longitude = _degrees(site.RefLatitude), _degrees(site.RefLongitude)
         try:
             scale = float(ifcopenshell.util.unit.calculate_unit_scale(model))
-        except Exception:  # broken unit assignment: reported by length_problems
+        except Exception:  # broken unit assignment: reported by length_issues
             scale = 1.0
         elevation = float(site.RefElevation or 0.0) * scale
         if latitude is None or longitude is None:
             continue
         if abs(latitude) > 90 or abs(longitude) > 180:
-            what = f"latitude {latitude:.3f}, longitude {longitude:.3f} are not on Earth"
-            return (
-                None,
-                None,
-                elevation,
-                [Problem(site.GlobalId, what, "left out: the weather file's are used")],
-            )
+            values = {"latitude": latitude, "longitude": longitude}
+            return None, None, elevation, [Issue("site-not-on-earth", site.GlobalId, values)]
         if latitude == 0 and longitude == 0:
-            return (
-                None,
-                None,
-                elevation,
-                [Problem(site.GlobalId, "site at 0 N 0 E", "left out: the weather file's is used")],
-            )
+            return None, None, elevation, [Issue("site-at-zero", site.GlobalId)]
         return latitude, longitude, elevation, []
-    return (
-        None,
-        None,
-        0.0,
-        [
-            Problem(
-                "IfcSite", "states no place", "the weather file's latitude and longitude are used"
-            )
-        ],
-    )
+    return None, None, 0.0, [Issue("site-without-position", "IfcSite")]
 
 
 def _degrees(parts: tuple[int, ...] | None) -> float | None:

@@ -49,8 +49,8 @@ def _all(psets: dict[str, dict], names: tuple[str, ...]) -> list[float]:
 
 def checked_volume(
     stated: float | None, drawn: float, psets: dict[str, dict], length_scale: float
-) -> tuple[float | None, str]:
-    """The stated volume [m3], freed of a slip of the exporter's unit, and what the slip was.
+) -> tuple[float | None, tuple[str, dict[str, float]] | None]:
+    """The stated volume [m3] without the exporter's error of unit; code and values of that error.
 
     Revit writes GrossVolume as area in m2 times height in mm: a thousand times too much. Where that
     height is not the room's own (it ends at the level above), the file states no volume of the
@@ -62,16 +62,15 @@ def checked_volume(
         length_scale: metres of the file's unit of length.
     """
     if stated is None:
-        return None, ""
+        return None, None
     for factor in (1e3, 1e-3, 1e9, 1e-9):
         if abs(stated / (factor * drawn) - 1) < 0.02:
-            return stated / factor, f"stated volume {stated:g} is {factor:g} times the drawn one"
+            slip = {"stated": stated, "factor": factor}
+            return stated / factor, ("volume-in-other-unit", slip)
     areas, heights = (_all(psets, names) for names in (AREA_NAMES, HEIGHT_NAMES))
     for height in heights:
         mixed = any(abs(stated / (area * height) - 1) < SAME for area in areas)
         if mixed and abs(length_scale - 1) > SAME:
-            return None, (
-                f"stated volume {stated:g} is its floor area times its height of {height:g} in "
-                f"another unit ({height * length_scale:.2f} m)"
-            )
-    return stated, ""
+            slip = {"stated": stated, "height": height, "height_m": height * length_scale}
+            return None, ("volume-from-mixed-units", slip)
+    return stated, None

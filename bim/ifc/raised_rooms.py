@@ -27,7 +27,7 @@ from bim.ifc.quantities import BASE_SETS
 from bim.ifc.shapes import read_shapes
 from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
-from bim.model import Problem
+from bim.report.issue import Issue, Phrase
 from bim.room_tops import Body, raised_body
 from bim.rooms import room_solid
 from bim.solids import triangles_of
@@ -44,13 +44,13 @@ SAME_HEIGHT = 0.05  # heights stated and drawn that agree to this are one [m]
 
 def raised_rooms(
     source: Source, records: Sequence[SpaceRecord], glass: GlassOfRooms
-) -> tuple[list[SpaceRecord], list[Problem]]:
+) -> tuple[list[SpaceRecord], list[Issue]]:
     """The rooms, those raised that end below their glass, and what was done with each of these."""
     low = {one.low.guid for one in glass.glass if one.low is not None}
     if not low:
         return list(records), []
     lids = _lids(source)
-    result, problems = list(records), []
+    result, issues = list(records), []
     for index, record in enumerate(records):
         if record.guid not in low:
             continue
@@ -60,15 +60,16 @@ def raised_rooms(
         most = max(float(np.ptp([record.solid.low[2], record.solid.high[2]])), 2 * reach + PLENUM)
         share = _share_above(record, area, glass)
         raised, why = _raised(source, index, result, lids, share, most)
-        gain = f"{raised.solid.high[2] - record.solid.high[2]:.2f} m"
-        top = record.solid.high[2]
-        what = f"room {record.label}: ends at {top:.2f} m, below {area:.2f} m2 of"
-        done = f"raised by {gain}, {raised.raised:.1f} m3 more" if not why else f"kept: {why}"
-        problems.append(
-            Problem(record.guid, f"{what} glass with no slab between", done, kind=f"low {why}")
-        )
+        top = float(record.solid.high[2])
+        values = {"room": record.label, "top": top, "area": area}
+        if why is None:
+            gain = float(raised.solid.high[2]) - top
+            values |= {"gain": gain, "volume": raised.raised}
+            issues.append(Issue("room-raised", record.guid, values))
+        else:
+            issues.append(Issue("room-too-low", record.guid, values | {"reason": why}))
         result[index] = raised
-    return result, problems
+    return result, issues
 
 
 def _glass_above(record: SpaceRecord, glass: GlassOfRooms) -> tuple[float, float]:
@@ -98,33 +99,33 @@ def _raised(
     lids: Sequence[Body],
     share_above: float,
     most: float,
-) -> tuple[SpaceRecord, str]:
+) -> tuple[SpaceRecord, Phrase | None]:
     """The room with the air above it, up to so much higher [m]; or as it is, and why."""
     record = records[index]
     stated = _stated_ceiling(source, record)
-    if stated:
+    if stated is not None:
         return record, stated
     others = [r for i, r in enumerate(records) if i != index]
     bodies = [triangles_of(r.solid.manifold)[0] for r in (record, *others)]
     try:
         body = raised_body_apart(bodies, lids)
     except ProcessEnded as error:
-        return record, str(error)
+        return record, Phrase("text", {"text": str(error)})
     if isinstance(body, str):
-        return record, body
+        return record, Phrase(body)
     (solid,) = solids_of([body])
     if isinstance(solid, ProcessEnded):
-        return record, str(solid)
+        return record, Phrase("text", {"text": str(solid)})
     gain = float(body[..., 2].max() - record.solid.high[2])
     if solid is None or gain < LOWEST_GAIN:
-        return record, "its ceiling is drawn"
+        return record, Phrase("ceiling-drawn")
     if gain > most:
-        return record, f"what covers it lies {gain:.2f} m above its top, a storey or more"
+        return record, Phrase("next-storey", {"gap": gain})
     if gain < PLENUM and share_above < MOSTLY:
-        return record, f"the {gain:.2f} m above it may be the void of a ceiling that is not drawn"
+        return record, Phrase("ceiling-void", {"gap": gain})
     whole = room_solid(record.guid, record.solid.name, solid.manifold)
     more = solid.volume - record.volume
-    return replace(record, solid=whole, volume=solid.volume, raised=more), ""
+    return replace(record, solid=whole, volume=solid.volume, raised=more), None
 
 
 def raised_body_apart(rooms: Sequence[Body], lids: Sequence[Body]) -> Body | str:
@@ -132,15 +133,15 @@ def raised_body_apart(rooms: Sequence[Body], lids: Sequence[Body]) -> Body | str
     return answer_apart(raised_body, rooms, lids, limit_s=LIMIT_S)
 
 
-def _stated_ceiling(source: Source, record: SpaceRecord) -> str:
-    """How the file states a suspended ceiling at the top of a space; "" if it does not."""
+def _stated_ceiling(source: Source, record: SpaceRecord) -> Phrase | None:
+    """How the file states a suspended ceiling at the top of a space; None if it does not."""
     guid = record.guid.partition("-")[0]
     space = source.model.by_guid(guid) if len(guid) == 22 else None
     if space is None or not space.is_a("IfcSpace"):
-        return ""
+        return None
     for relation in getattr(space, "HasCoverings", None) or ():
         if any(c.PredefinedType == "CEILING" for c in relation.RelatedCoverings):
-            return "a ceiling covers it in the file"
+            return Phrase("ceiling-covers")
     psets = psets_of(space)
     scale = source.quantity_scales().length
     drawn = float(np.ptp([record.solid.low[2], record.solid.high[2]]))
@@ -149,8 +150,9 @@ def _stated_ceiling(source: Source, record: SpaceRecord) -> str:
         if finish is None or height is None or height - finish < SAME_HEIGHT / scale:
             continue
         if abs(finish * scale - drawn) < SAME_HEIGHT:
-            return f"FinishCeilingHeight is {finish * scale:.2f} m of {height * scale:.2f} m"
-    return ""
+            values = {"height": finish * scale, "of": height * scale}
+            return Phrase("finish-ceiling-height", values)
+    return None
 
 
 def _lids(source: Source) -> list[Body]:

@@ -10,7 +10,7 @@ import ifcopenshell
 
 from bim.ifc.project import open_ifc
 from bim.ifc.property_sets import Entity, give_set, save
-from bim.model import Problem
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 
 SET_NAME = "CFS results"
@@ -25,11 +25,11 @@ def write_results(
     *,
     set_name: str = SET_NAME,
     description: str = "Computed by mitsuba-cfs",
-) -> tuple[Problem, ...]:
+) -> tuple[Issue, ...]:
     """Write `out`: the model with a property set of results on each element; what had no place.
 
     A set of that name that an element already has is replaced.  Rooms found from geometry have no
-    entity in the file: they are returned as problems.
+    entity in the file: they are returned as issues.
 
     Args: results: GUID of a space, window or other element -> name of the result, with its unit in
         the name -> value.
@@ -37,21 +37,20 @@ def write_results(
         `ValueError` for a value that is no number, truth value or text.
     """
     model = open_ifc(path)
-    problems = []
+    issues = []
     for guid, values in results.items():
         try:
             element = model.by_guid(guid)
         except RuntimeError:
-            what = "no element of that GUID: results not written"
-            problems.append(Problem(guid, what, "rooms found from geometry have no entity"))
+            issues.append(Issue("result-without-element", guid))
             continue
         properties = [_property(model, name, value) for name, value in values.items()]
         if properties:
             give_set(model, [element], set_name, description, properties)
-    if results and len(problems) == len(results):
+    if results and len(issues) == len(results):
         raise DataError("holds none of the elements that have results", file=path)
     save(model, out)
-    return tuple(problems)
+    return tuple(issues)
 
 
 def _property(model: ifcopenshell.file, name: str, value: Value) -> Entity:

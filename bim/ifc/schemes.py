@@ -17,7 +17,7 @@ import numpy as np
 
 from bim.guarded import shared_volumes
 from bim.ifc.spaces import OVERLAPPING, SpaceRecord
-from bim.model import Problem
+from bim.report.issue import Issue, Phrase
 from bim.solids import packed
 from mitsuba_cfs.processes import ProcessEnded
 
@@ -31,34 +31,34 @@ Key = Callable[[ifcopenshell.entity_instance], str]
 
 def one_of_each(
     model: ifcopenshell.file, records: Sequence[SpaceRecord]
-) -> tuple[list[SpaceRecord], list[SpaceRecord], list[Problem]]:
+) -> tuple[list[SpaceRecord], list[SpaceRecord], list[Issue]]:
     """The spaces with each room once, those left out for that, and what overlaps still."""
-    shared, problems = shared_by_pair(records)
+    shared, issues = shared_by_pair(records)
     left = set(range(len(records)))
     for name, key in (("PredefinedType", _predefined), ("ObjectType", _object), ("group", _group)):
         gone, chosen = _by_scheme(model, records, _same(records, shared, left), key)
         if gone:
             left -= gone
-            what = (
-                f"rooms are drawn several times, by {name}: {_schemes(gone, records, model, key)}"
-            )
-            done = f"{len(gone)} spaces left out, those of {chosen or 'none'} are the rooms"
-            problems.append(Problem("IfcSpace", what, done))
+            values = {
+                "attribute": name, "schemes": _schemes(gone, records, model, key),
+                "count": len(gone), "chosen": chosen or Phrase("no-scheme"),
+            }  # fmt: skip
+            issues.append(Issue("rooms-of-several-schemes", "IfcSpace", values))
     gone = _filled(records, _same(records, shared, left), shared)
     if gone:
         left -= gone
-        what = f"{len(gone)} rooms are drawn again: {', '.join(records[i].label for i in gone)}"
-        problems.append(Problem("IfcSpace", what, "left out, the smaller ones are the rooms"))
+        values = {"count": len(gone), "rooms": tuple(records[i].label for i in gone)}
+        issues.append(Issue("rooms-drawn-again", "IfcSpace", values))
     for (i, j), volume in shared.items():
         a, b = records[i], records[j]
         if {i, j} <= left and volume > TOUCHING * min(a.volume, b.volume):
-            what = f"spaces {a.solid.name} and {b.solid.name} overlap by {volume:.2f} m3"
-            problems.append(Problem(a.guid, what, "both kept as drawn", kind=OVERLAPPING))
+            overlap = {"room": a.solid.name, "other": b.solid.name, "volume": volume}
+            issues.append(Issue(OVERLAPPING, a.guid, overlap))
     kept = [record for i, record in enumerate(records) if i in left]
-    return kept, [record for i, record in enumerate(records) if i not in left], problems
+    return kept, [record for i, record in enumerate(records) if i not in left], issues
 
 
-def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Problem]]:
+def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Issue]]:
     """Volume [m3] that each pair of spaces shares, where it is any, and what was not worked out."""
     near = {
         i: [
@@ -70,15 +70,15 @@ def shared_by_pair(records: Sequence[SpaceRecord]) -> tuple[Shared, list[Problem
     bodies = {i: packed(records[i].solid.manifold) for i in near}
     items = [(bodies[i], [bodies[j] for j in others]) for i, others in near.items() if others]
     volumes = iter(shared_volumes(items))
-    found, problems = {}, []
+    found, issues = {}, []
     for i, others in near.items():
         shared = next(volumes) if others else []
         if isinstance(shared, ProcessEnded):
-            what = f"space {records[i].solid.name}: what it shares with others: {shared}"
-            problems.append(Problem(records[i].guid, what, "taken as nothing"))
+            values = {"room": records[i].solid.name, "reason": str(shared)}
+            issues.append(Issue("overlap-not-computed", records[i].guid, values))
             continue
         found |= {(i, j): volume for j, volume in zip(others, shared, strict=True) if volume > 0}
-    return found, problems
+    return found, issues
 
 
 def _same(records: Sequence[SpaceRecord], shared: Shared, left: set[int]) -> list[tuple[int, int]]:
@@ -126,9 +126,12 @@ def _filled(
 
 def _schemes(
     gone: set[int], records: Sequence[SpaceRecord], model: ifcopenshell.file, key: Key
-) -> str:
+) -> tuple[Phrase, ...]:
     count = Counter(key(_entity(model, records[i])) for i in gone)
-    return ", ".join(f"{name or 'none'} ({number})" for name, number in sorted(count.items()))
+    return tuple(
+        Phrase("scheme", {"name": name or Phrase("no-scheme"), "count": number})
+        for name, number in sorted(count.items())
+    )
 
 
 def _entity(model: ifcopenshell.file, record: SpaceRecord) -> ifcopenshell.entity_instance:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.ifc.looks import Look, look_of
-from bim.model import Problem
 from bim.rays import RayMesh, ray_mesh
+from bim.report.issue import Issue
 
 LOG = logging.getLogger(__name__)
 # exact polyhedra first, OpenCASCADE for curved bodies: half the time of OpenCASCADE alone on the
@@ -79,8 +79,8 @@ def read_shapes(
     without: Collection[int] = (),
     cut_openings: bool = True,
     skipped: Sequence[str] = SKIPPED,
-) -> tuple[dict[int, Shape], list[Problem]]:
-    """Shapes by STEP id, in the file's order; products that cannot be meshed are problems.
+) -> tuple[dict[int, Shape], list[Issue]]:
+    """Shapes by STEP id, in the file's order; products that cannot be meshed are issues.
 
     Args:
         progress: called with the fraction done, 0 to 1.
@@ -121,14 +121,14 @@ def read_shapes(
                     break
     except RuntimeError as error:
         LOG.warning("geometry: %s", error)
-    problems = [
-        Problem(p.GlobalId, f"{p.is_a()} {p.Name or ''}: geometry cannot be meshed", "left out")
+    issues = [
+        Issue("geometry-not-meshed", p.GlobalId, {"element": f"{p.is_a()} {p.Name or ''}"})
         for p in wanted
         if p.id() not in shapes
     ]
     # the iterator gives shapes as its threads finish them, which no two runs do alike: in that
     # order a model would have another hash in the cache, and other sums, each time it is read
-    return {p.id(): shapes[p.id()] for p in wanted if p.id() in shapes}, problems
+    return {p.id(): shapes[p.id()] for p in wanted if p.id() in shapes}, issues
 
 
 def _has_body(product: ifcopenshell.entity_instance) -> bool:

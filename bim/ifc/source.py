@@ -15,8 +15,8 @@ from bim.ifc.looks import Look
 from bim.ifc.placing import Placed, ground_level, in_world
 from bim.ifc.project import (
     area_scale,
-    ending_problems,
-    length_problems,
+    ending_issues,
+    length_issues,
     length_scale,
     north_rotation,
     open_ifc,
@@ -25,7 +25,7 @@ from bim.ifc.project import (
 from bim.ifc.quantities import QuantityScales
 from bim.ifc.shapes import NO_ELEMENTS, Shape, read_shapes
 from bim.ifc.transparent import judged_transparent
-from bim.model import Problem
+from bim.report.issue import Issue
 
 Progress = Callable[[str, float], None]
 
@@ -41,7 +41,7 @@ class Source:
     latitude_deg: float | None
     longitude_deg: float | None
     elevation: float
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
 
     @property
     def shapes(self) -> dict[int, Shape]:
@@ -83,7 +83,7 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     """The opened model, its shapes meshed, corrected and placed."""
     tell("opening", 0.0)
     model = open_ifc(path)
-    problems = ending_problems(path) + length_problems(model)
+    issues = ending_issues(path) + length_issues(model)
     rotation, more = north_rotation(model)
     latitude, longitude, elevation, site = site_location(model)
     removed = corrections.removed(model)
@@ -93,20 +93,20 @@ def read_source(path: str | Path, corrections: Corrections, tell: Progress) -> S
     unglazed = corrections.unglazed(model)
     shapes |= {key: opaque(shapes[key]) for key in unglazed if key in shapes}
     shapes, phantoms = judged_transparent(model, shapes)
-    problems += more + site + faults + phantoms
+    issues += more + site + faults + phantoms
     for step_id, paint in corrections.painted(model).items():
         if step_id in shapes:
             shapes[step_id] = painted(shapes[step_id], paint)
     if corrections.file:
-        what = (
-            f"{len(removed)} products left out, {len(corrections.painted(model))} repainted,"
-            f" {len(unglazed)} without glass"
-        )
-        problems.append(Problem(corrections.file, "corrections are used", what))
+        values = {
+            "removed": len(removed), "repainted": len(corrections.painted(model)),
+            "unglazed": len(unglazed),
+        }  # fmt: skip
+        issues.append(Issue("corrections-used", corrections.file, values))
     placed = in_world(shapes, rotation)
     return Source(
         Path(path), model, placed, corrections, latitude, longitude, elevation,
-        tuple([*problems, *placed.problems]),
+        tuple([*issues, *placed.issues]),
     )  # fmt: skip
 
 
@@ -126,6 +126,6 @@ def painted(shape: Shape, paint: Paint) -> Shape:
         else replace(look, **values)
         for look in shape.looks
     )
-    plain = Look("correction", paint.visible, 0.0, "", paint.solar, paint.gloss)
+    plain = Look("correction", paint.visible, 0.0, None, paint.solar, paint.gloss)
     index = np.where(shape.look < 0, len(looks), shape.look)
     return replace(shape, looks=(*looks, plain), look=index, is_painted=True)

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from bim.ifc.project import length_scale
 from bim.ifc.source import Source
-from bim.model import Face, Problem, Space
+from bim.model import Face, Space
 from bim.planes import newell_normal
+from bim.report.issue import Issue
 
 SAME_SHARE, SAME_AREA = 0.05, 0.2  # areas that differ by less agree: share, and [m2]
 RELATION = "IfcRelSpaceBoundary"
@@ -37,7 +38,7 @@ class _Stated:
     beyond: dict[str, float] = field(default_factory=lambda: defaultdict(float))  # area by word
 
 
-def boundary_problems(source: Source, spaces: Sequence[Space]) -> list[Problem]:
+def boundary_issues(source: Source, spaces: Sequence[Space]) -> list[Issue]:
     """How the file's second-level boundaries differ from the rooms' faces."""
     model = source.model
     relations = model.by_type(RELATION)
@@ -45,24 +46,22 @@ def boundary_problems(source: Source, spaces: Sequence[Space]) -> list[Problem]:
     if not relations:
         return []
     if not second:
-        what = f"has {len(relations)} space boundaries, none of the second level"
-        return [Problem(RELATION, what, "not used: neighbours are found from geometry")]
+        return [Issue("boundaries-first-level", RELATION, {"count": len(relations)})]
     stated, unread = _stated(second, length_scale(model))
     rooms = {space.guid: space for space in spaces}
-    problems, compared = [], 0
+    issues, compared = [], 0
     hosts = _hosts(model)
     for (room, element), theirs in stated.items():
         if room not in rooms:
             continue
         compared += 1
-        problems += _differences(model.by_guid(element), theirs, rooms[room], hosts)
-    differing = len({(p.where, p.what.partition(":")[0]) for p in problems})
-    what = (
-        f"has {len(second)} second-level space boundaries of {compared} pairs of room and element:"
-        f" {compared - differing} agree with ours within {100 * SAME_SHARE:.0f} %"
-        + (f", {unread} of a shape that is not read" if unread else "")
-    )
-    return [Problem(RELATION, what, "not used: neighbours are found from geometry"), *problems]
+        issues += _differences(model.by_guid(element), theirs, rooms[room], hosts)
+    differing = len({(i.where, i.values["room"]) for i in issues})
+    values = {
+        "count": len(second), "pairs": compared, "agreeing": compared - differing,
+        "percent": 100 * SAME_SHARE, "unread": unread,
+    }  # fmt: skip
+    return [Issue("boundaries-compared", RELATION, values), *issues]
 
 
 def _hosts(model: ifcopenshell.file) -> dict[str, str]:
@@ -143,17 +142,16 @@ def _differences(
     theirs: _Stated,
     room: Space,
     hosts: Mapping[str, str],
-) -> list[Problem]:
+) -> list[Issue]:
     """What the file says otherwise of one element at a room."""
     faces = [f for f in room.faces if f.element == element.GlobalId and f.kind != "reveal"]
     net, gross = _own_areas(element.GlobalId, faces, room, hosts)
-    label = f"{element.is_a()} {element.Name or ''} at room {room.label}"
+    values = {"element": f"{element.is_a()} {element.Name or ''}", "room": room.label}
     between = net < theirs.area < gross  # with some of its openings
     if not (between or _agree(theirs.area, net) or _agree(theirs.area, gross)):
-        own = f"{net:.2f}" if _agree(net, gross) else f"{net:.2f} to {gross:.2f}"
-        what = f"{label}: {theirs.area:.2f} m2 by the file's boundaries, {own} m2 by ours"
-        kind = "boundary's area" if net else "boundary without a face"
-        return [Problem(element.GlobalId, what, "ours are used", kind=kind)]
+        areas = {"stated": theirs.area, "net": net, "gross": gross}
+        code = "boundary-area-differs" if net else "boundary-without-face"
+        return [Issue(code, element.GlobalId, values | areas)]
     word = max(theirs.beyond, key=lambda key: theirs.beyond[key])
     beyond: Mapping[str, float] = _by_adjacency(faces)
     if not beyond or word not in (*OUTSIDE, "INTERNAL"):
@@ -161,8 +159,8 @@ def _differences(
     ours = max(beyond, key=lambda key: beyond[key])
     if ours in OUTSIDE.get(word, INSIDE):
         return []
-    what = f"{label}: {word.lower()} by the file's boundaries, {ours} by ours"
-    return [Problem(element.GlobalId, what, "ours is used", kind="boundary's neighbour")]
+    neighbours = {"stated": word.lower(), "computed": ours}
+    return [Issue("boundary-neighbour-differs", element.GlobalId, values | neighbours)]
 
 
 def _own_areas(

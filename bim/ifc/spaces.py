@@ -14,10 +14,10 @@ from bim.guarded import spaces_of
 from bim.ifc.project import psets_of, storey_of
 from bim.ifc.quantities import QuantityScales, checked_volume, stated_quantities
 from bim.ifc.shapes import Shape
-from bim.model import Problem
 from bim.names import label_of
 from bim.planes import Facet
 from bim.rays import RayMesh
+from bim.report.issue import Effect, Issue, Phrase
 from bim.rooms import RoomSolid, room_solid
 from bim.surroundings import sample_points
 from mitsuba_cfs.processes import ProcessEnded
@@ -26,7 +26,7 @@ SMALLEST_SPACE = 0.2  # smaller spaces are beams or ducts of the wrong class [m3
 UNCOVERED = 0.7  # share of the ceiling under the open sky from which a space has no roof
 WALLLESS = 0.5  # share of its sides without anything near from which it has no walls
 SIDE_REACH = 1.0  # how far from a side its wall may be [m]
-OVERLAPPING = "spaces overlap"  # kind of a problem
+OVERLAPPING = "spaces-overlap"  # code of the issue
 INSIDE = 0.3  # rays start this far inside: rooms drawn into their walls and roof [m]
 
 
@@ -59,10 +59,10 @@ def read_spaces(
     model: ifcopenshell.file,
     shapes: dict[int, Shape],
     scales: QuantityScales,
-) -> tuple[list[SpaceRecord], list[Problem]]:
-    """Every space that is indoors and has a body; the others are problems."""
+) -> tuple[list[SpaceRecord], list[Issue]]:
+    """Every space that is indoors and has a body; the others are issues."""
     records: list[SpaceRecord] = []
-    problems: list[Problem] = []
+    issues: list[Issue] = []
     seen: set[str] = set()
     spaces = model.by_type("IfcSpace")
     drawn = {space.id(): shapes[space.id()] for space in spaces if space.id() in shapes}
@@ -73,33 +73,36 @@ def read_spaces(
         guid = space.GlobalId
         if guid in seen:
             guid = f"{guid}-{space.id()}"
-            what = f"space {label}: GlobalId is used twice"
-            problems.append(Problem(space.GlobalId, what, f"called {guid} here"))
+            values = {"room": label, "guid": guid}
+            issues.append(Issue("space-guid-repeated", space.GlobalId, values))
         seen.add(guid)
         psets = psets_of(space)
         if is_outdoors(space, psets):
-            problems.append(
-                Problem(guid, f"space {label}: is marked as external", "left out", "room")
-            )
+            issues.append(Issue("space-external", guid, {"room": label}, Effect("room")))
             continue
         if space.id() not in solids:
-            problems.append(Problem(guid, f"space {label}: has no geometry", "left out", "room"))
+            issues.append(Issue("space-without-geometry", guid, {"room": label}, Effect("room")))
             continue
         solid = solids[space.id()]
-        if solid is None or isinstance(solid, ProcessEnded):
-            why = "its geometry encloses no volume" if solid is None else f"its geometry: {solid}"
-            problems.append(Problem(guid, f"space {label}: {why}", "left out", "room"))
+        if solid is None:
+            issues.append(Issue("space-encloses-nothing", guid, {"room": label}, Effect("room")))
+            continue
+        if isinstance(solid, ProcessEnded):
+            values = {"room": label, "reason": str(solid)}
+            issues.append(Issue("space-not-computed", guid, values, Effect("room")))
             continue
         if solid.volume < SMALLEST_SPACE:
-            what = f"space {label}: holds {solid.volume:.3f} m3 only"
-            problems.append(Problem(guid, what, "no room: left out", "room"))
+            values = {"room": label, "volume": solid.volume}
+            issues.append(Issue("space-too-small", guid, values, Effect("room")))
             continue
         if solid.repair:
-            problems.append(Problem(guid, f"space {label}: its shell was not sound", solid.repair))
+            values = {"room": label, "repair": Phrase(solid.repair)}
+            issues.append(Issue("space-repaired", guid, values))
         area, volume = stated_quantities(psets, scales)
         volume, slip = checked_volume(volume, solid.volume, psets, scales.length)
-        if slip:
-            problems.append(Problem(guid, f"space {label}: {slip}", "the drawn one is used"))
+        if slip is not None:
+            code, values = slip
+            issues.append(Issue(code, guid, {"room": label, **values}))
         records.append(
             SpaceRecord(
                 room_solid(guid, label, solid.manifold),
@@ -112,7 +115,7 @@ def read_spaces(
                 _type_name(space),
             )
         )
-    return records, problems
+    return records, issues
 
 
 def _type_name(space: ifcopenshell.entity_instance) -> str:
@@ -133,25 +136,24 @@ def is_outdoors(space: ifcopenshell.entity_instance, psets: dict[str, dict]) -> 
 
 def enclosed_spaces(
     records: Sequence[SpaceRecord], building: RayMesh
-) -> tuple[list[SpaceRecord], list[Problem]]:
-    """The spaces that building elements enclose; those under the open sky are problems.
+) -> tuple[list[SpaceRecord], list[Issue]]:
+    """The spaces that building elements enclose; those under the open sky are issues.
 
     Rays from just below its ceiling go up, rays from its sides go out: a space is outdoors where
     most of both meet nothing.  A room whose roof is only missing in the file is kept.
     """
-    kept, problems = [], []
+    kept, issues = [], []
     for record in records:
         facets = record.solid.facets
         upper = [facet for facet in facets if facet.plane.normal[2] > 0.3]
         sides = [facet for facet in facets if abs(facet.plane.normal[2]) <= 0.3]
         roofless = _open_share(upper, np.array([0.0, 0.0, 1.0]), np.inf, building) > UNCOVERED
         if roofless and _open_share(sides, None, SIDE_REACH, building) > WALLLESS:
-            what = f"space {record.solid.name}: no roof covers it and no walls enclose it"
-            done = "taken as outdoors, left out"
-            problems.append(Problem(record.solid.guid, what, done, "room"))
+            values = {"room": record.solid.name}
+            issues.append(Issue("space-outdoors", record.solid.guid, values, Effect("room")))
         else:
             kept.append(record)
-    return kept, problems
+    return kept, issues
 
 
 def _open_share(

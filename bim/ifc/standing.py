@@ -9,7 +9,8 @@ from pathlib import Path
 from bim.ifc.corrections import Corrections, chosen, corrections_beside
 from bim.ifc.elements import outdoor_elements
 from bim.ifc.source import Progress, read_source
-from bim.model import Element, Problem
+from bim.model import Element
+from bim.report.issue import Issue
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +19,7 @@ class Standing:
 
     elements: tuple[Element, ...]
     chosen: tuple[frozenset[str], ...]  # GUIDs that each selector chose, in their order
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
     name: str
 
 
@@ -45,4 +46,4 @@ def read_standing(
         frozenset(source.model.by_id(i).GlobalId for i in chosen(source.model, query, selected_in))
         for query in select
     )
-    return Standing(tuple(elements), found, source.problems, source.name)
+    return Standing(tuple(elements), found, source.issues, source.name)

@@ -40,7 +40,7 @@ class Surveyed:
     areas_to_middles: int = 0  # of them: agree with the floor to the middle of the walls
     volumes: int = 0  # rooms that state a volume
     volumes_agreeing: int = 0
-    problems: int = 0
+    issues: int = 0
     check_s: float = 0.0  # reading and checking
     export_s: float = 0.0  # every room for Radiance, EnergyPlus and glTF
     cpu_s: float = 0.0  # of both, all threads: the same on a busy machine
@@ -95,7 +95,7 @@ def _surveyed(path: Path) -> Surveyed:
         sum(s.area_to_middles is not None for s in areas),
         len(volumes),
         sum(agree(s.drawn_volume, s.stated_volume) for s in volumes),
-        len(building.problems),
+        len(building.issues),
         check_s,
         export_s,
         cpu_s,
@@ -125,7 +125,7 @@ def markdown(rows: Sequence[Surveyed]) -> str:
     """The table of the files, and a line of sums below it."""
     head = (
         "| file | MB | schema | rooms | of spaces | with windows | windows | glass m2 | of all "
-        "| verdict | open | area | volume | problems | check s | export s | CPU s | memory MB |"
+        "| verdict | open | area | volume | issues | check s | export s | CPU s | memory MB |"
     )
     lines = [head, "|---" * head.count(" | ") + "|---|"]
     for row in rows:
@@ -141,7 +141,7 @@ def markdown(rows: Sequence[Surveyed]) -> str:
             f"| {row.rooms_with_windows} | {row.windows} | {row.glass:.1f} "
             f"| {_share(row.glass_used, row.glass_out)} | {row.verdict} | {row.open_rooms} "
             f"| {_of(area, row.areas)} | {_of(str(row.volumes_agreeing), row.volumes)} "
-            f"| {row.problems} | {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} "
+            f"| {row.issues} | {row.check_s:.1f} | {row.export_s:.1f} | {row.cpu_s:.1f} "
             f"| {row.memory_mb:.0f} |"
         )
     total = {f.name: sum(getattr(r, f.name) for r in rows) for f in fields(Surveyed)

@@ -124,7 +124,7 @@ def _room(building: Building, name: str, path: str | Path):
     try:
         return found_by_name(building.spaces, name, "room")
     except (KeyError, ValueError) as error:
-        raise DataError(str(error.args[0]), file=path, field="--space") from None
+        raise DataError(str(error.args[0]), file=path, field="space") from None
 
 
 def _storey(building: Building, name: str, path: str | Path) -> str:
@@ -133,7 +133,7 @@ def _storey(building: Building, name: str, path: str | Path) -> str:
     found = found or [one for one in storeys if one.casefold() == name.strip().casefold()]
     if len(found) != 1:
         message = f"no storey {name!r} with rooms; there are: {listed(name, storeys)}"
-        raise DataError(message, file=path, field="--storey")
+        raise DataError(message, file=path, field="storey")
     return found[0]
 
 
@@ -153,7 +153,7 @@ def _sector(name: str, building: Building, path: str | Path) -> tuple[float, flo
         f"no facade {name!r}: expected N, NE, E, ..., roof, or azimuths from-to as 150-210; "
         f"windows face: {there or 'nowhere'}"
     )
-    raise DataError(message, file=path, field="--facade")
+    raise DataError(message, file=path, field="facade")
 
 
 def _faces(window: Window, sector: tuple[float, float] | None) -> bool:

@@ -38,14 +38,16 @@ from bim.apertures import FLAT, main_direction
 from bim.defaults import UNKNOWN_MATERIAL
 from bim.ifc.materials import default_material
 from bim.ifc.shapes import NO_ELEMENTS, Shape
-from bim.model import Problem
 from bim.names import plain_text
 from bim.planes import area_vectors, principal_extents
 from bim.rays import RayMesh, ray_mesh
+from bim.report.issue import Effect, Issue, Phrase
 
 JUDGED = ("IfcWall", "IfcSlab", "IfcRoof", "IfcCovering", "IfcBuildingElementProxy")
 THINNEST, THICKEST = 0.001, 0.06  # of a pane with its spacers [m]
-PHANTOM = "no glass"  # kinds of problems that begin so are of transparent surfaces without glass
+NO_GLASS = (  # codes of the issues of transparent surfaces that are no glass
+    "transparent-taken-as-opaque", "transparent-left-out", "transparent-facing-down",
+)  # fmt: skip
 BAR = 0.2  # width up to which a member is no pane [m]
 LIES_ON = 0.03  # from a sheet to what it lies on [m]
 WITHIN = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / [[3], [6], [6], [6]]  # triangles
@@ -66,13 +68,13 @@ NOT_GLASS = re.compile(r"glass ?wool|glaswol|glasvlies|laine de verre|fib\w* ?(d
 
 def judged_transparent(
     model: ifcopenshell.file, shapes: dict[int, Shape]
-) -> tuple[dict[int, Shape], list[Problem]]:
+) -> tuple[dict[int, Shape], list[Issue]]:
     """Shapes whose transparent looks are glass, the others opaque or left out, and which they were.
 
     Args: shapes: by STEP id [m].
     """
     kept: dict[int, Shape] = {}
-    problems = []
+    issues = []
     judgements = {
         key: _judged(model.by_id(key), shape)
         for key, shape in shapes.items()
@@ -84,18 +86,18 @@ def judged_transparent(
         if key not in judgements:
             kept[key] = shape
             continue
-        on_another = None, "which lies on something else"
+        on_another = None, "on-another-body"
         judged, why = on_another if key in lying else judgements[key]
         if judged is not None:
             kept[key] = judged
         if judged is not shape:
             area = transparent_area(shape)
-            what = f"{shape.ifc_class} {shape.name}: {area:.2f} m2 transparent, {why}"
-            done = "no glass: left out" if judged is None else "no glass: taken as opaque"
-            problems.append(
-                Problem(shape.guid, what, done, glass=area, kind=f"{PHANTOM} {why} {done}")
-            )
-    return kept, problems
+            values = {
+                "element": f"{shape.ifc_class} {shape.name}", "area": area, "reason": Phrase(why),
+            }  # fmt: skip
+            code = "transparent-left-out" if judged is None else "transparent-taken-as-opaque"
+            issues.append(Issue(code, shape.guid, values, Effect(glass=area)))
+    return kept, issues
 
 
 def is_phantom(ifc_class: str, normal: np.ndarray) -> bool:
@@ -111,17 +113,17 @@ def transparent_area(shape: Shape) -> float:
 
 
 def _judged(element: ifcopenshell.entity_instance, shape: Shape) -> tuple[Shape | None, str]:
-    """The shape as it is, opaque, or None where it is no body, and why."""
+    """The shape as it is, opaque, or None where it is no body, and the phrase that says why."""
     if shape.ifc_class.startswith("IfcMember"):
         if not _is_bar(shape):
             return shape, ""
         solid = tuple(replace(look, transparency=0.0) for look in shape.looks)
-        return replace(shape, looks=solid), "a bar of a frame"
+        return replace(shape, looks=solid), "bar"
     materials = _material_texts(element)
     own = plain_text(f"{element.Name or ''} {getattr(element, 'ObjectType', None) or ''}")
     thickness = _thickness(shape)
     if SEPARATION.search(own) or (materials and all(_is_air(text) for text in materials)):
-        return None, "which the file calls air or a separation of rooms"
+        return None, "air"
     looks = tuple(
         look if not look.is_glass or _is_pane(look, materials, thickness)
         else replace(look, transparency=0.0)
@@ -130,10 +132,10 @@ def _judged(element: ifcopenshell.entity_instance, shape: Shape) -> tuple[Shape 
     if looks == shape.looks:
         return shape, ""
     if thickness < THINNEST:
-        return None, "without thickness"
+        return None, "no-thickness"
     if any(_names_a_body(text) for text in materials):
-        return replace(shape, looks=looks), "of a material that is no glass"
-    return replace(shape, looks=looks), "which nothing calls glass"
+        return replace(shape, looks=looks), "other-material"
+    return replace(shape, looks=looks), "not-called-glass"
 
 
 def _lying(

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bim.defaults import default_construction
-from bim.model import Building, Element, Face, Problem, Space, Window
+from bim.model import Building, Element, Face, Space, Window
 from bim.names import numbered
 from bim.radiance.daylight import held_states, opaque_objects, scene_windows
 from bim.radiance.indoors import THICK, Indoors, indoors_of
 from bim.radiance.materials import SYSTEMS
 from bim.radiance.scene import RadianceObject, RadianceScene, read_radiance
+from bim.report.issue import Issue
 from bim.shell import enclosed_volume, open_edges
 from mitsuba_cfs.errors import DataError, RoomError
 
@@ -46,14 +47,14 @@ def read_radiance_building(path: Path, apertures: Sequence[str] = ()) -> Buildin
         raise DataError("has no opaque surface", file=path)
     indoors = indoors_of(objects, windows)
     if not indoors.bounds.any():
-        raise DataError("no surface is indoors: is the room closed?", file=path, field="--aperture")
-    space, problems = _space(path.stem, objects, indoors, windows)
+        raise DataError("no surface is indoors: is the room closed?", file=path, field="aperture")
+    space, issues = _space(path.stem, objects, indoors, windows)
     elements = tuple(
         _element(f"{path.stem}-{i}", thing, thing.triangles)
         for i, thing in enumerate(objects)
         if not indoors.stands[indoors.owner == i].any()
     )
-    found = (*scene.problems, *problems)
+    found = (*scene.issues, *issues)
     return Building(path.stem, (space,), elements, found, file=path)
 
 
@@ -63,7 +64,7 @@ def _clear(scene: RadianceScene, path: Path) -> list[str]:
     if not names:
         there = ", ".join(sorted({thing.material.name for thing in scene.objects})[:12])
         message = f"has no glass and no BSDF: name the windows' material, there are {there}"
-        raise DataError(message, file=path, field="--aperture")
+        raise DataError(message, file=path, field="aperture")
     return sorted(names)
 
 
@@ -72,7 +73,7 @@ def _space(
     objects: Sequence[RadianceObject],
     indoors: Indoors,
     windows: tuple[Window, ...],
-) -> tuple[Space, list[Problem]]:
+) -> tuple[Space, list[Issue]]:
     pieces = _furniture(objects, indoors)
     seen = indoors.bounds.any(axis=0) & ~indoors.furniture
     faces = _faces(objects, indoors.outward(seen), indoors.owner[seen], windows)
@@ -82,21 +83,17 @@ def _space(
     shell = np.concatenate([part.triangles for part in (*faces, *windows)])
     volume = enclosed_volume(shell)
     drawn = floor * float(np.ptp(shell[..., 2]))
-    problems = [
-        Problem(name, "a Radiance scene states no constructions",
-                "default ones; walls without windows are adiabatic")
-    ]  # fmt: skip
+    issues = [Issue("constructions-unstated", name)]
     if not LIKELY[0] * drawn < volume < LIKELY[1] * drawn:
-        what = f"its surfaces enclose {volume:.1f} m3, floor times height is {drawn:.1f} m3"
-        problems.append(Problem(name, what, "the latter is used"))
+        values = {"room": name, "enclosed": volume, "drawn": drawn}
+        issues.append(Issue("volume-from-floor-and-height", name, values))
         volume = drawn
     leaks = open_edges(shell)
     if leaks:
-        what = f"room {name}: {leaks} edges of its surfaces do not meet another's"
-        problems.append(Problem(name, what, "light may leak there, where there is a gap"))
+        issues.append(Issue("room-with-open-edges", name, {"room": name, "count": leaks}))
     return Space(
         f"{name}-room", name, "", volume, floor, faces, windows, volume, furniture=pieces
-    ), problems
+    ), issues
 
 
 def _faces(

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Problem
 from bim.radiance import shapes
 from bim.radiance.generators import GENERATORS, Polygon
 from bim.radiance.materials import MATERIALS, PATTERNS, RadianceMaterial, material_of
 from bim.radiance.primitives import VOID, Command, Primitive, read_statements
 from bim.radiance.xform import Xform, read_xform
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 
 DEEPEST = 32  # files that call each other
@@ -42,7 +42,7 @@ class RadianceScene:
 
     objects: tuple[RadianceObject, ...]
     files: tuple[Path, ...]  # all that were read
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
 
     def of_modifiers(self, names: Iterable[str]) -> list[RadianceObject]:
         """The surfaces that one of these materials or modifiers colours.
@@ -66,7 +66,7 @@ def read_radiance(
     """The surfaces of Radiance scene files, read one after the other as `oconv` does.
 
     Read are polygon, sphere, bubble, cylinder, tube, cone, cup, ring, alias, all materials, and
-    the commands `xform`, `genbox` and `genprism`; the scene's `problems` name what else there is.
+    the commands `xform`, `genbox` and `genprism`; the scene's `issues` name what else there is.
     Paths in commands hold from the working directory of the files: their own folder, or `root`.
 
     Args:
@@ -83,7 +83,7 @@ def read_radiance(
     whole = Xform((np.diag([scale, scale, scale, 1.0]),), ())
     for path in paths:
         reader.read(path, (whole,), ())
-    return RadianceScene(tuple(reader.objects), tuple(reader.files), tuple(reader.problems()))
+    return RadianceScene(tuple(reader.objects), tuple(reader.files), tuple(reader.issues()))
 
 
 class _Reader:
@@ -96,8 +96,8 @@ class _Reader:
         self.defined: dict[str, Primitive] = {}
         self.objects: list[RadianceObject] = []
         self.files: list[Path] = []
-        self.left_out: Counter[str] = Counter()
-        self.first: dict[str, Primitive] = {}
+        self.left_out: Counter[tuple[str, str]] = Counter()  # by code and type
+        self.first: dict[tuple[str, str], Primitive] = {}
 
     def read(self, path: Path, outer: tuple[Xform, ...], above: tuple[Path, ...]) -> None:
         """Add what a file holds, in the places that the `xform`s around it give."""
@@ -155,7 +155,7 @@ class _Reader:
         else:
             if kind not in ("source", "instance", "mesh"):
                 self.defined[primitive.name] = primitive  # a mixture, a prism ...
-            self._leave_out(kind, primitive)
+            self._leave_out("primitives-not-read", primitive, kind)
 
     def _add(self, primitive: Primitive, outer: tuple[Xform, ...]) -> None:
         given = next((x.modifier for x in outer if x.modifier is not None), primitive.modifier)
@@ -165,7 +165,7 @@ class _Reader:
         material, modifiers = found
         triangles = shapes.triangles_of(primitive)
         if not len(triangles):
-            self._leave_out("surfaces without area", primitive)
+            self._leave_out("surfaces-without-area", primitive)
             return
         for place in _places(outer):
             moved = triangles @ place[:3, :3].T + place[:3, 3]
@@ -195,29 +195,27 @@ class _Reader:
                 modifier = definition.strings[0]
             elif definition.kind in MATERIALS:
                 if definition.modifier != VOID:
-                    self._leave_out("patterns and textures of materials", definition)
+                    self._leave_out("material-patterns-left-out", definition)
                 return replace(material_of(definition), name=definition.name), tuple(names)
             elif definition.kind in PATTERNS:
-                self._leave_out(definition.kind, definition)
+                self._leave_out("pattern-left-out", definition, definition.kind)
                 modifier = definition.modifier
             else:
-                self._leave_out(f"surfaces of {definition.kind}", surface)
+                self._leave_out("surfaces-not-read", surface, definition.kind)
                 return None
-        self._leave_out("surfaces without a material", surface)
+        self._leave_out("surfaces-without-material", surface)
         return None
 
-    def _leave_out(self, what: str, primitive: Primitive) -> None:
-        self.left_out[what] += 1
-        self.first.setdefault(what, primitive)
+    def _leave_out(self, code: str, primitive: Primitive, kind: str = "") -> None:
+        self.left_out[code, kind] += 1
+        self.first.setdefault((code, kind), primitive)
 
-    def problems(self) -> Iterator[Problem]:
+    def issues(self) -> Iterator[Issue]:
         """What was met and not used, each kind once."""
-        for what, count in self.left_out.items():
-            first = self.first[what]
-            consequence = "plain colours stand for them" if what in PATTERNS else "left out"
-            yield Problem(
-                f"{first.file}:{first.line}", f"{what} ({count}, first {first.name})", consequence
-            )
+        for (code, kind), count in self.left_out.items():
+            first = self.first[code, kind]
+            values = {"count": count, "type": kind, "first": first.name}
+            yield Issue(code, f"{first.file}:{first.line}", values)
 
 
 def _is_xform(program: Sequence[str]) -> bool:

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from mitsuba_cfs.glare.annual import PictureMatrix, Pictures, add_seen
 from mitsuba_cfs.glare.sun_disc import SunDisc
-from mitsuba_cfs.trace.matrices.adjacent_view import RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import RoomBehind
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown
 
 

@@ -20,7 +20,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.paths.path_scene import Sky
+from mitsuba_cfs.trace.paths.scene import Sky
 from mitsuba_cfs.trace.pictures.point_in_time import colour_picture
 
 FEWER = 8  # paths of the luminance for one of a band: colour varies less than light

@@ -19,8 +19,7 @@ from mitsuba_cfs.trace.kernels.scattering import (
     Scattering,
     sun_scattering,
 )
-from mitsuba_cfs.trace.paths.path_scene import PathOptics
-from mitsuba_cfs.trace.paths.systems import lit_system, without_peaks
+from mitsuba_cfs.trace.paths.scene import PathOptics, lit_system, without_peaks
 
 PATCH_ANGLES = 32  # of incidence in each patch, for its mean
 OVER = 1e-3  # by which shares may be more than 1, for rounding

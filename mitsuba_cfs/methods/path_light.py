@@ -17,8 +17,8 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
 BATCHES = 4

@@ -26,8 +26,12 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.scene import kept_scene
-from mitsuba_cfs.trace.matrices.adjacent_daylight import borrowed_daylight
-from mitsuba_cfs.trace.matrices.adjacent_view import LendingRoom, RoomBehind, borrowed_view
+from mitsuba_cfs.trace.matrices.adjacent import (
+    LendingRoom,
+    RoomBehind,
+    borrowed_daylight,
+    borrowed_view,
+)
 from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
@@ -191,7 +195,7 @@ class PhaseScene:
         interior, parts = self.scene.interior, self.parts.groups
         return window_elements(
             kept_scene(interior, parts),
-            float(interior.areas.sum()),
+            interior,
             samples=self._exchange_samples(parts, EXCHANGE_SHARE),
             seed=self.sampling.seed,
         )

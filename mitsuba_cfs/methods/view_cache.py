@@ -18,8 +18,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import UNREADABLE, MatrixCache
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
-from mitsuba_cfs.trace.sun.lit_points import Places
-from mitsuba_cfs.trace.sun.room_sun import EdgePlaces, SunElements, SunlitRows
+from mitsuba_cfs.trace.sun.room_sun import SunlitRows
 
 SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
 LARGEST = 256 << 20  # [bytes] larger ones are traced anew: they would push out all the others
@@ -52,7 +51,7 @@ def kept_view(
         found = trace(light=light, elements=elements)
         sunlit = found.elements
         # matrices without the elements that they have would be of no use
-        if sunlit is elements or (sunlit is not None and _write(beside, _of_elements(sunlit))):
+        if sunlit is elements or (sunlit is not None and _write(beside, sunlit.arrays())):
             _write(path, _of_view(found))
         cache.trim(keep=path)
     return found
@@ -101,14 +100,7 @@ def _read(path: Path, view: View, elements: SunlitRows | None) -> ViewMatrices |
 
 def _read_elements(path: Path) -> SunlitRows:
     with opened_arrays(path) as data:
-        places = Places(data["places_point"], data["places_normal"])
-        more = Places(data["more_point"], data["more_normal"])
-        ends = _sparse(data, "smooth"), EdgePlaces(more, _sparse(data, "beside"))
-        mean, noise = (
-            SunElements(places, _sparse(data, f"far{i}"), _sparse(data, f"near{i}"), *ends)
-            for i in range(2)
-        )
-        return SunlitRows(mean, noise, data["close"])
+        return SunlitRows.of_arrays(data)
 
 
 def _write(path: Path, arrays: dict[str, np.ndarray]) -> bool:
@@ -137,18 +129,6 @@ def _of_view(found: ViewMatrices) -> dict[str, np.ndarray]:
         "sunlit": np.array(found.elements is not None),
         **_arrays("seen", found.seen),
     }
-
-
-def _of_elements(found: SunlitRows) -> dict[str, np.ndarray]:
-    """The elements of the rows, and those of their noise, which are in the same places."""
-    first = found.mean
-    arrays = {"close": found.close, **_arrays("smooth", first.smooth)}
-    arrays |= _arrays("beside", first.edges.beside)
-    for i, rows in enumerate((first, found.noise)):
-        arrays |= _arrays(f"far{i}", rows.share) | _arrays(f"near{i}", rows.near)
-    for name, places in (("places", first.places), ("more", first.edges.places)):
-        arrays |= {f"{name}_point": places.point, f"{name}_normal": places.normal}
-    return arrays
 
 
 def _arrays(name: str, matrix: sparse.csr_array) -> dict[str, np.ndarray]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from bim.report.issue import issue_text
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import given
@@ -114,8 +115,8 @@ def command(
         click.echo(f"note: {text}")
     click.echo(f"dossier: {out / 'dossier.html'}")
     if write_ifc is not None:
-        for problem in write_into_ifc(result, write_ifc):
-            click.echo(f"note: {problem.where}: {problem.what}")
+        for issue in write_into_ifc(result, write_ifc):
+            click.echo(f"note: {issue.where}: {issue_text(issue, 'command').what}")
         click.echo(f"building with results: {write_ifc}")
 
 

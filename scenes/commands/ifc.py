@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bim.report.issue import COLUMNS, issue_rows
 from mitsuba_cfs.files import check_file, write_table, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.bonsai import bonsai
@@ -46,13 +47,13 @@ def command() -> None:
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--csv", "problems", type=click.Path(path_type=Path), help="Also write the problems.")
+@click.option("--csv", "issues", type=click.Path(path_type=Path), help="Also write the problems.")
 @join_option
 @furniture_option
-def check(building: Path, join: tuple[str, ...], furniture: bool, problems: Path | None) -> None:
+def check(building: Path, join: tuple[str, ...], furniture: bool, issues: Path | None) -> None:
     """Rooms, windows and problems of an IFC file, as the simulation will see them."""
-    if problems is not None:
-        check_file(problems, field="--csv", inputs=[building])
+    if issues is not None:
+        check_file(issues, field="--csv", inputs=[building])
     from rich.console import Console
 
     from bim.ifc.building import read_ifc
@@ -65,18 +66,17 @@ def check(building: Path, join: tuple[str, ...], furniture: bool, problems: Path
     for line in read.account.lines if read.account is not None else ():
         console.print(line, markup=False, highlight=False)
     console.print(_rooms(read))
-    console.print(_problems(read))
+    console.print(_issues(read))
     console.print(
         f"{len(read.spaces)} rooms, {sum(bool(s.windows) for s in read.spaces)} with windows, "
         f"{len(read.windows)} windows, {sum(w.area for w in read.windows):.1f} m2 of glass, "
-        f"{len(read.problems)} problems"
+        f"{len(read.issues)} problems"
     )
-    if problems is not None:
+    if issues is not None:
         import pandas as pd
 
-        rows = [(p.where, p.what, p.consequence) for p in read.problems]
-        columns = ["where", "what", "consequence"]
-        write_table(pd.DataFrame(rows, columns=columns), problems, index=False)
+        rows = issue_rows(read.issues, "command")
+        write_table(pd.DataFrame(rows, columns=list(COLUMNS)), issues, index=False)
 
 
 @command.command()
@@ -315,17 +315,17 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f}"
 
 
-def _problems(building: Building) -> Table:
+def _issues(building: Building) -> Table:
     """The problems by their weight, alike ones counted once."""
     from rich.table import Table
 
-    from bim.ranking import ranked
+    from bim.report.ranking import ranked
 
     table = Table(title="Problems", title_justify="left")
     table.add_column("glass m2", justify="right")
     for head in ("where", "what", "consequence or repair"):
         table.add_column(head, overflow="fold")
-    for one in ranked(building.problems):
+    for one in ranked(building.issues):
         glass = f"{one.glass:.2f}" if one.glass else ""
-        table.add_row(glass, one.first.where, one.what, one.first.consequence)
+        table.add_row(glass, one.first.where, *one.text("command").pair)
     return table

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bim.report.issue import COLUMNS, issue_rows
 from scenes.commands.parameters import FILE, IFC_FILE
 
 if TYPE_CHECKING:
@@ -102,8 +103,7 @@ def _write(result, record: dict, results: ResultFolder) -> None:
         write_table(result.module_table().round(4), folder / "modules.csv", index=False)
         write_table(result.yield_table().round(4), folder / "yield.csv", index=False)
         write_table(power.astype("float32"), folder / "power_w.parquet")
-        problems = [(p.where, p.what, p.consequence) for p in result.problems]
-        table = pd.DataFrame(problems, columns=["where", "what", "consequence"])
+        table = pd.DataFrame(issue_rows(result.issues, "command"), columns=list(COLUMNS))
         write_table(table, folder / "problems.csv", index=False)
         for name, towards in view_directions(result):
             write_irradiation_picture(folder / f"irradiation_{name}.png", result, towards)

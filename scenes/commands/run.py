@@ -179,8 +179,8 @@ def run_to_folder(
     for note in result.notes:
         if note != quick_run.NOTE:
             click.echo(f"note: {note}")
-    if result.problems:
-        found = counted(len(result.problems), "problem")
+    if result.issues:
+        found = counted(len(result.issues), "problem")
         click.echo(f"{found} in the model: {out / 'problems.csv'}")
     click.echo(f"report: {out / 'report.html'}")
     if options.explore:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bim.report.issue import issue_text
 from scenes import quick as quick_run
 from scenes.commands.parameters import FILE
 from scenes.commands.quick_option import quick_option
@@ -127,8 +128,8 @@ def study_to_folder(
     write_study(parsed, result, store, report, page_of_cases)
     _print_outcome(result, out)
     if write_ifc is not None and not nothing:
-        for problem in write_study_ifc(result, write_ifc):
-            click.echo(f"note: {problem.where}: {problem.what}")
+        for issue in write_study_ifc(result, write_ifc):
+            click.echo(f"note: {issue.where}: {issue_text(issue, 'command').what}")
         click.echo(f"building with results: {write_ifc}")
     _raise_failures(result, len(chosen))
 

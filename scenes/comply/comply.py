@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Effect, Issue
 from bim.seasons import in_month
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -23,7 +24,7 @@ from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
+from scenes.comply.findings import Findings, GridLight, calendar_of
 from scenes.comply.glare import seat_glare
 from scenes.comply.glass import windows_without_view
 from scenes.comply.heat import room_heat
@@ -37,8 +38,10 @@ from scenes.comply.uses import UNKNOWN, RoomUse
 from scenes.comply.view_out import ViewOut, view_out
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import States
+from scenes.room.inputs import room_inputs
+from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation
+from scenes.room.room import StageTimes
 from scenes.room.series import RoomSeries, corner
 from scenes.room.skies import skies_for
 from scenes.room.windows import traced_building
@@ -81,9 +84,9 @@ def check_rooms(
     dark = [s for s in spaces if not s.windows and uses[s.guid].occupied]
     if not glazed:
         raise no_window(building, check.file)
-    views, view_problems = check.views(glazed)
+    views, view_issues = check.views(glazed)
     check.asked = {s.guid: asked_of(files.rules, s, uses[s.guid]) for s in glazed}
-    lights, problems, notes = check.lights(glazed)
+    lights, issues, notes = check.lights(glazed)
     rooms = []
     for space in spaces:
         if space.guid in lights and space.guid in views:
@@ -99,7 +102,7 @@ def check_rooms(
         check.building, files.rules, tuple(rooms), tuple(verdicts), check.calendar, files.weather,
         check.day, tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
         tuple(dict.fromkeys([*check.notes, *check.files.weather.notes, *notes])),
-        (*building.problems, *view_problems, *problems), check.seconds,
+        (*building.issues, *view_issues, *issues), check.seconds,
     )  # fmt: skip
 
 
@@ -165,9 +168,9 @@ class Check:
 
     def views(
         self, spaces: list[Space]
-    ) -> tuple[dict[str, tuple[ViewOut, SunExposure]], list[Problem]]:
+    ) -> tuple[dict[str, tuple[ViewOut, SunExposure]], list[Issue]]:
         """View and sunlight of each room by GUID, by rays against the whole building."""
-        start, found, problems = time.monotonic(), {}, []
+        start, found, issues = time.monotonic(), {}, []
         for number, space in enumerate(spaces):
             self.progress("view and sunlight", number / len(spaces))
             try:
@@ -178,14 +181,15 @@ class Check:
                     hidden=self.hidden,
                 )
             except RoomError as error:
-                problems.append(Problem(space.guid, str(error), "the room was left out"))
+                values = {"room": space.label, "reason": str(error)}
+                issues.append(Issue("room-not-simulated", space.guid, values, Effect("room")))
                 continue
             found[space.guid] = view, sun_exposure(space, self.outdoors, self.day)
         self.progress("view and sunlight", 1.0)
         self._took({"view and sunlight": time.monotonic() - start})
-        return found, problems
+        return found, issues
 
-    def lights(self, spaces: list[Space]) -> tuple[dict[str, RoomLights], list[Problem], list[str]]:
+    def lights(self, spaces: list[Space]) -> tuple[dict[str, RoomLights], list[Issue], list[str]]:
         """The light of each room by GUID, equal rooms computed once."""
         if not self.lit:
             rules = self.files.rules.items()
@@ -201,14 +205,14 @@ class Check:
         def compute(space: Space, steps: Progress) -> RoomLights:
             return self._light(space, skies, cache, steps)
 
-        results, problems, notes = RoomSeries(
+        results, issues, notes = RoomSeries(
             self.building, spaces, self.systems, options.room.sampling, cache, compute,
             moved_lights, options.building,
             alike=lambda one, other: self._costly(one) == self._costly(other),
         ).results(self.progress)  # fmt: skip
         left = time.monotonic() - start - sum(self.seconds.get(name, 0.0) for name in PARTS)
         self._took({"what else light takes": max(left, 0.0)})
-        return {result.space.guid: result for result in results}, problems, notes
+        return {result.space.guid: result for result in results}, issues, notes
 
     def _costly(self, space: Space) -> frozenset[str]:
         """What of glare and heat a rule looks at in a room."""
@@ -221,33 +225,44 @@ class Check:
         rules = self.files.rules
         grids = {name: sensor_grid_of(space, rule.grid) for name, rule in rules.items()}
         distinct = list(dict.fromkeys(grids.values()))
-        room = RoomSimulation(
+        room = room_inputs(
             self.building, space, self.systems, self.files.weather, self.options.room,
-            skies=skies, cache=cache, grids=distinct, progress=progress,
+            skies=skies, cache=cache, grids=distinct,
         )  # fmt: skip
         operated = {
             distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts
         }
         if self.moving and self.shaded:
             operated = operated or {0}
-        room.timed(TRACING, lambda: room.traced.trace("sDGP"))
-        found = room.timed(SUMS, lambda: lights_of(room, operated))
+        times = StageTimes()
+        with times.stage(TRACING):
+            light = room_light(room, progress=progress)
+            light.traced.trace("sDGP")
+        with times.stage(SUMS):
+            found = lights_of(room, light, operated)
         closed = next((one.closed for one in found if one.closed is not None), None)
         closed = closed if self.shaded else None
         glare = heat = None
         if self.glaring and "glare" in self._costly(space):
-            glare = room.timed(GLARE, lambda: self._glare(room, closed))
+            state = None if closed is None else closed[skies.lit].T.astype(np.int64)
+            with times.stage(GLARE):
+                glare = seat_glare(
+                    room, light, state, grid=self.options.grid,
+                    directions=self.options.directions, eye_height=self.options.eye_height,
+                    progress=progress,
+                )  # fmt: skip
         if "heat" in self._costly(space):
-            heat = room.timed(HEAT, lambda: room_heat(room, closed))
-        self._took(room.seconds)
+            with times.stage(HEAT):
+                heat = room_heat(room, light, closed, progress=progress)
+        self._took(times.seconds)
         of_room = Findings(self.calendar, glare=glare, heat=heat)
         lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
         values = {
-            name: values_of(rules[name], replace(of_room, light=light), LIGHT)
-            for name, light in lights.items()
+            name: values_of(rules[name], replace(of_room, light=grid), LIGHT)
+            for name, grid in lights.items()
         }
-        summaries = {id(light): self._summary(light) for light in found}
-        by_rule = {name: summaries[id(light)] for name, light in lights.items()}
+        summaries = {id(grid): self._summary(grid) for grid in found}
+        by_rule = {name: summaries[id(grid)] for name, grid in lights.items()}
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
 
@@ -255,15 +270,6 @@ class Check:
         """Add what parts of the check took."""
         for name, value in seconds.items():
             self.seconds[name] = round(self.seconds.get(name, 0.0) + value, 1)
-
-    def _glare(self, room: RoomSimulation, closed: NDArray[np.bool_] | None) -> SeatGlare:
-        """Glare of a room's seats with its blinds closed [H, G]; None: open all year."""
-        state = None if closed is None else closed[room.skies.lit].T.astype(np.int64)
-        options = self.options
-        return seat_glare(
-            room, state, grid=options.grid, directions=options.directions,
-            eye_height=options.eye_height,
-        )  # fmt: skip
 
     def _summary(self, light: GridLight) -> GridSummary:
         ten = self.calendar.ten

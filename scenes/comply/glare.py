@@ -7,20 +7,23 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.methods.glare import hourly_glare, light_seen_from
 from mitsuba_cfs.metrics.schedules import working_hours
-from mitsuba_cfs.progress import part
+from mitsuba_cfs.progress import Progress, part, silent
 from scenes.comply.findings import SeatGlare
 from scenes.room.glare import rating_of
-from scenes.room.room import RoomSimulation
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight
 from scenes.room_views import eyes_of
 
 
 def seat_glare(
-    room: RoomSimulation,
+    room: RoomInputs,
+    light: RoomLight,
     state: NDArray[np.int64] | None,
     *,
     grid: float | None,
     directions: int,
     eye_height: float,
+    progress: Progress = silent,
 ) -> SeatGlare:
     """DGP of every hour of use at each seat of a room.
 
@@ -30,13 +33,13 @@ def seat_glare(
     """
     used = working_hours(room.weather, *room.options.occupancy.hours)
     lit = np.flatnonzero(used[room.skies.lit])
-    views = eyes_of(room.space, grid, directions, eye_height, room.outputs.picture_size)
+    views = eyes_of(room.space, grid, directions, eye_height, room.options.outputs.picture_size)
     rows = []
     for number, each in enumerate(views):
-        steps = part(room.progress, number / len(views), (number + 1) / len(views), "annual glare")
+        steps = part(progress, number / len(views), (number + 1) / len(views), "annual glare")
         rated = hourly_glare(
-            light_seen_from(room.light, each.view), "DGP", state, hours=lit,
-            options=rating_of(room.outputs), progress=steps,
+            light_seen_from(light.light, each.view), "DGP", state, hours=lit,
+            options=rating_of(room.options.outputs), progress=steps,
         )  # fmt: skip
         whole = np.zeros(room.skies.hours)
         whole[room.skies.lit[lit]] = rated.dgp

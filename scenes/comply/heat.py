@@ -5,20 +5,35 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.progress import Progress, silent
 from scenes.comply.findings import RoomHeat
-from scenes.room.room import RoomSimulation
+from scenes.room.heat import heat_alone
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight
+from scenes.room.solar import seasonal_outdoors
+from scenes.room.zone import room_zone, zone_surfaces
 
 
-def room_heat(room: RoomSimulation, closed: NDArray[np.bool_] | None) -> RoomHeat:
+def room_heat(
+    room: RoomInputs,
+    light: RoomLight,
+    closed: NDArray[np.bool_] | None,
+    *,
+    progress: Progress = silent,
+) -> RoomHeat:
     """Operative temperatures of a room that neither heats nor cools.
 
     Args:
-        closed: [H, G] when the blinds of each window group are; a room's heat knows one state for
-            all windows, closed when those of any group are.  None: open all year.
+        closed: [H, G] when the blinds of each window group are closed; the heat balance has one
+            state for all windows, closed when any group is. None: open all year.
     """
+    state = np.zeros(room.skies.hours, dtype=np.int64)
     if closed is not None:
-        room.state = np.where(closed.any(axis=1), 1, 0)
-    temperatures = room.thermal().temperatures
+        state = np.where(closed.any(axis=1), 1, 0)
+    outdoors = seasonal_outdoors(room, light, progress=progress)
+    zone = room_zone(room, zone_surfaces(room), outdoors, state, progress=progress)
+    thermal, _ = heat_alone(zone, room.weather, room.options.heat_step_s, progress)
     return RoomHeat(
-        temperatures["operative_c"].to_numpy(), np.asarray(room.weather.dry_bulb_c), room.occupied
-    )
+        thermal.temperatures["operative_c"].to_numpy(), np.asarray(room.weather.dry_bulb_c),
+        room.occupied,
+    )  # fmt: skip

@@ -14,9 +14,10 @@ from mitsuba_cfs.metrics.lm83 import blinds_operated
 from scenes.comply.findings import GridLight
 from scenes.comply.glass import sight_through
 from scenes.comply.rules import GridTable
-from scenes.room.daylight import grid_points, overcast_factor
+from scenes.room.daylight import overcast_factor
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight, grid_points
 from scenes.room.options import SensorGrid
-from scenes.room.room import RoomSimulation
 
 
 def sensor_grid_of(space: Space, table: GridTable) -> SensorGrid:
@@ -29,22 +30,22 @@ def sensor_grid_of(space: Space, table: GridTable) -> SensorGrid:
     return SensorGrid(spacing=float(spacing), height=table.height, margin=table.margin)
 
 
-def lights_of(room: RoomSimulation, operated: Iterable[int]) -> list[GridLight]:
+def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> list[GridLight]:
     """The light on each grid of a room.
 
     The windows' first state is open, their second closed; LM-83's rule moves them by group.
 
     Args: operated: numbers of the grids whose light with operated blinds is wanted.
     """
-    light, sky = room.light, room.skies
+    light, sky = traced.light, room.skies
 
     def year(values: NDArray[np.float64]) -> NDArray[np.float32]:
         return sky.whole_year(values.astype(np.float32)).T
 
     opened, factor = light.illuminance(), overcast_factor(light)
     through = light.direct_sun_by_group() or []
-    points = room.scene.points
-    seen = [room.windows.of_state(j, lambda one: sight_through(one).is_view) for j in (0, 1)]
+    points = traced.scene.points
+    seen = [[sight_through(one).is_view for one in room.windows.in_state(j)] for j in (0, 1)]
     found, first = [], 0
     for number, grid in enumerate(room.grids):
         count = len(grid_points(room.space, grid))

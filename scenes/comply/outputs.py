@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from bim.model import Problem
+from bim.report.issue import COLUMNS, Issue, issue_rows
 from mitsuba_cfs.files import write_table, write_text
 from scenes.comply.bcf import write_bcf
 from scenes.comply.page import dossier_html
@@ -30,15 +30,15 @@ def write_compliance(
     """Write all files; earlier results are replaced at the end."""
     with folder.replaced() as place:
         write_table(values_frame(result), place / "values.csv", index=False, float_format="%.6g")
-        rows = [(p.where, p.what, p.consequence) for p in result.problems]
-        problems = pd.DataFrame(rows, columns=["where", "what", "consequence"])
-        write_table(problems, place / "problems.csv", index=False)
+        rows = issue_rows(result.issues, "command")
+        issues = pd.DataFrame(rows, columns=list(COLUMNS))
+        write_table(issues, place / "problems.csv", index=False)
         write_text(place / MODEL_CHECK.name, MODEL_CHECK.read_text("utf-8"))
         write_bcf(result, place / "issues.bcf")
         write_text(place / "dossier.html", dossier_html(result, quick=quick, page=page))
 
 
-def write_into_ifc(result: Compliance, out: Path) -> tuple[Problem, ...]:
+def write_into_ifc(result: Compliance, out: Path) -> tuple[Issue, ...]:
     """Write the building's file with a property set of its levels on each room; what had no place.
 
     The properties are "RULE CRITERION" with the level that is reached, and "use".

@@ -9,6 +9,7 @@ from importlib import metadata
 import numpy as np
 from markupsafe import Markup
 
+from bim.report.issue import issue_rows
 from scenes.comply import tables
 from scenes.comply.drawings import plans, sun_bars
 from scenes.comply.findings import SeatGlare
@@ -162,5 +163,5 @@ def summary(result: Compliance) -> tuple[tuple[str, str], ...]:
 def problems_table(result: Compliance) -> Table:
     """What is wrong with the building's file and what was done about it."""
     columns = tuple(Column(c, numeric=False) for c in ("Where", "What", "Consequence and repair"))
-    rows = tuple((p.where, p.what, p.consequence) for p in result.problems)
+    rows = tuple(row[:3] for row in issue_rows(result.issues, "command"))
     return Table("Problems of the model", columns, rows)

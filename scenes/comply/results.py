@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Issue
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.assess import BuildingVerdict, RoomVerdict
 from scenes.comply.findings import Calendar, SeatGlare
@@ -71,5 +72,5 @@ class Compliance:
     day: SunDay
     assumptions: tuple[str, ...]  # sentences
     notes: tuple[str, ...]
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
     seconds: dict[str, float]  # by part

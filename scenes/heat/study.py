@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bim.building_file import ReadOptions, read_building_file, surrounded
 from bim.model import Building, Space
+from bim.report.issue import issue_text
 from bim.to_thermal import shared_constructions
 from mitsuba_cfs import variants
 from mitsuba_cfs.errors import DataError
@@ -28,9 +29,12 @@ from scenes.heat.radiant import RadiantRoom, felt, radiant_room
 from scenes.heat.study_file import StudyFile
 from scenes.heat.tables import comfort_summary, hourly_table, year_summary
 from scenes.room.heat import felt_by, room_humidity
+from scenes.room.inputs import room_inputs
+from scenes.room.leaks import leak_issues
+from scenes.room.light import visible_scene
 from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours, check_schedules
-from scenes.room.room import RoomSimulation
+from scenes.room.room import operated_zone
 from scenes.room.skies import skies_for
 from scenes.room.windows import traced_building
 from scenes.room.zone import RoomZone, balances, coupled
@@ -109,13 +113,14 @@ def run_study(
     rooms, radiants = [], []
     for i, space in enumerate(spaces):
         steps = item(progress, "room", i + 1, len(spaces), space.label)
-        room = RoomSimulation(
+        room = room_inputs(
             building, space, in_windows, weather, options,
-            operation=study, skies=skies, cache=cache, progress=steps,
+            operation=study, skies=skies, cache=cache,
         )  # fmt: skip
         if space.windows:
-            notes |= dict.fromkeys(f"{one.what}: {one.consequence}" for one in room.holes())
-        zone, radiant = room.zone, None
+            leaks = leak_issues(space, visible_scene(room), seed=options.sampling.seed, cache=cache)
+            notes |= dict.fromkeys(issue_text(one, "command").line for one in leaks)
+        zone, radiant = operated_zone(room, progress=steps), None
         if trace.view_factors:
             radiant = radiant_room(
                 space, zone.room, samples=trace.patch_samples, seed=trace.seed, cache=cache

@@ -12,7 +12,7 @@ import pandas as pd
 
 from bim.ifc.corrections import corrections_beside
 from bim.ifc.standing import Standing, read_standing
-from bim.model import Problem
+from bim.report.issue import Issue
 from bim.to_tracer import COMPASS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
@@ -37,7 +37,7 @@ class PvResult:
     irradiance: CellIrradiance
     yields: tuple[SubsystemYield, ...]
     weather: Weather
-    problems: tuple[Problem, ...]
+    issues: tuple[Issue, ...]
 
     def module_table(self) -> pd.DataFrame:
         """Annual irradiation of each module, in the plane and behind its glass [kWh/m2]."""
@@ -119,7 +119,7 @@ def run_pv(
         message = f"chooses no element with a shape in {model}"
         raise DataError(message, file=file, field=f"module.select = {study.module.select!r}")
     cell = fitted_cell(study.module.datasheet())
-    subsystems, problems = _subsystems(study, standing, modules, file)
+    subsystems, issues = _subsystems(study, standing, modules, file)
     irradiance = cell_irradiance(
         standing.elements, modules, weather, samples=samples, seed=seed, progress=progress,
         cache=cache,
@@ -131,21 +131,21 @@ def run_pv(
     )  # fmt: skip
     return PvResult(
         standing, tuple(modules), subsystems, irradiance, tuple(yields), weather,
-        (*standing.problems, *problems),
+        (*standing.issues, *issues),
     )  # fmt: skip
 
 
 def _subsystems(
     study: PvStudy, standing: Standing, modules: Sequence[PvModule], file: Path | None
-) -> tuple[tuple[Subsystem, ...], list[Problem]]:
+) -> tuple[tuple[Subsystem, ...], list[Issue]]:
     """Modules of each stated subsystem; without any, those of each orientation."""
-    problems = _unalike(modules)
+    issues = _unalike(modules)
     if not study.subsystem:
         names = [orientation(module) for module in modules]
         return tuple(
             Subsystem(name, tuple(np.flatnonzero(np.array(names) == name).tolist()), False)
             for name in dict.fromkeys(names)
-        ), problems
+        ), issues
     taken: dict[str, str] = {}
     result = []
     for table, guids in zip(study.subsystem, standing.chosen[1:], strict=True):
@@ -162,9 +162,9 @@ def _subsystems(
         result.append(Subsystem(table.name, own, table.in_series))
     for module in modules:
         if module.guid not in taken:
-            what = f"module {module.name}: in no subsystem"
-            problems.append(Problem(module.guid, what, "its yield is not counted"))
-    return tuple(result), problems
+            values = {"module": module.name}
+            issues.append(Issue("module-in-no-subsystem", module.guid, values))
+    return tuple(result), issues
 
 
 def orientation(module: PvModule) -> str:
@@ -174,15 +174,15 @@ def orientation(module: PvModule) -> str:
     return COMPASS[round(module.azimuth_deg / 45) % 8]
 
 
-def _unalike(modules: Sequence[PvModule]) -> list[Problem]:
+def _unalike(modules: Sequence[PvModule]) -> list[Issue]:
     """Modules of another size than most: one datasheet cannot be theirs."""
     sizes = [round(module.area, 2) for module in modules]
     usual = Counter(sizes).most_common(1)[0][0]
     return [
-        Problem(
+        Issue(
+            "module-of-other-size",
             module.guid,
-            f"module {module.name}: {module.area:.2f} m2, most have {usual:.2f} m2",
-            "the datasheet's power is used for it nevertheless",
+            {"module": module.name, "area": module.area, "usual": usual},
         )
         for module in modules
         if abs(module.area - usual) > 0.05 * usual

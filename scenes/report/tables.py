@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from bim.ranking import ranked
+from bim.report.ranking import ranked
 from scenes.language.catalogue import month_name, said
 from scenes.report.names import Quantity, quantity
 from scenes.report.numbers import cell
@@ -154,8 +154,8 @@ def problems_table(result: RunResult) -> Table:
         ),
     )
     rows = tuple(
-        (cell(one.glass, 2) if one.glass else "–", one.first.where, one.what, one.first.consequence)
-        for one in ranked(result.problems)
+        (cell(one.glass, 2) if one.glass else "–", one.first.where, *one.text("command").pair)
+        for one in ranked(result.issues)
     )
     return Table(said("By element"), columns, rows)
 

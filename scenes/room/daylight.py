@@ -1,140 +1,71 @@
-"""Daylight of a room: its scene, the illuminance of its year, and the metrics."""
+"""Stage 3 of a room: illuminance of the sensors over the year, and daylight metrics."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.held_sensors import HeldGrid
-from bim.model import Building, Space
-from bim.sensors import held_grids, held_views, sensor_grid, view_point
-from bim.to_tracer import exterior_surfaces, furnished_surfaces
-from mitsuba_cfs.images.view import View, fisheye, fitted
 from mitsuba_cfs.methods.phase_light import PhaseLight
-from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
 from mitsuba_cfs.metrics.daylight_factor import daylight_factor
 from mitsuba_cfs.metrics.room import room_metrics
-from mitsuba_cfs.progress import Progress
+from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.weather import Weather
 from scenes.provision_levels import level_number
 from scenes.results import DaylightResult, GridDaylight
-from scenes.room.inner_glass import InnerGlass
-from scenes.room.options import SensorGrid
-from scenes.room.windows import RoomWindows
-
-
-@dataclass(frozen=True, slots=True)
-class HeldSensors:
-    """What the building's file holds for a room: sensor grids, and the view for glare."""
-
-    grids: tuple[HeldGrid, ...] = ()
-    view: View | None = None  # the first fisheye of the whole hemisphere
-
-    @classmethod
-    def of(cls, building: Building, space: Space) -> HeldSensors:
-        """Those of a room."""
-        fisheyes = [one.view for one in held_views(building, space) if one.view.covers_hemisphere]
-        return cls(tuple(held_grids(building, space)), fisheyes[0] if fisheyes else None)
-
-
-NO_SENSORS = HeldSensors()
-
-
-def room_scene(
-    building: Building,
-    space: Space,
-    windows: RoomWindows,
-    grids: Sequence[SensorGrid],
-    picture_size: int,
-    *,
-    inner: InnerGlass | None = None,
-    held: HeldSensors = NO_SENSORS,
-) -> DaylightScene:
-    """Triangles, window groups, sensors and view of a room in the visible band.
-
-    Args:
-        grids: of the sensors, one after the other.
-        picture_size: pixels of a side of the view.
-        inner: the glass to other rooms that gives light; without it that is opaque.
-        held: of the building's file: sensors after those of the grids, and the view.
-    """
-    points = np.concatenate([grid_points(space, grid) for grid in grids])
-    upwards = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    position, direction = view_point(space)
-    view = fisheye(position, direction, picture_size)
-    if held.view is not None:
-        view = fitted(held.view, picture_size)
-    return DaylightScene(
-        furnished_surfaces(space, "visible") if inner is None else inner.interior,
-        exterior_surfaces(building, space, "visible"),
-        [*windows.groups, *(() if inner is None else inner.groups)],
-        np.concatenate([points, *(grid.points for grid in held.grids)]),
-        np.concatenate([upwards, *(grid.directions for grid in held.grids)]),
-        view,
-        () if inner is None else inner.beyond,
-    )
-
-
-def grid_points(space: Space, grid: SensorGrid) -> NDArray[np.float64]:
-    """Sensors [S, 3] of a grid in a room [m]."""
-    return sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)[0]
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight
 
 
 def room_daylight(
-    light: PhaseLight | SeasonalLight,
+    room: RoomInputs,
+    light: RoomLight,
     state: NDArray[np.int64],
-    weather: Weather,
-    method: str,
-    progress: Progress,
     *,
-    held: HeldSensors = NO_SENSORS,
+    progress: Progress = silent,
 ) -> DaylightResult:
-    """Illuminance of the year with the state of each hour, and its metrics.
-
-    Args:
-        state: [L] which one holds in each lit hour.
-        held: whose grids' sensors come last in the scene.
-    """
-    sky, traced = light.sky, light.filled.traced
-    scene = traced.scene
-    if method == "point-in-time":
-        lit, error = paths_of(light, progress).estimate(state)
+    """Illuminance of the year with the shading state of each hour [H], and its metrics."""
+    progress("daylight", 0.0)
+    lights, lit_state, points = light.light, room.lit_state(state), light.scene.points
+    if room.options.method == "point-in-time":
+        steps = part(progress, 0.9, 1.0, "daylight")
+        lit, error = paths_of(lights, steps).estimate(lit_state)
     else:
-        lit, error = light.illuminance(state), light.relative_error(state)
-    illuminance = sky.whole_year(lit.astype(np.float32)).T
+        lit, error = lights.illuminance(lit_state), lights.relative_error(lit_state)
+    illuminance = room.skies.whole_year(lit.astype(np.float32)).T
     # LM-83's direct sun and the daylight factor are those of open blinds
-    direct = light.direct_sun()
-    direct = None if direct is None else sky.whole_year(direct.astype(np.float32)).T
-    factor = overcast_factor(light)
+    direct = lights.direct_sun()
+    direct = None if direct is None else room.skies.whole_year(direct.astype(np.float32)).T
+    factor = overcast_factor(lights)
 
-    def metrics_of(own: slice) -> tuple[pd.DataFrame, dict[str, float]]:
-        sun = None if direct is None else direct[:, own]
-        return daylight_metrics(scene.points[own], illuminance[:, own], factor[own], weather, sun)
+    def metrics_of(sensors: slice) -> tuple[pd.DataFrame, dict[str, float]]:
+        sun = None if direct is None else direct[:, sensors]
+        return daylight_metrics(
+            points[sensors], illuminance[:, sensors], factor[sensors], room.weather, sun
+        )
 
-    counts = [len(grid.points) for grid in held.grids]
-    plane = slice(0, len(scene.points) - sum(counts))
+    counts = [len(grid.points) for grid in room.file_sensors.grids]
+    plane = slice(0, len(points) - sum(counts))
     ends = np.cumsum([plane.stop, *counts])
     grids = []
-    for grid, first, last in zip(held.grids, ends[:-1], ends[1:], strict=True):
+    for grid, first, last in zip(room.file_sensors.grids, ends[:-1], ends[1:], strict=True):
         table, of_grid = metrics_of(slice(first, last))
         table["relative_standard_error"] = error[first:last]
         grids.append(GridDaylight(grid.name, grid.directions, table, of_grid))
-    return DaylightResult(
-        scene.points[plane], illuminance[:, plane], error[plane], *metrics_of(plane), tuple(grids)
+    result = DaylightResult(
+        points[plane], illuminance[:, plane], error[plane], *metrics_of(plane), tuple(grids)
     )
+    progress("daylight", 1.0)
+    return result
 
 
 def overcast_factor(light: PhaseLight | SeasonalLight) -> NDArray[np.float64]:
     """Daylight factor of the sensors [S] (0 to 1) with every window in its first state.
 
-    Where the outdoors changes over the year, with most leaves.
+    With trees that change over the year: of the season with the most leaves.
     """
     subdivision = light.filled.traced.sampling.subdivision
     overcast = cie_patches("overcast", ReinhartSky(subdivision), 1.0)
@@ -179,10 +110,10 @@ def daylight_metrics(
         direct: [H, S] [lx] straight from the sun, for annual sunlight exposure.
     """
     metrics = room_metrics(illuminance, weather, direct_illuminance=direct)
-    found = metrics.by_sensor()
+    by_sensor = metrics.by_sensor()
     table = pd.DataFrame(points, columns=["x", "y", "z"]).rename_axis("sensor")
     for column, (source, factor) in SENSOR_COLUMNS.items():
-        table[column] = factor * found[source].to_numpy()
+        table[column] = factor * by_sensor[source].to_numpy()
     if metrics.sunlit_hours is not None:
         table["sunlit_hours"] = metrics.sunlit_hours
     table["daylight_factor"] = 100.0 * daylight_factor

@@ -1,4 +1,4 @@
-"""What lies beyond a room's faces by its tables: ground, neighbours, thermal bridges, frames."""
+"""The envelope of a room by its tables: ground, neighbours, thermal bridges, frames, slab."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DOWNWARDS = -0.7  # z of a floor's normal
 def enveloped(
     room: ThermalRoom, building: Building, space: Space, tables: OperationTables, weather: Weather
 ) -> ThermalRoom:
-    """The room with the ground, neighbours, bridges, frames and slab that its tables state.
+    """The room with ground, neighbours, bridges, frames and slab of its tables.
 
     Raises: `DataError` that names the room and the table.
     """
@@ -63,9 +63,8 @@ def enveloped(
         for number, table in enumerate(envelope.neighbour):
             place = f"envelope.neighbour.{number}"
             beyond = hours.value(table, "temperature_c", place)
-            here = _named(table, faces, building, place)
-            for i in here:
-                surfaces[i] = _beside(surfaces[i], table, beyond)
+            for i in _named(table, faces, building, place):
+                surfaces[i] = _next_to(surfaces[i], table, beyond)
     except ThermalInputError as error:
         raise DataError(
             error.message, file=building.file, element=space.label, field="envelope"
@@ -79,32 +78,32 @@ def enveloped(
 
 
 def glass_edge(window: Window) -> float:
-    """Length of the edges of a window's glass [m]: of triangles' sides that no other shares."""
+    """Length of the edges of a window's glass [m]: triangle sides that only one triangle has."""
     sides: Counter[tuple[tuple[float, ...], ...]] = Counter()
     for triangle in np.round(window.triangles, 6):
         for start, end in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
             sides[tuple(sorted((tuple(start), tuple(end))))] += 1
-    free = [np.subtract(*pair) for pair, count in sides.items() if count == 1]
-    return float(sum(np.linalg.norm(side) for side in free))
+    edges = [np.subtract(*pair) for pair, count in sides.items() if count == 1]
+    return float(sum(np.linalg.norm(side) for side in edges))
 
 
 def _grounded(
     surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather
 ) -> list[OpaqueSurface]:
-    """The surfaces with soil and virtual layer below those that lie on the ground."""
+    """The surfaces, those on the ground with soil and virtual layer (ISO 13370)."""
     days = weather.midpoints
     hours = (days.day_of_year.to_numpy() - 1) * 24.0 + days.hour.to_numpy() + days.minute / 60.0
     year = harmonic(weather.dry_bulb_c, hours)
     wind = float(np.mean(weather.wind_speed))
     floors = [s for s in surfaces if s.outside == "ground" and s.normal[2] < DOWNWARDS]
     area = table.area or sum(s.area for s in floors)
-    found = []
+    grounded = []
     for one in surfaces:
         if one.outside != "ground":
-            found.append(one)
+            grounded.append(one)
             continue
         element = _element(one, floors, table, area, wind)
-        found.append(
+        grounded.append(
             replace(
                 one,
                 layers=element.layers(one.layers),
@@ -112,7 +111,7 @@ def _grounded(
                 beyond_c=element.temperature(table.indoor_c, *year, hours),
             )
         )
-    return found
+    return grounded
 
 
 def _element(
@@ -124,28 +123,28 @@ def _element(
     soil = Soil(table.conductivity or soil.conductivity, table.heat_capacity or soil.heat_capacity)
     if not floors and table.area is None:
         raise ThermalInputError("ground", "area: is needed where a room has no floor on the ground")
-    place = Footprint(area, table.perimeter, table.wall_thickness, soil)
+    footprint = Footprint(area, table.perimeter, table.wall_thickness, soil)
     resistance = sum(layer.resistance for layer in one.layers)
     is_floor = one.normal[2] < DOWNWARDS
     if table.kind == "basement":
         floor = sum(layer.resistance for layer in floors[0].layers) if floors else resistance
         if is_floor:
-            return basement(place, resistance, table.wall_resistance, table.depth)[0]
-        return basement(place, floor, resistance, table.depth)[1]
+            return basement(footprint, resistance, table.wall_resistance, table.depth)[0]
+        return basement(footprint, floor, resistance, table.depth)[1]
     if not is_floor:
         raise ThermalInputError(
             "ground", f"{one.name}: a wall below ground needs kind = 'basement' and its depth"
         )
     if table.kind == "slab":
         vertical = table.edge_lies == "vertical"
-        return slab_on_ground(place, resistance, edge=table.edge, vertical=vertical)
+        return slab_on_ground(footprint, resistance, edge=table.edge, vertical=vertical)
     if table.kind == "suspended":
         return suspended_floor(
-            place, resistance, height=table.height, wall_u=table.wall_u, vents=table.vents,
+            footprint, resistance, height=table.height, wall_u=table.wall_u, vents=table.vents,
             wind=wind, shield=table.shield, ground_resistance=table.below_resistance,
         )  # fmt: skip
     return over_unheated_basement(
-        place, resistance, depth=table.depth, height=table.height, wall_u=table.wall_u,
+        footprint, resistance, depth=table.depth, height=table.height, wall_u=table.wall_u,
         floor_resistance=table.below_resistance, wall_resistance=table.wall_resistance,
     )  # fmt: skip
 
@@ -155,7 +154,7 @@ def _named(
 ) -> list[int]:
     """The surfaces that a neighbour's table names."""
     guids = {building.room(name).space.guid for name in table.spaces}
-    found = [
+    named = [
         number
         for number, own in enumerate(faces)
         if any(
@@ -165,17 +164,17 @@ def _named(
         )
     ]
     known = {name for own in faces for face in own for name in (face.name, face.kind)}
-    lost = sorted(set(table.faces) - known)
-    if lost:
+    unknown = sorted(set(table.faces) - known)
+    if unknown:
         there = ", ".join(sorted(known))
         raise DataError(
-            f"no face {lost[0]!r}; there are {there}", file=building.file, field=f"{place}.faces"
+            f"no face {unknown[0]!r}; there are {there}", file=building.file, field=f"{place}.faces"
         )
-    return found
+    return named
 
 
-def _beside(one: OpaqueSurface, table: NeighbourTable, beyond) -> OpaqueSurface:
-    """The surface with the neighbour's film and temperature at its far side."""
+def _next_to(one: OpaqueSurface, table: NeighbourTable, beyond) -> OpaqueSurface:
+    """The surface with the neighbour's film and temperature on its far side."""
     layers = one.layers
     if table.film > 0:
         layers = (Layer(1.0, 1.0 / table.film, 0.0, 0.0), *layers)
@@ -185,7 +184,7 @@ def _beside(one: OpaqueSurface, table: NeighbourTable, beyond) -> OpaqueSurface:
 def _heated(
     zone: Zone, faces: Sequence[Sequence[Face]], hours: OperationHours, space: Space
 ) -> Zone:
-    """The zone with its heated slab, in the biggest surface that its table names."""
+    """The zone with its heated slab, in the largest surface that its table names."""
     table = hours.tables.loads.slab
     if table is None:
         return zone

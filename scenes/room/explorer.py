@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,44 +10,49 @@ from numpy.typing import NDArray
 from mitsuba_cfs.methods.glare import light_seen_from
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.picture_year.year import picture_year
-from mitsuba_cfs.progress import Progress, part
+from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.trace.kernels.scattering import through_beams
 from scenes.results import ExploredRoom
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight
 
 LARGEST = 400  # pixels of a side of its pictures
 
 
 def explored_room(
-    light: PhaseLight,
-    operated: NDArray[np.int64],
-    names: Sequence[str],
-    progress: Progress,
+    room: RoomInputs,
+    room_light: RoomLight,
+    state: NDArray[np.int64],
     *,
     sensors: int,
+    progress: Progress = silent,
 ) -> ExploredRoom:
     """Pictures, illuminances and the sun's beam of all lit hours in all states.
 
+    The outdoors must be the same all year.
+
     Args:
-        operated: [H] the state that holds in each hour.
-        names: [J] of the states.
-        sensors: of the work plane, the first of the scene's.
+        state: [H] of the shading in each hour.
+        sensors: number of sensors of the work plane, the first of the scene's.
     """
-    sky, scene = light.sky, light.filled.traced.scene
+    light, scene, sky = room_light.light, room_light.scene, room.skies
+    progress = part(progress, 0.0, 1.0, "explorer")
+    names = [system.name for system in max(room.windows.systems, key=len)]
     L, J = len(sky.lit), light.filled.states
     small, pictures, through = _small(light, progress), [], []
     hours, ones = np.arange(L), np.ones(L, dtype=np.int64)
     for j in range(J):
-        state = [min(j, len(states) - 1) for states in light.filled.systems]
+        of_groups = [min(j, len(states) - 1) for states in light.filled.systems]
         steps = part(progress, j / J, (j + 1) / J)
-        made = small.pictures(hours, state)
+        made = small.pictures(hours, of_groups)
         pictures.append(picture_year(made, seed=light.filled.traced.sampling.seed, progress=steps))
-        optics = [states[k] for states, k in zip(light.filled.systems, state, strict=True)]
-        ways = [one.scattering for one in optics]
-        through.append(through_beams(scene.groups, ways, sky.direction))
+        optics = [states[k] for states, k in zip(light.filled.systems, of_groups, strict=True)]
+        scattering = [one.scattering for one in optics]
+        through.append(through_beams(scene.groups, scattering, sky.direction))
     triangles = [np.concatenate([w.triangles for w in g.windows]) for g in scene.groups]
     return ExploredRoom(
         tuple(names[:J]),
-        operated,
+        state,
         sky.lit,
         tuple(pictures),
         tuple(light.illuminance(j * ones)[:sensors].astype(np.float32) for j in range(J)),

@@ -1,4 +1,4 @@
-"""Glare of a room: pictures of chosen hours, every hour of a year, one picture in colour."""
+"""Stage 4 of a room: glare of every hour, pictures of chosen hours, one picture in colour."""
 
 from __future__ import annotations
 
@@ -11,23 +11,26 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bim.model import COLOURS, Building, Space
+from bim.seasons import in_month
 from bim.to_tracer import exterior_surfaces, furnished_surfaces
+from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.matrices.cache import CacheEntry, digest
 from mitsuba_cfs.methods.colour_view import coloured_picture, has_colour
 from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
 from mitsuba_cfs.methods.optics import States
-from mitsuba_cfs.methods.path_light import PathLight, PathSystems
+from mitsuba_cfs.methods.path_light import PathSystems
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.seasonal_light import SeasonalLight
-from mitsuba_cfs.progress import Progress, part
-from mitsuba_cfs.sky.annual import AnnualSky
-from mitsuba_cfs.sky.weather import Weather
+from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.surfaces import WindowGroup
 from scenes.results import ColourPicture, GlareResults, LuminancePicture
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight, picture_light
 from scenes.room.options import Outputs
 from scenes.room.picture_hours import hour_index
 from scenes.room.windows import RoomWindows
@@ -40,6 +43,9 @@ COLUMNS = {
     "ugr": "ugr",
     "sources": "sources",
 }
+WORST = 4  # pictures of a rated year without hours asked for
+DEFAULT_DAYS = ((3, 21), (6, 21), (12, 21))  # month, day
+DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
 
 
 def glare_by_state(
@@ -57,22 +63,38 @@ def glare_by_state(
     return light.sky.whole_year(np.stack(lit))
 
 
-def glare_of_year(
-    light: PhaseLight | SeasonalLight,
-    state: NDArray[np.int64],
-    weather: Weather,
-    *,
-    rating: GlareOptions,
-    progress: Progress,
+def annual_glare(
+    room: RoomInputs, light: RoomLight, state: NDArray[np.int64], *, progress: Progress = silent
 ) -> pd.DataFrame:
-    """Glare of every hour [H] with the state [L] that holds in it; NaN in the dark."""
+    """Glare of every hour with the shading state of that hour [H]; NaN in the dark."""
     rated = hourly_glare(
-        light, "DGP", state, options=rating, progress=part(progress, 0.0, 1.0, "annual glare")
-    )
-    table = np.full((light.sky.hours, len(COLUMNS)), np.nan)
-    table[light.sky.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
-    frame = pd.DataFrame(table, index=weather.midpoints, columns=list(COLUMNS))
+        light.light, "DGP", room.lit_state(state), options=rating_of(room.options.outputs),
+        progress=part(progress, 0.0, 1.0, "annual glare"),
+    )  # fmt: skip
+    table = np.full((room.skies.hours, len(COLUMNS)), np.nan)
+    table[room.skies.lit] = np.stack([getattr(rated, name) for name in COLUMNS.values()], axis=1)
+    frame = pd.DataFrame(table, index=room.weather.midpoints, columns=list(COLUMNS))
     return frame.rename_axis("time")
+
+
+def rated_hours(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    metric: str,
+    hours: NDArray[np.int64],
+    *,
+    progress: Progress = silent,
+) -> AnnualGlare:
+    """A glare metric in some hours of the year [n] with the sun up; ratings are cached on disk."""
+    rating, source = rating_of(room.options.outputs), picture_light(room, light)
+    columns, cached = np.searchsorted(room.skies.lit, hours), None
+    if isinstance(source, PhaseLight) and light.inner is None:
+        cached = cached_glare(source, room.windows, metric, columns, rating)
+    return hourly_glare(
+        source, metric, room.lit_state(state), hours=columns, options=rating, kept=cached,
+        progress=part(progress, 0.0, 1.0, "annual glare"),
+    )  # fmt: skip
 
 
 def worst_hours(year: pd.DataFrame, count: int) -> list[int]:
@@ -90,40 +112,36 @@ def worst_hours(year: pd.DataFrame, count: int) -> list[int]:
     return chosen
 
 
-def kept_glare(
-    light: PhaseLight, windows: RoomWindows, *asked: object
+def cached_glare(
+    light: PhaseLight, windows: RoomWindows, *inputs: object
 ) -> Callable[[NDArray], CacheEntry] | None:
     """Cache entry of a year of glare with each window group in a state [G]; None: no cache.
 
     Cases of a study with the blind up and with the blind down rate every hour; the case whose blind
     is controlled reads each hour from the case whose state holds.
 
-    Args: asked: what the ratings depend on besides light and windows.
+    Args: inputs: what the ratings depend on besides light and windows.
     """
     traced, sky = light.filled.traced, light.sky
     cache = traced.cache
     if cache is None:
         return None
-    seen = digest(
+    key = digest(
         traced.scene, traced.sampling, traced.five_phase,
-        sky.whole, sky.sun, sky.direction, sky.illuminance, *asked,
+        sky.whole, sky.sun, sky.direction, sky.illuminance, *inputs,
     )  # fmt: skip
 
     def entry(state: NDArray) -> CacheEntry:
         rows = zip(windows.systems, state.tolist(), strict=True)
         chosen = [systems[min(j, len(systems) - 1)] for systems, j in rows]
         optics = [[one.visible, one.fine, one.angular] for one in chosen]
-        return cache.entry("year of glare", seen, optics, by=hourly_glare.__module__)
+        return cache.entry("year of glare", key, optics, by=hourly_glare.__module__)
 
     return entry
 
 
-DEFAULT_DAYS = ((3, 21), (6, 21), (12, 21))  # month, day
-DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
-
-
 def rating_of(outputs: Outputs) -> GlareOptions:
-    """How glare is rated."""
+    """The rules by which glare sources are recognised."""
     return GlareOptions(grouping=outputs.glare_sources, sun=outputs.glare_sun)
 
 
@@ -133,37 +151,48 @@ def default_hours(
     eye_illuminance: NDArray[np.float32],
     count: int,
 ) -> list[int]:
-    """The year's brightest hour at the eye, and with it hours of the equinox and the solstices.
+    """The year's brightest hour at the eye, and hours of the equinox and the solstices.
 
-    In all up to `count`; these at 9, 12 and 15 o'clock, as far as the sun is up.
+    At most `count` hours; those of the three days at 9, 12 and 15 o'clock if the sun is up.
 
     Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
     """
     moments = [datetime(2000, *day, clock) for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
     lit_set = set(lit.tolist())
-    found = [hour for moment in moments if (hour := hour_index(moment, times)) in lit_set]
+    usual = [hour for moment in moments if (hour := hour_index(moment, times)) in lit_set]
     brightest = int(lit[np.argmax(eye_illuminance)])
-    chosen = {brightest, *[hour for hour in found if hour != brightest][: count - 1]}
-    return [hour for hour in dict.fromkeys([*found, brightest]) if hour in chosen]
+    chosen = {brightest, *[hour for hour in usual if hour != brightest][: count - 1]}
+    return [hour for hour in dict.fromkeys([*usual, brightest]) if hour in chosen]
 
 
 def room_glare(
-    light: PhaseLight | PathLight | SeasonalLight,
-    view: View,
+    room: RoomInputs,
+    light: RoomLight,
     state: NDArray[np.int64],
     hours: list[int],
+    year: pd.DataFrame | None = None,
     *,
-    rating: GlareOptions,
-    progress: Progress,
+    progress: Progress = silent,
 ) -> GlareResults:
-    """Pictures of the chosen hours of the year and their glare.
+    """Pictures of hours of the year and their glare.
 
-    Args: state: [L] of the windows in each hour with the sun up.
+    Args:
+        state: [H] of the shading.
+        hours: indices; none: the worst hours of `year`, else `default_hours`.
+        year: `annual_glare`.
     """
+    outputs, lit_state = room.options.outputs, room.lit_state(state)
+    if not hours and year is not None:
+        hours = worst_hours(year, min(WORST, outputs.picture_count))
+    if not hours:
+        eye = light.eye()[lit_state, np.arange(len(room.skies.lit))]
+        hours = default_hours(room.weather.midpoints, room.skies.lit, eye, outputs.picture_count)
     progress("pictures", 0.0)
-    columns = np.searchsorted(light.sky.lit, hours)
-    rated = []
-    made = rated_pictures(light, columns, state, options=rating, progress=progress)
+    columns, rating = np.searchsorted(room.skies.lit, hours), rating_of(outputs)
+    made = rated_pictures(
+        picture_light(room, light), columns, lit_state, options=rating, progress=progress
+    )
+    pictures = []
     for hour, (luminance, result) in zip(hours, made, strict=True):
         glare = {
             "ev": result.Ev,
@@ -177,9 +206,9 @@ def room_glare(
             "sources": float(result.count),
             "background_luminance": result.background_luminance,
         }
-        rated.append(LuminancePicture(hour, luminance, glare, result.labels > 0))
+        pictures.append(LuminancePicture(hour, luminance, glare, result.labels > 0))
     progress("pictures", 1.0)
-    return GlareResults(view, tuple(rated), rating.rule)
+    return GlareResults(light.scene.view, tuple(pictures), rating.rule)
 
 
 def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:
@@ -212,6 +241,31 @@ def brightest_picture(glare: GlareResults) -> LuminancePicture:
     return max(glare.pictures, key=lambda picture: picture.glare["ev"])
 
 
+def coloured(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    glare: GlareResults,
+    *,
+    progress: Progress = silent,
+) -> GlareResults:
+    """The pictures, with the brightest of them in colour too."""
+    if not glare.pictures:
+        return glare
+    progress("colour", 0.0)
+    hour, groups = brightest_picture(glare).hour, room.windows.groups
+    building = in_month(room.building, int(room.weather.midpoints[hour].month))
+    sampling = room.options.sampling
+    sky = annual_sky(room.weather, sampling.subdivision, hours=[hour], **room.options.sky)
+    result = with_colour(
+        glare, band_scenes(building, room.space, groups, glare.view),
+        light.light.filled.systems[: len(groups)], sky, state=int(state[hour]), sampling=sampling,
+        progress=part(progress, 0.0, 1.0, "colour"),
+    )  # fmt: skip
+    progress("colour", 1.0)
+    return result
+
+
 def with_colour(
     glare: GlareResults,
     bands: Sequence[DaylightScene],
@@ -224,7 +278,7 @@ def with_colour(
 ) -> GlareResults:
     """The pictures with the brightest in colour; without it where that would be grey.
 
-    Grey too is what no window of the room's own lights.
+    A room without windows to the outdoors is taken for grey.
 
     Args:
         bands: the room's scene with its view by red, green and blue.

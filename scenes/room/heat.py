@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.annual import AnnualGlare
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
-from scenes.fenestration.thermal_system import ThermalSystem
 from scenes.results import (
     DaylightResult,
     ExploredRoom,
@@ -25,7 +25,6 @@ from scenes.results import (
     ThermalResult,
 )
 from scenes.room.operation_tables import ComfortTable, OperationTables
-from scenes.room.windows import RoomWindows
 from scenes.room.zone import RoomZone, balances, coupled
 from thermal.balance import ZoneResult
 from thermal.comfort import comfort_by_outdoors, pmv_ppd, standard_effective_temperature, summarise
@@ -84,9 +83,9 @@ def room_humidity(
 
 
 def felt_by(person: ComfortTable, result: ZoneResult, humidity: Humidity) -> dict[str, FloatArray]:
-    """Relative humidity of the air [%], the person's PMV, PPD [%] and SET [degC], each [H].
+    """Relative humidity of the air [%], PMV, PPD [%] and SET [degC] of a person, each [H].
 
-    The person is in the humidity stated, else in the air's.
+    Comfort is computed with the humidity of the table, else with that of the air.
     """
     air = 100.0 * np.clip(humidity.relative, 0.0, 1.0)
     about = person.model_dump(exclude={"mean_radiant"})
@@ -100,13 +99,8 @@ def felt_by(person: ComfortTable, result: ZoneResult, humidity: Humidity) -> dic
 BANDS = {"within_90": "ASHRAE 55 90 %", "within_80": "ASHRAE 55 80 %"}
 
 
-def operated_year(
-    room: RoomZone, result: ZoneResult, weather: Weather, states: tuple[str, ...], rule: str
-) -> OperationResult:
-    """What control, heating, cooling and lamps of a room did.
-
-    Args: states: names of the shading states; rule: of their control.
-    """
+def operated_year(room: RoomZone, result: ZoneResult, weather: Weather) -> OperationResult:
+    """Shading state and power of heating, cooling and lamps by hour, with their sums."""
     hours = pd.DataFrame(
         {
             "shading_state": room.state,
@@ -117,14 +111,14 @@ def operated_year(
         index=weather.midpoints,
     ).rename_axis("time")
     summary = {
-        "heating_kwh": result.heating.sum() / 1e3,
-        "cooling_kwh": result.cooling.sum() / 1e3,
-        "lighting_kwh": room.lamps.sum() / 1e3,
+        "heating_kwh": result.heating.sum() * weather.step_h / 1e3,
+        "cooling_kwh": result.cooling.sum() * weather.step_h / 1e3,
+        "lighting_kwh": room.lamps.sum() * weather.step_h / 1e3,
         "peak_heating_w": result.heating.max(),
         "peak_cooling_w": result.cooling.max(),
     }
     summary = {key: float(value) for key, value in summary.items()}
-    return OperationResult(states, hours, summary, rule)
+    return OperationResult(room.states, hours, summary, room.operation.control.rule)
 
 
 def thermal_result(
@@ -132,11 +126,10 @@ def thermal_result(
     result: ZoneResult,
     weather: Weather,
     felt: dict[str, NDArray[np.float64]],
-    fenestration: Iterator[dict[str, float | str]],
 ) -> ThermalResult:
-    """The tables of a room's year.
+    """Tables of a room's temperatures, solar gains and comfort.
 
-    Args: felt: `felt_by`; fenestration: `fenestration_table` of its windows.
+    Args: felt: `felt_by`.
     """
     comfort, summary = _comfort(result, weather, room.occupied)
     return ThermalResult(
@@ -144,32 +137,8 @@ def thermal_result(
         pd.DataFrame(room.gains, index=weather.midpoints).rename_axis("time"),
         comfort,
         summary,
-        tuple(fenestration),
+        room.fenestration,
     )
-
-
-def fenestration_table(
-    windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]]
-) -> Iterator[dict[str, float | str]]:
-    """What the windows are, group by group and state by state, at normal incidence."""
-    seen = set()
-    for states, heats in zip(windows.systems, thermals, strict=True):
-        for system, heat in zip(states, heats, strict=True):
-            if id(system) in seen:
-                continue
-            seen.add(id(system))
-            visible = system.visible
-            yield {
-                "system": system.name,
-                "source": system.source,
-                "u_value": heat.fenestration.u_value,
-                "g_value": float(heat.g_value[0]),
-                "solar_transmittance": float(heat.transmittance[0]),
-                "solar_reflectance": float(heat.reflectance[0]),
-                "visible_transmittance": float(
-                    visible.direct_hemispherical(visible.transmission_front)[0]
-                ),
-            }
 
 
 def _temperatures(result: ZoneResult, zone: Zone, weather: Weather) -> pd.DataFrame:
@@ -215,42 +184,32 @@ Heat = tuple[ThermalResult, OperationResult | None]
 
 
 @dataclass(frozen=True, slots=True)
-class HeatInputs:
-    """What the heat of a room comes from, and what its tables name."""
-
-    zone: RoomZone
-    fenestration: tuple[dict[str, float | str], ...]  # `fenestration_table` of its windows
-    states: tuple[str, ...]  # names of the shading states
-    tables: OperationTables | None  # None: not operated
-
-
-@dataclass(frozen=True, slots=True)
 class DaylitRoom:
-    """A room with its year of light, before its heat."""
+    """A room with its year of light, and the zone from which its heat is computed."""
 
     space: Space
     daylight: DaylightResult
     glare: GlareResults
-    inputs: HeatInputs
+    zone: RoomZone
     seconds: dict[str, float]  # by stage
     annual_glare: pd.DataFrame | None = None
     dgp: AnnualGlare | None = None
-    problems: tuple[Problem, ...] = ()
+    issues: tuple[Issue, ...] = ()
     explored: ExploredRoom | None = None
     template: str = ""
     borrowed: str = ""
 
     def with_heat(self, heat: Heat) -> RoomYear:
-        """The whole year."""
-        thermal, ran = heat
-        names = (field.name for field in fields(self) if field.name != "inputs")
+        """The room's year, with temperatures and operation."""
+        thermal, operation = heat
+        names = (field.name for field in fields(self) if field.name != "zone")
         return RoomYear(
-            heat=thermal, operation=ran, **{name: getattr(self, name) for name in names}
+            heat=thermal, operation=operation, **{name: getattr(self, name) for name in names}
         )
 
 
 def heat_of(
-    rooms: Sequence[HeatInputs],
+    rooms: Sequence[RoomZone],
     weather: Weather,
     step_s: float,
     *,
@@ -263,34 +222,30 @@ def heat_of(
 
     Args:
         step_s: of the balance [s].
-        air_links: air between them [Z, Z] [m3/s]; None: none.
-        store: where the balances and what is found lie; None: in memory.
+        air_links: air between the rooms [Z, Z] [m3/s]; None: none.
+        store: of balances and results on disk; None: in memory.
     """
-    zones = [room.zone for room in rooms]
-    found = balances(
-        zones, weather, step_s, air_links=air_links, terrain=terrain, progress=progress,
+    results = balances(
+        rooms, weather, step_s, air_links=air_links, terrain=terrain, progress=progress,
         store=store,
     )  # fmt: skip
     passed = iter if store is None else store.each
-    moist = room_humidity(zones, passed(found), weather, air_links=air_links)
+    humidities = room_humidity(rooms, passed(results), weather, air_links=air_links)
     heats: list[Heat] = []
-    for room, balance, humidity in zip(rooms, passed(found), moist, strict=True):
-        tables = room.tables or OperationTables()
-        felt = felt_by(tables.comfort, balance, humidity)
-        heat = thermal_result(room.zone, balance, weather, felt, iter(room.fenestration))
-        ran = None
-        if room.tables is not None:
-            rule = tables.control.rule
-            ran = operated_year(room.zone, balance, weather, room.states, rule)
-        heats.append((heat, ran) if store is None else store.kept((heat, ran)))
+    for room, balance, humidity in zip(rooms, passed(results), humidities, strict=True):
+        comfort = (room.operation or OperationTables()).comfort
+        thermal = thermal_result(room, balance, weather, felt_by(comfort, balance, humidity))
+        operation = None if room.operation is None else operated_year(room, balance, weather)
+        heat = thermal, operation
+        heats.append(heat if store is None else store.kept(heat))
     return heats
 
 
 def heat_alone(
-    room: HeatInputs, weather: Weather, step_s: float, progress: Progress = silent
+    room: RoomZone, weather: Weather, step_s: float, progress: Progress = silent
 ) -> Heat:
-    """The heat of a room with rooms of its own temperature around it."""
-    terrain = (room.tables or OperationTables()).terrain
+    """The heat of a room whose neighbours have its own temperature."""
+    terrain = (room.operation or OperationTables()).terrain
     (heat,) = heat_of([room], weather, step_s, terrain=terrain, progress=progress)
     progress("heat", 1.0)
     return heat
@@ -305,26 +260,25 @@ def coupled_years(
     *,
     store: StoredArrays | None = None,
 ) -> tuple[list[RoomYear], str]:
-    """The years of rooms that exchange heat through what lies between them, and that in words.
+    """The years of rooms that exchange heat through the parts between them, and a note on that.
 
     Args:
-        tables: of all rooms; they say the site's terrain and the air through open doors.
-        store: where the rooms' heat lies; None: in memory.
+        tables: of all rooms; terrain of the site, air through open doors.
+        store: of the rooms' heat on disk; None: in memory.
     """
     progress("heat balance", 0.0)
-    zones, links, _ = coupled([room.inputs.zone for room in rooms], tables.air.door_m3_s)
-    inputs = [replace(r.inputs, zone=zone) for r, zone in zip(rooms, zones, strict=True)]
-    found = heat_of(
-        inputs, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress,
+    zones, links, _ = coupled([room.zone for room in rooms], tables.air.door_m3_s)
+    heats = heat_of(
+        zones, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress,
         store=store,
     )  # fmt: skip
     progress("heat balance", 1.0)
-    years = [room.with_heat(heat) for room, heat in zip(rooms, found, strict=True)]
-    return years, _said(zones)
+    years = [room.with_heat(heat) for room, heat in zip(rooms, heats, strict=True)]
+    return years, _coupling_note(zones)
 
 
-def _said(rooms: Sequence[RoomZone]) -> str:
-    """What the rooms exchange heat through, and behind what the room itself is taken to lie."""
+def _coupling_note(rooms: Sequence[RoomZone]) -> str:
+    """Areas through which the rooms exchange heat, and areas without a computed neighbour."""
     through = among = other = 0.0
     guids = {room.space.guid for room in rooms}
     for room in rooms:
@@ -339,11 +293,13 @@ def _said(rooms: Sequence[RoomZone]) -> str:
         f"The heat of the {len(rooms)} rooms is balanced together: it flows between them through "
         f"{through:.1f} m2 of walls, floors and doors."
     )
-    apart = {
+    uncoupled = {
         "towards each other where no face of the other was found": among,
         "towards rooms that are not computed": other,
     }
-    behind = " and ".join(f"{area:.1f} m2 {what}" for what, area in apart.items() if area >= 0.05)
+    behind = " and ".join(
+        f"{area:.1f} m2 {what}" for what, area in uncoupled.items() if area >= 0.05
+    )
     if behind:
         text += f" Behind these sides a room of the same temperature is taken to lie: {behind}."
     return text

@@ -1,8 +1,8 @@
-"""Glass and open doorways between rooms: window groups whose outdoors is another room with windows.
+"""Glass and open doorways between rooms: window groups that face another room, not the outdoors.
 
-A doorway is a pane that passes everything.  A room without windows that such panes light passes
-light on: each room takes light from rooms that are no more panes away from the nearest window than
-it is, and these from rooms that are fewer away.
+A doorway is a pane of transmittance 1. A room without windows passes light on: each room receives
+light from rooms that are at most as many panes away from the nearest window, and these from rooms
+that are fewer panes away.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
 from bim.doorways import THINNEST, panes_between, reveals_between, wall_depth
-from bim.model import SHUT_ADVICE, Building, Element, Face, Space
+from bim.model import Building, Element, Face, Space
 from bim.to_tracer import (
     element_surfaces,
     exterior_surfaces,
@@ -33,14 +33,17 @@ from scenes.fenestration.stated import StatedValues, glazing_system
 from scenes.fenestration.systems import States
 from scenes.room.windows import room_windows
 
-CLEAR = 0.88  # visible transmittance of glass that states none: a float pane of 6 mm, EN 410
-PASSES = "daylight passes (--inner-glass)"
-PANE = "glass between rooms"  # name of a pane as the room beyond has it: opaque
+CLEAR = 0.88  # visible transmittance of glass without a value: a float pane of 6 mm, EN 410
+OPENED = {  # codes of issues of a building whose inner glass and doorways daylight passes
+    "glass-between-rooms": "glass-between-rooms-open",
+    "rooms-open-to-each-other": "rooms-open-to-each-other-lit",
+}
+PANE = "glass between rooms"  # name of a pane in the scene of the room beyond, where it is opaque
 
 
 @dataclass(frozen=True, slots=True)
 class InnerGlass:
-    """The window groups of a room that look into other rooms, and what they take from there."""
+    """The window groups of a room that face other rooms, with the scenes of these rooms."""
 
     interior: Surfaces  # the room without this glass
     groups: tuple[WindowGroup, ...]  # axis I
@@ -49,47 +52,50 @@ class InnerGlass:
     names: tuple[str, ...]  # [I] labels of the rooms beyond
     area: float  # of the glass [m2]
     open_area: float  # of the doorways [m2]
-    faces: frozenset[str]  # names of the room's faces that this glass is
+    faces: frozenset[str]  # names of the room's faces that the glass replaces
 
 
-def lending_rooms(building: Building, space: Space) -> list[Space]:
-    """The rooms that a room gets light from through glass, and those that they get it from."""
+def source_rooms(building: Building, space: Space) -> list[Space]:
+    """The rooms from which light reaches a room through inner glass, in one step or several."""
     away = _panes_to_windows(building)
-    found: dict[str, Space] = {}
-    left = _lenders(building, space, away, away.get(space.guid, -1) + 1)
-    while left:
-        room = left.pop(0)
-        if room.guid not in found:
-            found[room.guid] = room
-            left += _lenders(building, room, away, away[room.guid])
-    return list(found.values())
+    rooms: dict[str, Space] = {}
+    queue = _light_sources(building, space, away, away.get(space.guid, -1) + 1)
+    while queue:
+        room = queue.pop(0)
+        if room.guid not in rooms:
+            rooms[room.guid] = room
+            queue += _light_sources(building, room, away, away[room.guid])
+    return list(rooms.values())
 
 
 def opened(building: Building) -> Building:
-    """The building with its doorways open: each reflects what comes back from the room beyond.
+    """The building with open doorways, whose reflectance is that of the room beyond.
 
     rho f / (1 - rho (1 - f)), rho the mean reflectance of that room, f the doorway's share of its
-    surface.  Problems that asked for this say that it is so.
+    surface. Issues that advise this option state that it is in use.
 
     Source: Sumpner 1892 (the integrating sphere), as for light wells and cavities.
     """
     rooms = {space.guid: space for space in building.spaces}
 
-    def seen(face: Face) -> Face:
+    def opened_face(face: Face) -> Face:
         beyond = rooms.get(face.neighbour or "")
         if face.pane is None or not face.pane.is_open or beyond is None:
             return face
         visible, solar = (_returned(beyond, face.area, band) for band in ("visible", "solar"))
         return replace(face, reflectance_visible=visible, reflectance_solar=solar)
 
-    spaces = tuple(replace(space, faces=tuple(map(seen, space.faces))) for space in building.spaces)
-    told = [(one, one.consequence.replace(SHUT_ADVICE, PASSES)) for one in building.problems]
-    problems = tuple(replace(one, consequence=text) for one, text in told)
-    return replace(building, spaces=spaces, problems=problems)
+    spaces = tuple(
+        replace(space, faces=tuple(map(opened_face, space.faces))) for space in building.spaces
+    )
+    issues = tuple(
+        replace(issue, code=OPENED.get(issue.code, issue.code)) for issue in building.issues
+    )
+    return replace(building, spaces=spaces, issues=issues)
 
 
 def _returned(room: Space, area: float, band: str) -> float:
-    """Share of the light through an opening [m2] of a room that comes back out of it."""
+    """Share of the light through an opening [m2] of a room that returns through it."""
     parts = [(face.area, face.total_reflectance(band)) for face in room.faces]
     whole = sum(size for size, _ in parts) + sum(window.area for window in room.windows)
     mean = sum(size * reflectance for size, reflectance in parts) / whole
@@ -100,11 +106,11 @@ def _returned(room: Space, area: float, band: str) -> float:
 def inner_glass(
     building: Building, space: Space, systems: Mapping[str, States]
 ) -> InnerGlass | None:
-    """The glass and doorways of a room to rooms that daylight reaches; None where there are none.
+    """Glass and doorways of a room to rooms with daylight; None without any.
 
-    The windows there are in their first state, the glass between is a clear pane of the
-    transmittance that it states, a doorway passes all.  The wall's thickness is a tube of reveals
-    beyond the glass.
+    The windows of these rooms are in their first state, the glass is a clear pane of its stated
+    transmittance, a doorway transmits everything. The wall's thickness is a tube of reveals beyond
+    the glass.
 
     Args: systems: of the windows of all these rooms, by their GUID.
     """
@@ -119,10 +125,10 @@ def _inner_glass(
     away: Mapping[str, int],
     below: int,
 ) -> InnerGlass | None:
-    """That to rooms fewer than so many panes away from a window."""
-    found, used = [], []
-    dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun comes by patches
-    for other in _lenders(building, space, away, below):
+    """Inner glass to rooms fewer than `below` panes away from a window."""
+    panes, used = [], []
+    dark = AngularScattering(np.zeros(2), np.zeros(2))  # the sun is part of the sky patches
+    for other in _light_sources(building, space, away, below):
         pairs = panes_between(building, space)[other.guid]
         onward = _inner_glass(building, other, systems, away, away[other.guid])
         scene, transmission = _room_beyond(building, other, pairs, systems, onward)
@@ -132,20 +138,20 @@ def _inner_glass(
             beam = np.diag(optics.transmission)
             named = replace(group, name=f"{group.name}, to {other.label}")
             beyond = RoomBeyond(scene, transmission, beam)
-            found.append((named, (given,), beyond, other.label))
-    if not found:
+            panes.append((named, (given,), beyond, other.label))
+    if not panes:
         return None
     names = frozenset(face.name for face in used)
     rest = replace(space, faces=tuple(face for face in space.faces if face.name not in names))
     areas = [sum(f.area for f in used if f.pane.is_open == is_open) for is_open in (False, True)]
-    groups = map(tuple, zip(*found, strict=True))
+    groups = map(tuple, zip(*panes, strict=True))
     return InnerGlass(furnished_surfaces(rest), *groups, *areas, names)
 
 
 def borrowed_share(
     space: Space, light: PhaseLight | SeasonalLight, inner: InnerGlass | None
 ) -> str:
-    """How much of the light of a room's sensors over the year its inner glass gives, in words."""
+    """A sentence on the share of the sensors' light over the year that inner glass gives."""
     if inner is None:
         return ""
     first = len(light.filled.traced.scene.outdoor_groups)
@@ -163,27 +169,29 @@ def borrowed_share(
 
 
 def _through(inner: InnerGlass) -> str:
-    """What the light comes through, in words."""
+    """Areas of glass and doorways, in words."""
     parts = ((inner.area, "glass"), (inner.open_area, "open doorways"))
     return " and ".join(f"{area:.1f} m2 of {what}" for area, what in parts if area > 0)
 
 
 def _panes_to_windows(building: Building) -> dict[str, int]:
-    """How many panes lie between a room and the nearest with windows; of rooms with light only."""
+    """Number of panes between a room and the nearest window, by GUID; without unlit rooms."""
     rooms = {space.guid: space for space in building.spaces}
-    found = {space.guid: 0 for space in building.spaces if space.windows}
-    newest = list(found)
+    panes = {space.guid: 0 for space in building.spaces if space.windows}
+    newest = list(panes)
     while newest:
         reached = {
             guid for one in newest for guid in panes_between(building, rooms[one])
-        } - found.keys()
-        found |= dict.fromkeys(reached, found[newest[0]] + 1)
+        } - panes.keys()
+        panes |= dict.fromkeys(reached, panes[newest[0]] + 1)
         newest = sorted(reached)
-    return found
+    return panes
 
 
-def _lenders(building: Building, space: Space, away: Mapping[str, int], below: int) -> list[Space]:
-    """The rooms behind a room's panes that are fewer than so many panes away from a window."""
+def _light_sources(
+    building: Building, space: Space, away: Mapping[str, int], below: int
+) -> list[Space]:
+    """The rooms behind a room's panes that are fewer than `below` panes away from a window."""
     pairs = panes_between(building, space)
     return [
         other for other in building.spaces
@@ -197,15 +205,15 @@ def _groups(space: Space, faces: Sequence[Face]) -> list[tuple[SystemOptics, Win
     for face in faces:
         tau = None if face.pane.is_open else face.pane.visible_transmittance or CLEAR
         by_tau.setdefault(tau, []).append(face.pane)
-    found = []
+    groups = []
     for tau, panes in by_tau.items():
         optics: SystemOptics = GivenOptics(np.eye(KLEMS_FULL.size))
         if tau is not None:
             glass = glazing_system(StatedValues(tau, None, None, None, 1), "the model")
             optics = BsdfOptics(glass.visible, glass.fine, glass.angular)
-        groups = window_groups(replace(space, windows=tuple(panes)))
-        found += [(optics, group) for group in groups]
-    return found
+        of_tau = window_groups(replace(space, windows=tuple(panes)))
+        groups += [(optics, group) for group in of_tau]
+    return groups
 
 
 def _room_beyond(
@@ -215,9 +223,9 @@ def _room_beyond(
     systems: Mapping[str, States],
     onward: InnerGlass | None,
 ) -> tuple[DaylightScene, tuple[NDArray[np.float64], ...]]:
-    """The room beyond seen from the panes of another one, and T of all glass that lights it."""
+    """The scene of a room beyond panes, and T of all glass that lights it."""
     open_ = {back.name for _, back in pairs} | (set() if onward is None else onward.faces)
-    kept = [face for face in room.faces if face.name not in open_]
+    opaque = [face for face in room.faces if face.name not in open_]
     glass = [
         _piece(face, PANE, face.triangles,
                back.reflectance_visible if back.pane.is_open else GLASS_REFLECTANCE)
@@ -235,7 +243,7 @@ def _room_beyond(
     ]
     windows = room_windows(room, systems)
     scene = DaylightScene(
-        element_surfaces([*kept, *room.furniture, *glass, *reveals]),
+        element_surfaces([*opaque, *room.furniture, *glass, *reveals]),
         exterior_surfaces(building, room),
         (*windows.groups, *(() if onward is None else onward.groups)),
         beyond=() if onward is None else onward.beyond,
@@ -245,5 +253,5 @@ def _room_beyond(
 
 
 def _piece(face: Face, name: str, triangles: NDArray[np.float64], reflectance: float) -> Element:
-    """Something of the pane of a face that the room beyond has."""
+    """A surface of the room beyond at the pane of a face."""
     return Element(face.pane.guid, name, "IfcWindow", triangles, reflectance, reflectance)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from bim.model import Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue, Phrase, issue_text
 from bim.sensors import sensor_grid, view_point
 from bim.to_tracer import furnished_surfaces, window_groups
 from mitsuba_cfs.errors import RoomError
@@ -17,39 +16,38 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.matrices.escape import SIDES, Escape, escaped_view
 
-SPACING, WORK_PLANE = 1.0, 0.8  # of the sensors that are looked from [m]
-EYE_PIXELS = 64  # of the eye's view, of which only place and direction count
-MOST_LOST = 0.01  # of a sensor's view, before it is a problem
-WHERE = {"floor": "through the floor", "ceiling": "through the ceiling"}
+SPACING, WORK_PLANE = 1.0, 0.8  # of the sensors [m]
+EYE_PIXELS = 64  # of the eye's view; only its position and direction count
+MOST_LOST = 0.01  # greatest share of a sensor's view that is no issue
 
 
-def hole_problems(
+def leak_issues(
     space: Space,
     scene: DaylightScene,
     *,
     seed: int = 0,
     cache: MatrixCache | None = None,
     progress: Progress = silent,
-) -> tuple[Problem, ...]:
-    """A problem where a sensor loses more than 1 % of its view, direct and reflected.
+) -> tuple[Issue, ...]:
+    """An issue if a sensor loses more than 1 % of its view, direct and reflected.
 
-    Args: scene: the room with its sensors and an eye.
+    Args: scene: of the room, with its sensors and the eye.
     """
     points, directions = scene.sensors()
-    found = escaped_view(
+    escape = escaped_view(
         scene.interior, scene.groups, points, directions,
         seed=seed, progress=progress, cache=cache,
     )  # fmt: skip
-    if not (found.share - 2 * found.error > MOST_LOST).any():
+    if not (escape.share - 2 * escape.error > MOST_LOST).any():
         return ()
-    return (_problem(space, points, found),)
+    return (_issue(space, points, escape),)
 
 
-def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None) -> list[str]:
-    """The problems of a room's holes as sentences, where no scene with sensors is at hand."""
+def leak_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None) -> list[str]:
+    """Sentences on the leaks of a room, seen from sensors of their own."""
     try:
         points, _ = sensor_grid(space, spacing=SPACING, height=WORK_PLANE, margin=SPACING / 2)
-    except RoomError:  # too low for a work plane: the eye alone
+    except RoomError:  # too low for a work plane: from the eye alone
         points = np.empty((0, 3))
     scene = DaylightScene(
         furnished_surfaces(space, "visible"),
@@ -59,34 +57,35 @@ def hole_notes(space: Space, *, seed: int = 0, cache: MatrixCache | None = None)
         np.tile([0.0, 0.0, 1.0], (len(points), 1)),
         fisheye(*view_point(space), EYE_PIXELS),
     )
-    found = hole_problems(space, scene, seed=seed, cache=cache)
-    return [f"{problem.what}: {problem.consequence}" for problem in found]
+    issues = leak_issues(space, scene, seed=seed, cache=cache)
+    return [issue_text(issue).line for issue in issues]
 
 
-def _problem(space: Space, points: np.ndarray, found: Escape) -> Problem:
-    """How many sensors lose how much, and where most of it leaves."""
-    worst, sensors = int(np.argmax(found.share)), len(points) - 1
-    count = int(np.count_nonzero(found.share[:sensors] > MOST_LOST))
-    name = f"sensor {worst}" if worst < sensors else "the view point"
-    side = int(np.argmax(found.by_side.sum(axis=0)))
-    towards = WHERE.get(SIDES[side], f"to the {SIDES[side]}")
-    what = (
-        f"room {space.label} is open: up to {100 * found.share[worst]:.0f} % of what "
-        f"a sensor sees is neither wall nor window ({name} at {_place(points[worst])}; "
-        f"{count} of {sensors} sensors above {100 * MOST_LOST:g} %); most of it leaves "
-        f"{towards} near {_place(found.place[side])}"
-    )
-    return Problem(
-        space.guid, what,
-        "this light is lost and the room too dark: model what closes the hole (a door, a wall)",
-    )  # fmt: skip
+def _issue(space: Space, points: np.ndarray, escape: Escape) -> Issue:
+    """The number of sensors that lose light, the largest loss, and where most of it leaves."""
+    worst, sensors = int(np.argmax(escape.share)), len(points) - 1
+    count = int(np.count_nonzero(escape.share[:sensors] > MOST_LOST))
+    at_sensor = worst < sensors
+    side = int(np.argmax(escape.by_side.sum(axis=0)))
+    values = {
+        "room": space.label,
+        "percent": 100 * float(escape.share[worst]),
+        "sensor": Phrase("sensor", {"number": worst}) if at_sensor else Phrase("view-point"),
+        "position": _position(points[worst]),
+        "count": count,
+        "sensors": sensors,
+        "limit_percent": 100 * MOST_LOST,
+        "side": Phrase(f"side-{SIDES[side]}"),
+        "exit": _position(escape.place[side]),
+    }
+    return Issue("room-leaks-light", space.guid, values)
 
 
-def _place(point: np.ndarray) -> str:
+def _position(point: np.ndarray) -> str:
     return "({:.1f}, {:.1f}, {:.1f}) m".format(*(round(float(x), 1) + 0.0 for x in point))
 
 
-def moved_problem(problem: Problem, space: Space, template: str) -> Problem:
-    """The problem of a template room as that of one equal to it."""
-    what = f"room {space.label} is like room {template}: {problem.what}"
-    return replace(problem, where=space.guid, what=what)
+def moved_issue(issue: Issue, space: Space, template: str) -> Issue:
+    """The issue of a template room as the issue of an equal room."""
+    values = {**issue.values, "room": space.label, "template": template}
+    return Issue("equal-room-leaks-light", space.guid, values)

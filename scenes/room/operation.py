@@ -21,19 +21,20 @@ from scenes.room.schedules import ScheduleTable
 from scenes.toml_file import read_table, validated
 
 Tables = TypeVar("Tables", bound=OperationTables)
+PREFIX = "of the building's file: "  # of the names of schedules that the building's file contains
 
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """An operation file with its systems read."""
+    """An operation file and its fenestration systems."""
 
     file: Path
     tables: OperationTables
-    systems: tuple[FenestrationSystem, ...]  # states of every window; empty: the windows' own
+    systems: tuple[FenestrationSystem, ...]  # states of every window; empty: the building file's
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The BSDF files and the tables of schedules that it names."""
+        """The BSDF files and CSV schedules that the file names."""
         tables = (one.csv for one in self.tables.schedules.values())
         states = [table.placed(self.file.parent) for table in self.tables.system]
         panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
@@ -41,38 +42,38 @@ class Operation:
         return tuple(path for path in (*named, *panes, *tables) if path is not None)
 
     def outdoors(self, weather: Weather) -> Weather:
-        """The weather of its rooms: with the air of a street where it states one.
+        """The weather of its rooms, with the urban heat island that the file states.
 
-        Raises: `DataError` out of the range of the heat island's equation.
+        Raises: `DataError` outside the range of the heat island's equation.
         """
         island = self.tables.heat_island
         return weather if island is None else island.warmed(weather, self.file)
 
 
 def read_operation(path: str | PathLike[str]) -> Operation:
-    """The operation of a TOML file; the paths in it start at its folder.
+    """The operation of a TOML file; paths in it are relative to its folder.
 
     Raises: `DataError` that names file and field.
     """
     path = Path(path)
     tables = schedules_there(validated(OperationTables, read_table(path), path), path)
     systems = []
-    for number, one in enumerate(tables.system):
-        place = None if one.bsdf is None else path.parent / one.bsdf
-        if place is not None and not place.is_file():
-            raise DataError(f"no such file: {one.bsdf}", file=path, field=f"system.{number}.bsdf")
-        system = read_state(one.placed(path.parent), place, by=f"[[system]] of {path.name},")
+    for number, state in enumerate(tables.system):
+        bsdf = None if state.bsdf is None else path.parent / state.bsdf
+        if bsdf is not None and not bsdf.is_file():
+            raise DataError(f"no such file: {state.bsdf}", file=path, field=f"system.{number}.bsdf")
+        system = read_state(state.placed(path.parent), bsdf, by=f"[[system]] of {path.name},")
         if any(system.name == other.name for other in systems):
-            name = f"{system.name} ({number + 1})" if place is None else place.stem
+            name = f"{system.name} ({number + 1})" if bsdf is None else bsdf.stem
             system = replace(system, name=name)
         systems.append(system)
     return Operation(path, tables, tuple(systems))
 
 
 def check_systems(operation: Operation) -> None:
-    """Raise `DataError` where a state's U, g and BSDF do not go together, naming its BSDF's file.
+    """Raise `DataError` for a state with inconsistent U, g and BSDF, naming its BSDF file.
 
-    Of a state by its panes that file is the operation's own.
+    A state given by its panes names the operation file.
     """
     for table, system in zip(operation.tables.system, operation.systems, strict=True):
         bsdf = table.placed(operation.file.parent).bsdf
@@ -80,27 +81,30 @@ def check_systems(operation: Operation) -> None:
 
 
 def schedules_there(tables: Tables, path: Path) -> Tables:
-    """The tables of a file with absolute paths of the schedules' CSV files, which are there."""
-    found = {}
+    """The tables of a file with absolute paths of CSV schedules.
+
+    Raises: `DataError` for a file that does not exist.
+    """
+    schedules = {}
     for name, one in tables.schedules.items():
-        place = None if one.csv is None else (path.parent / one.csv).absolute()
-        if place is not None and not place.is_file():
+        csv = None if one.csv is None else (path.parent / one.csv).absolute()
+        if csv is not None and not csv.is_file():
             field = f"schedules.{name}.csv"
             raise DataError(f"no such file: {one.csv}", file=path, field=field)
-        found[name] = one.model_copy(update={"csv": place})
-    return tables.model_copy(update={"schedules": found})
+        schedules[name] = one.model_copy(update={"csv": csv})
+    return tables.model_copy(update={"schedules": schedules})
 
 
 def read_state(table: StateTable, path: Path | None, *, by: str = "") -> FenestrationSystem:
     """The system of a shading state from its BSDF file, with U, g and closure of its table.
 
-    Args: path: None: its panes say its optics; by: what names the file, for the system's source.
+    Args: path: of the BSDF; None: optics from the panes. by: start of the system's source.
     """
     if path is None:
         system = replace(system_of_panes(table.layers), source=f"{by} layers".strip())
     else:
         system = read_system(path, u_value=table.u_value, g_value=table.g_value, by=by)
-    if table.layers:  # they say U and g too: those of the file beside are of another model
+    if table.layers:  # their U and g come before those of the BSDF's thermal file
         system = replace(system, u_value=table.u_value, g_value=table.g_value, g_by_patch=None)
     by_patch = table.g_by_patch()
     return replace(
@@ -112,7 +116,7 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
 
 
 def check_states(operation: Operation, states: int) -> None:
-    """Raise `DataError` where the control names states that the windows do not have."""
+    """Raise `DataError` for a control that names states that the windows do not have."""
     for fault in (one.control_fault(states) for one in operation.tables.variants):
         if fault is None:
             continue
@@ -120,12 +124,8 @@ def check_states(operation: Operation, states: int) -> None:
         raise DataError(message, file=operation.file, field=f"control.{field}")
 
 
-Tables = TypeVar("Tables", bound=OperationTables)
-PREFIX = "of the building's file: "  # of its schedules' names, which an operation file has not
-
-
 def used_operation(operation: Operation | None, building: Building) -> Operation | None:
-    """The operation with what the building's file states of its rooms; None where none says any."""
+    """The operation, completed by the use of rooms in the building's file; None without either."""
     if not building.uses or building.file is None:
         return operation
     tables = OperationTables() if operation is None else operation.tables
@@ -135,9 +135,11 @@ def used_operation(operation: Operation | None, building: Building) -> Operation
 
 
 def with_stated_uses(tables: Tables, building: Building) -> Tables:
-    """The tables with an entry for each room of which the building's file states a use.
+    """The tables with an entry for each room whose use the building's file states.
 
-    Raises: `DataError` for a value that cannot be, naming the building's file.
+    Values of the operation file come before those of the building's file, key by key.
+
+    Raises: `DataError` for an impossible value, naming the building's file.
     """
     if not building.uses:
         return tables
@@ -155,9 +157,9 @@ def with_stated_uses(tables: Tables, building: Building) -> Tables:
 
 
 def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
-    """A sentence that rooms are used as the building's file says, where they are.
+    """A sentence on rooms whose use is that of the building's file; empty without any.
 
-    Args: before: the name of what goes before it.
+    Args: before: name of the file whose values come first.
     """
     count = sum(space.guid in building.uses for space in building.spaces)
     if not count or building.file is None:
@@ -174,46 +176,46 @@ def _entry(
 ) -> dict[str, Any]:
     """The tables of one room: the building's, then the operation's own, then its `[[rooms]]`."""
     chosen = tables.entry_of(building, space)
-    found: dict[str, Any] = {"spaces": (space.guid,)}
+    tables_of_room: dict[str, Any] = {"spaces": (space.guid,)}
     for part in PARTS:
-        said = getattr(tables, part).model_fields_set
-        fields = {key: value for key, value in own.get(part, {}).items() if key not in said}
+        stated = getattr(tables, part).model_fields_set
+        fields = {key: value for key, value in own.get(part, {}).items() if key not in stated}
         if chosen is not None:
             entry = getattr(chosen, part)
             fields |= {key: getattr(entry, key) for key in entry.model_fields_set}
-        found[part] = fields
-    return found
+        tables_of_room[part] = fields
+    return tables_of_room
 
 
 class _Schedules:
-    """Schedules of a file as tables, each once, by a name that no other has."""
+    """Schedules of a building's file as tables with unique names, each schedule once."""
 
     def __init__(self) -> None:
         self.tables: dict[str, ScheduleTable] = {}
         self._names: dict[tuple[int, float], str] = {}
-        self._held: list[YearSchedule] = []  # so that no other gets the same id
+        self._referenced: list[YearSchedule] = []  # kept alive, so that ids stay unique
         self._counts: Counter[str] = Counter()
 
     def name(self, schedule: YearSchedule, factor: float = 1.0) -> str:
         """The name of a schedule times a number."""
         key = (id(schedule), factor)
         if key not in self._names:
-            self._held.append(schedule)
+            self._referenced.append(schedule)
             self._counts[schedule.name] += 1
             count = self._counts[schedule.name]
             name = f"{PREFIX}{schedule.name}{f' {count}' if count > 1 else ''}"
             self._names[key] = name
-            self.tables[name] = ScheduleTable.held(schedule, factor)
+            self.tables[name] = ScheduleTable.from_file(schedule, factor)
         return self._names[key]
 
     def value(self, value: ScheduledValue, per: float) -> str | float:
-        """The name of the schedule of a quantity, divided by a number; or that alone."""
+        """The name of the schedule of a quantity divided by a number, or a constant."""
         amount = value.peak / per
         return self.name(value.share, amount) if amount and value.share is not None else amount
 
 
 def stated_fields(use: StatedUse, space: Space, schedules: _Schedules) -> dict[str, dict[str, Any]]:
-    """The fields of a room's tables by part, of what its use states."""
+    """The fields of a room's tables by part, from its stated use."""
     gains, air, loads = {}, {}, {}
     area, changes = space.floor_area, space.volume / 3600.0
     if use.persons is not None:

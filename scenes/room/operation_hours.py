@@ -1,4 +1,4 @@
-"""What an operation file says of a room in every hour: gains, air, set points, states."""
+"""Hourly values of an operation file: gains, air, set points, shading states."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ FloatArray = NDArray[np.float64]
 
 
 def check_schedules(tables: OperationTables, weather: Weather, file: Path | None = None) -> None:
-    """Raise `DataError` where hourly values are out of bounds or set points cross."""
+    """Raise `DataError` for hourly values out of bounds or set points that cross."""
     for variant in tables.variants:
         try:
             OperationHours(variant, weather).check()
@@ -47,7 +47,7 @@ def check_schedules(tables: OperationTables, weather: Weather, file: Path | None
 
 
 class OperationHours:
-    """What the tables of a room say of every hour of a weather's year."""
+    """Values of a room's tables in every hour of a weather's year."""
 
     def __init__(self, tables: OperationTables, weather: Weather) -> None:
         first = tables.calendar.starts_on
@@ -56,11 +56,11 @@ class OperationHours:
         self.tables, self.weather = tables, weather
 
     def _of(self, part: str, key: str) -> FloatArray | float | None:
-        """The values [H] of a schedule, or the number that stands in its place."""
+        """The values [H] of a schedule, or a constant."""
         return self.value(getattr(self.tables, part), key, part)
 
     def value(self, table: TomlTable, key: str, place: str) -> FloatArray | float | None:
-        """The same of a table within the tables, named by its place."""
+        """The values [H] of a field of a table, or a constant; `place` is the path of the table."""
         if key not in scheduled_fields(table):
             return getattr(table, key)
         name, limits = scheduled_fields(table)[key]
@@ -74,13 +74,13 @@ class OperationHours:
         return values
 
     def _while_occupied(self, part: str, key: str) -> FloatArray:
-        """The values [H]: a schedule's own, or a number in the hours with people."""
+        """The values [H] of a schedule, or a constant in the hours with people."""
         value = self._of(part, key)
         return value if isinstance(value, np.ndarray) else value * self.present
 
     @cached_property
     def present(self) -> FloatArray:
-        """Share of the people that is there [H]; numbers stated for all hours go with it."""
+        """Share of the people that is present [H]; multiplies constant gains and air."""
         value = self._of("gains", "occupied")
         if isinstance(value, np.ndarray):
             return value
@@ -96,7 +96,7 @@ class OperationHours:
         return self._while_occupied("gains", "equipment_w_m2") * floor_area
 
     def vapour(self) -> FloatArray:
-        """Vapour of people and all else [H] [kg/s]."""
+        """Vapour of people and other sources [H] [kg/s]."""
         people = self._while_occupied("gains", "persons") * self.tables.gains.person_vapour_g_h
         return (people + self._while_occupied("gains", "vapour_g_h")) / 3.6e6
 
@@ -105,7 +105,7 @@ class OperationHours:
         return self._while_occupied("gains", "lighting_w_m2") * floor_area
 
     def outdoor_air(self) -> dict[str, Any]:
-        """Air from outdoors but through windows, and neighbours', by a zone's fields."""
+        """Outdoor air except through opened windows, and neighbours' air, as fields of a zone."""
         night, air = self._of("air", "night_ach"), self.tables.air
         if not isinstance(night, np.ndarray):
             night = night * working_hours(self.weather, *air.night)
@@ -122,11 +122,11 @@ class OperationHours:
             "leakage": replace(leaks, factors=air.infiltration_factors),
             "other_air_ach": night,
             "supply": fan,
-            "beside": tuple(map(self._beside, range(len(air.neighbour)))),
+            "beside": tuple(map(self._neighbour_air, range(len(air.neighbour)))),
         }
 
-    def _beside(self, number: int) -> NeighbourAir:
-        """The air exchanged with one of the neighbours."""
+    def _neighbour_air(self, number: int) -> NeighbourAir:
+        """The air exchanged with a neighbour."""
         table, place = self.tables.air.neighbour[number], f"air.neighbour.{number}"
         beyond, share, flow = (
             self.value(table, key, place) for key in ("temperature_c", "open", "m3_h")
@@ -137,7 +137,7 @@ class OperationHours:
         return NeighbourAir(beyond, flow / 3600.0, buoyant, share)
 
     def airing(self, windows: Sequence[WindowElement]) -> WindowAiring | None:
-        """How the windows of a room are opened; None where they are not."""
+        """Airing by opened windows; None if no window is opened."""
         table = self.tables.air.windows
         if table is None or not windows:
             return None
@@ -165,18 +165,18 @@ class OperationHours:
         )
 
     def states(self, count: int) -> NDArray[np.int64]:
-        """Shading states of the rule "schedule" [H], of windows that have so many."""
+        """Shading states of the rule "schedule" [H] for windows with `count` states."""
         control = self.tables.control
         if not isinstance(control.schedule, str):
             return by_schedule(control.schedule, len(self.weather.times))
         values = self._of("control", "schedule")
-        if not np.isin(values, range(count)).all():  # of a file: stated ones are checked before
+        if not np.isin(values, range(count)).all():  # of a CSV file
             message = f"schedule {control.schedule!r}: a state outside 0 to {count - 1}"
             raise DataError(message, field="control.schedule")
         return values.astype(np.int64)
 
     def loads(self) -> IdealLoads:
-        """Set points and limits; none stated means never, and without limit."""
+        """Set points and limits; without a set point never, without a limit unlimited."""
         infinity, stated = float("inf"), self.tables.loads
         heating, cooling = (self._of("loads", key) for key in ("heating_c", "cooling_c"))
         return IdealLoads(
@@ -189,7 +189,10 @@ class OperationHours:
         )
 
     def slab(self, surface: str, area: float) -> HeatedSlab:
-        """The heated slab of `loads.slab` in a surface of the room of that area [m2]."""
+        """The heated slab of `loads.slab` in a surface of the room.
+
+        Args: surface: its name; area: of the surface [m2].
+        """
         table, place = self.tables.loads.slab, "loads.slab"
         heating, cooling = (self.value(table, k, place) for k in ("heating_c", "cooling_c"))
         return HeatedSlab(
@@ -203,7 +206,7 @@ class OperationHours:
         )
 
     def check(self) -> None:
-        """Raise `DataError` for the first value that cannot be."""
+        """Raise `DataError` for the first impossible value."""
         for place, table in operated_tables(self.tables):
             for key in scheduled_fields(table):
                 self.value(table, key, place)

@@ -34,18 +34,18 @@ from thermal.zone import OUTSIDE_ABSORPTANCE, ROUGHNESS
 
 
 class HeatIslandTable(TomlTable):
-    """The street that the outdoor air is in, as of `mitsuba_cfs.sky.heat_island`."""
+    """Urban heat island: the street of the room, see `mitsuba_cfs.sky.heat_island`."""
 
     sky_view: Share
     vegetation: Share
     hourly_shares: Annotated[tuple[Share, ...], Field(min_length=24, max_length=24)]
 
     def warmed(self, weather: Weather, file: Path | None) -> Weather:
-        """The weather with the air of the street; its notes say by how much.
+        """The weather with the air of the street; a note of the weather states the warming.
 
-        Args: file: that states the table.
+        Args: file: of the table, named in messages.
 
-        Raises: `DataError` out of the range of the equation.
+        Raises: `DataError` outside the range of the equation.
         """
         try:
             return in_city(weather, self.sky_view, self.vegetation, self.hourly_shares)
@@ -66,7 +66,7 @@ Factor = Annotated[float, Field(ge=0)]
 
 
 class LeakageTable(TomlTable):
-    """Leaks found by a pressure test: an area at 4 Pa, or a coefficient with its exponent."""
+    """Leakage from a pressure test: an area at 4 Pa, or a coefficient with its exponent."""
 
     area_cm2: Annotated[Positive, plausible.LEAK] | None = None
     coefficient: Positive | None = None  # [m3/(s Pa^n)]
@@ -82,7 +82,7 @@ class LeakageTable(TomlTable):
         return self
 
     def leakage(self) -> Leakage:
-        """The leaks as the balance takes them."""
+        """The leakage of the heat balance."""
         if self.area_cm2 is not None:
             return sherman_grimsrud(self.area_cm2, stack=self.stack, wind=self.wind)
         return aim2(
@@ -92,9 +92,9 @@ class LeakageTable(TomlTable):
 
 
 class OpenedTable(TomlTable):
-    """Windows that are opened, EN 16798-7."""
+    """Airing by opened windows, EN 16798-7."""
 
-    # share of the glass that opens, while allowed; a schedule says its own hours
+    # share of the glass that opens, while allowed; or a schedule
     share: Annotated[float | str, OrSchedule(plausible.SHARE)] = 0.1
     flow: Literal["single-sided", "cross"] = "single-sided"
     when: Literal["always", "occupied"] = "occupied"  # a share that is a number
@@ -112,15 +112,15 @@ class OpenedTable(TomlTable):
 
 
 class NeighbourAirTable(TomlTable):
-    """Air exchanged with a neighbour of known temperature, as much each way."""
+    """Air exchanged with a neighbour of known temperature, the same flow each way."""
 
     temperature_c: Annotated[float | str, OrSchedule(plausible.TEMPERATURE)]
-    # of an opening through which warm air leaves above and cool air comes below: an open door
+    # of an opening with buoyant exchange, warm air above and cool air below: an open door
     width: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
     height: Annotated[Positive, plausible.LENGTH] | None = None  # [m]
     discharge: Annotated[Positive, Field(le=1)] = DOOR_DISCHARGE
     open: Annotated[float | str, OrSchedule(plausible.SHARE)] = 1.0  # share of its width
-    m3_h: Annotated[float | str, OrSchedule(plausible.FLOW)] = 0.0  # whatever the temperatures
+    m3_h: Annotated[float | str, OrSchedule(plausible.FLOW)] = 0.0  # at any temperature
 
     @model_validator(mode="after")
     def _has_a_size_or_a_flow(self) -> NeighbourAirTable:
@@ -143,7 +143,7 @@ class AirTable(TomlTable):
     windows: OpenedTable | None = None
     night_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0  # by night
     night: Hours = (0, 7)
-    # of a fan, while occupied; the name of a schedule says its own hours
+    # of a fan, while occupied; or a schedule
     ventilation_ach: Annotated[float | str, OrSchedule(plausible.AIR_CHANGE)] = 0.0
     heat_recovery: Share = 0.0  # of the fan's air
     bypass_above_c: Annotated[float, plausible.TEMPERATURE] | None = None  # no recovery above
@@ -166,9 +166,9 @@ Cop = Annotated[Positive, plausible.COP]
 
 
 class SlabTable(TomlTable):
-    """Pipes or wires in a construction of the room, in proportion to what its air lacks."""
+    """Pipes or wires in a construction, with power proportional to the deviation of the air."""
 
-    faces: tuple[str, ...] = ("floor",)  # side of the box, or kind of faces; the biggest such one
+    faces: tuple[str, ...] = ("floor",)  # side of the box, or kind of faces; the largest surface
     depth: Annotated[Positive, plausible.LAYER] = 0.05  # below the inside face [m]
     heating_c: SetPoint = None
     cooling_c: SetPoint = None
@@ -178,7 +178,7 @@ class SlabTable(TomlTable):
 
 
 class LoadsTable(TomlTable):
-    """Ideal heating and cooling; without set points the room floats."""
+    """Ideal heating and cooling; a room without set points floats."""
 
     heating_c: SetPoint = None
     cooling_c: SetPoint = None
@@ -202,7 +202,7 @@ class LoadsTable(TomlTable):
 
 
 class PlantTable(TomlTable):
-    """What heat and cold cost: an ideal plant by its COP, and primary energy."""
+    """An ideal plant by its COP, and primary energy factors."""
 
     # heat per final energy: a number, or pairs of outdoor temperature and COP between which it
     # is linear
@@ -242,13 +242,13 @@ class BridgeTable(TomlTable):
 
     @property
     def conductance(self) -> float:
-        """Its heat flow per kelvin [W/K]."""
+        """Heat flow per kelvin [W/K]."""
         each = self.chi if self.psi is None else self.psi * self.length
         return self.number * each
 
 
 class GroundTable(TomlTable):
-    """The ground below a room by ISO 13370, of the whole building that it belongs to."""
+    """The ground below a room by ISO 13370, for the whole building."""
 
     kind: Literal[KINDS] = "slab"
     area: Annotated[Positive, plausible.AREA] | None = None  # of the building's floor [m2]
@@ -281,7 +281,7 @@ class GroundTable(TomlTable):
 
 
 class NeighbourTable(TomlTable):
-    """What lies behind some of a room's faces, at a known temperature."""
+    """A neighbour of known temperature behind some of a room's faces."""
 
     faces: tuple[str, ...] = ()  # sides of the box, or kinds of faces: "wall", "floor", "ceiling"
     spaces: tuple[str, ...] = ()  # rooms of the model, by name or GUID
@@ -296,12 +296,12 @@ class NeighbourTable(TomlTable):
 
 
 class EnvelopeTable(TomlTable):
-    """What a model of rooms leaves open at their outside."""
+    """Properties of the envelope that a building model does not contain."""
 
     ground: GroundTable | None = None  # without: undisturbed soil half a metre down
     neighbour: tuple[NeighbourTable, ...] = ()
     bridge: tuple[BridgeTable, ...] = ()
-    # of all that faces outdoors, frames apart
+    # of all outdoor surfaces except frames
     outside_absorptance: Share = OUTSIDE_ABSORPTANCE  # solar
     outside_roughness: Literal[tuple(ROUGHNESS)] = "medium rough"  # DOE-2, for the outside film
     frame_u: Annotated[Positive, plausible.FRAME_U] | None = None  # with films 0.13 and 0.04
@@ -309,7 +309,7 @@ class EnvelopeTable(TomlTable):
 
 
 class ControlTable(TomlTable):
-    """Which state holds: states are numbered from 0 in the order of the file."""
+    """Control of the shading state; states are numbered from 0 in the order of the file."""
 
     rule: Literal["always", "schedule", "irradiance", "glare", "cut-off"] = "always"
     state: Annotated[int, Field(ge=0)] = 0  # "always"; and the closed one of "irradiance"
@@ -326,13 +326,13 @@ class ControlTable(TomlTable):
     slat_spacing: Annotated[Positive, plausible.SLAT] = 0.072  # [m]
 
     def fault(self, states: int) -> tuple[str, str] | None:
-        """The key that does not fit windows of so many states, and what is wrong with it."""
+        """The key that does not fit windows with `states` states, and the fault."""
         if isinstance(self.schedule, str):
-            return None  # its states are known with the weather
+            return None  # its states are checked with the weather
         if self.rule == "schedule" and len(self.schedule) != CLOCK:
             return "schedule", f"expected {CLOCK} states, got {len(self.schedule)}"
-        wanted = self.schedule if self.rule == "schedule" else (self.state,)
-        if any(not 0 <= state < states for state in wanted):
+        used = self.schedule if self.rule == "schedule" else (self.state,)
+        if any(not 0 <= state < states for state in used):
             return "state", f"a state outside 0 to {states - 1}: the windows have {states}"
         if self.rule == "cut-off" and len(self.slat_tilts_deg) != states:
             return "slat_tilts_deg", f"expected one for each of {states} states"
@@ -340,20 +340,20 @@ class ControlTable(TomlTable):
 
 
 class GainsTable(TomlTable):
-    """Heat in the room during the occupied hours."""
+    """Internal gains during the occupied hours."""
 
     equipment_w_m2: Annotated[float | str, OrSchedule(plausible.GAIN)] = 8.0
     persons: Annotated[float | str, OrSchedule(plausible.PERSONS)] = 1.0
     person_w: Annotated[float, plausible.PERSON] = 75.0  # dry
     person_vapour_g_h: Annotated[float, plausible.VAPOUR] = 50.0
-    vapour_g_h: Annotated[float | str, OrSchedule(plausible.VAPOUR)] = 0.0  # of all else
+    vapour_g_h: Annotated[float | str, OrSchedule(plausible.VAPOUR)] = 0.0  # of other sources
     lighting_w_m2: Annotated[float | str, OrSchedule(plausible.LAMPS)] = 0.0
     lighting_target_lx: Annotated[Positive, plausible.TARGET] = (
-        500.0  # of the mean on the work plane; daylight dims
+        500.0  # mean of the work plane, to which the lamps are dimmed
     )
     lighting_dimmed: bool = True  # False: daylight does not dim the lamps
     radiant_share: Share = 0.5
-    # clock hours of every day, or a schedule of the share that is there: numbers above hold then
+    # clock hours of every day, or a schedule of the share of people; multiplies the constants above
     occupied: Annotated[tuple[int, int] | str, OrSchedule(plausible.SHARE, clock_or_name)] = (8, 18)
 
 
@@ -368,7 +368,7 @@ class ComfortTable(TomlTable):
 
 
 class RoomsTable(TomlTable):
-    """Rooms that are operated otherwise: what is stated here goes before the file's own tables."""
+    """Tables of some rooms; their values replace those of the file's tables for all rooms."""
 
     spaces: tuple[str, ...] = ()  # names or GUIDs
     types: tuple[str, ...] = ()  # of the IFC's space types
@@ -389,15 +389,15 @@ PARTS = ("control", "gains", "air", "loads", "envelope")
 
 
 def operated_tables(tables: TomlTable) -> Iterator[tuple[str, TomlTable]]:
-    """The parts of a room's tables and the tables within them, with their places."""
+    """The parts of a room's tables and the tables within them, with their paths."""
     for part in PARTS:
         yield from tables_within(getattr(tables, part), part)
 
 
 class OperationTables(TomlTable):
-    """How rooms are operated: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s."""
+    """Operation of rooms: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s file."""
 
-    system: tuple[StateTable, ...] = ()  # states, from open to closed; none: those of the windows
+    system: tuple[StateTable, ...] = ()  # states, open to closed; none: the building file's
     control: ControlTable = ControlTable()
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
@@ -405,11 +405,9 @@ class OperationTables(TomlTable):
     envelope: EnvelopeTable = EnvelopeTable()
     comfort: ComfortTable = ComfortTable()
     plant: PlantTable = PlantTable()
-    terrain: Literal["country", "suburbs", "city"] = (
-        "suburbs"  # what the weather station's wind becomes
-    )
-    heat_island: HeatIslandTable | None = None  # the air of a street in place of the station's
-    rooms: tuple[RoomsTable, ...] = ()  # the first that names a room holds for it
+    terrain: Literal["country", "suburbs", "city"] = "suburbs"  # of the site, for the wind profile
+    heat_island: HeatIslandTable | None = None  # air of a street in place of the weather station's
+    rooms: tuple[RoomsTable, ...] = ()  # the first entry that names a room applies to it
     schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
     calendar: CalendarTable = CalendarTable()
 
@@ -425,7 +423,7 @@ class OperationTables(TomlTable):
         return self
 
     def control_fault(self, states: int) -> tuple[str, str] | None:
-        """The key of `control` that does not fit windows of so many states, and what is wrong."""
+        """The key of `control` that does not fit windows with `states` states, and the fault."""
         name = self.control.schedule
         if self.control.rule != "schedule" or not isinstance(name, str):
             return self.control.fault(states)
@@ -435,13 +433,13 @@ class OperationTables(TomlTable):
         return None
 
     def with_rooms(self, rooms: RoomsTable) -> OperationTables:
-        """The tables with what an entry of `rooms` states."""
-        found = {}
+        """The tables with the values of an entry of `rooms`."""
+        parts = {}
         for part in PARTS:
             stated = getattr(rooms, part)
             update = {key: getattr(stated, key) for key in stated.model_fields_set}
-            found[part] = getattr(self, part).model_copy(update=update)
-        return self.model_copy(update=found)
+            parts[part] = getattr(self, part).model_copy(update=update)
+        return self.model_copy(update=parts)
 
     @property
     def variants(self) -> tuple[OperationTables, ...]:
@@ -457,7 +455,10 @@ class OperationTables(TomlTable):
         return self if chosen is None else self.with_rooms(chosen)
 
     def entry_of(self, building: Building, space: Space) -> RoomsTable | None:
-        """The first entry of `rooms` that names a room; None without one. Raises: as `of_room`."""
+        """The first entry of `rooms` that names a room; None without one.
+
+        Raises: see `of_room`.
+        """
         chosen = None
         for number, rooms in reversed(tuple(enumerate(self.rooms))):
             guids = {building.room(name).space.guid for name in rooms.spaces}

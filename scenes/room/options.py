@@ -1,7 +1,7 @@
-"""What the user may choose about a room, each part for the functions that need it.
+"""Options of a room: method, sampling, sensors, occupancy, outputs.
 
-Files, flags and Python name a choice by one word ("sensor_spacing"): `RoomOptions.of` takes these
-names, `RoomOptions.named` gives them back.
+Files, flags and Python name an option by one word ("sensor_spacing"): `RoomOptions.of` takes these
+names, `RoomOptions.named` returns them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ GLARE_SUN = ("source", "pixels")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorGrid:
-    """Where the sensors of the work plane are."""
+    """Positions of the sensors on the work plane."""
 
     spacing: float = 0.5  # [m]
     height: float = 0.8  # above the floor [m]
@@ -28,7 +28,7 @@ class SensorGrid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Occupancy:
-    """When people are in the room, and the heat of them and of what they use."""
+    """Hours with people in the room; heat of people and equipment."""
 
     hours: tuple[int, int] = (8, 18)  # clock hours from and to, every day
     equipment_w_m2: float = 8.0  # while occupied, half of it radiant
@@ -38,10 +38,10 @@ class Occupancy:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outputs:
-    """What is pictured and rated beside the sensors' year."""
+    """Pictures and glare ratings besides the sensors' year."""
 
-    picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: see `scenes.room.glare.default_hours`
-    picture_count: int = 10  # at most, where no hours are asked for
+    picture_hours: tuple[str, ...] = ()  # "MM-DD HH"; none: `scenes.room.glare.default_hours`
+    picture_count: int = 10  # at most, without `picture_hours`
     picture_size: int = 600  # pixels of a side of the fisheye picture
     annual_glare: bool = False  # rate every lit hour, not only the pictures
     glare_sources: str = "evalglare"  # one of GLARE_SOURCES
@@ -50,7 +50,7 @@ class Outputs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoomOptions:
-    """How a room is computed."""
+    """Options of a room's computation."""
 
     method: str = "five-phase"  # one of METHODS
     sampling: Sampling = field(default_factory=Sampling)
@@ -75,18 +75,18 @@ class RoomOptions:
 
     @property
     def sky(self) -> dict[str, str]:
-        """The choices about sun and sky, as `annual_sky` calls them."""
+        """The options of sun and sky, by their names in `annual_sky`."""
         return {"sun_model": self.sun_model, "ground": self.sky_ground}
 
     @classmethod
     def of(cls, **choices: Any) -> RoomOptions:
-        """The options with these choices, by the names of `NAMES`; the others are the defaults."""
+        """Options by the names of `NAMES`; all others have their defaults."""
         return cls().changed(**choices)
 
     def changed(self, **choices: Any) -> RoomOptions:
-        """These options with other choices, by the names of `NAMES`.
+        """These options with changes by the names of `NAMES`.
 
-        Raises: `TypeError` for a name that is none.
+        Raises: `TypeError` for an unknown name.
         """
         own: dict[str, Any] = {}
         parts: dict[str, dict[str, Any]] = {}
@@ -98,21 +98,21 @@ class RoomOptions:
                 parts.setdefault(part, {})[key] = value
             else:
                 own[key] = value
-        if "view_samples" in parts.get("sampling", {}):  # nothing is averaged over hours there
+        if "view_samples" in parts.get("sampling", {}):  # of a single hour: not averaged over hours
             parts["sampling"]["picture_samples"] = 2 * parts["sampling"]["view_samples"]
         for part, values in parts.items():
             own[part] = replace(getattr(self, part), **values)
         return replace(self, **own)
 
     def named(self) -> dict[str, Any]:
-        """Every choice by its name of `NAMES`, in that order."""
+        """Every option by its name in `NAMES`, in that order."""
         return {
             name: getattr(getattr(self, part) if part else self, key)
             for name, (part, key) in NAMES.items()
         }
 
 
-# Each choice as files, flags and Python name it: the part that holds it ("": none), its name there
+# Options by their name in files, flags and Python: part of `RoomOptions` ("": none), name there
 NAMES = {
     "method": ("", "method"),
     "picture_hours": ("outputs", "picture_hours"),
@@ -142,7 +142,7 @@ NAMES = {
     "seed": ("sampling", "seed"),
 }
 
-# What the choices that are words may be, by their names
+# Allowed values of the options that are words
 CHOICES = {
     "glare_sources": GLARE_SOURCES,
     "glare_sun": GLARE_SUN,
@@ -152,7 +152,7 @@ CHOICES = {
 
 
 def named_types() -> dict[str, Any]:
-    """The type of each choice by its name of `NAMES`."""
+    """The type of each option by its name in `NAMES`."""
     own = get_type_hints(RoomOptions)
     return {
         name: (get_type_hints(own[part]) if part else own)[key]

@@ -1,4 +1,4 @@
-"""The hours of a year that pictures are asked for, as "MM-DD HH" or "MM-DD HH:MM"."""
+"""Hours of a year given as "MM-DD HH" or "MM-DD HH:MM"."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ FORMS = ("%Y-%m-%d %H", "%Y-%m-%d %H:%M")
 
 
 class PictureHourError(CfsError, ValueError):
-    """An hour asked for that the year does not have, or when the sun is down."""
+    """An hour that the year does not contain, or with the sun below the horizon."""
 
 
 def wanted_hours(
     wanted: tuple[str, ...], times: pd.DatetimeIndex, lit: NDArray[np.int64]
 ) -> list[int]:
-    """Hours of the year [indices] that `cfs run --picture` asked for.
+    """Indices of the hours of the year that `cfs run --picture` names.
 
     Args:
-        wanted: as of `hour_of`.
+        wanted: texts, see `hour_of`.
         times: [H] middles of the hours; lit: [L] hours with the sun up.
     """
     hours, lit_set = [hour_of(text, times, "--picture") for text in wanted], set(lit.tolist())
@@ -34,9 +34,9 @@ def wanted_hours(
 
 
 def check_hours(wanted: tuple[str, ...], times: pd.DatetimeIndex | None = None) -> None:
-    """Raise `PictureHourError` for a text that is no hour, or none of the year where it is given.
+    """Raise `PictureHourError` for a text that is no hour, or no hour of `times`.
 
-    Where the sun is then is another matter, and takes longer to know.
+    The position of the sun takes longer to compute and is checked by `wanted_hours`.
     """
     for text in wanted:
         if times is None:
@@ -46,21 +46,21 @@ def check_hours(wanted: tuple[str, ...], times: pd.DatetimeIndex | None = None) 
 
 
 def hour_of(text: str, times: pd.DatetimeIndex, flag: str) -> int:
-    """The index of the hour that holds a month, day and time of day.
+    """The index of the hour that contains a month, day and time of day.
 
-    Args: times: [H] middles of the hours; flag: what the text was given by.
+    Args: times: [H] middles of the hours; flag: option that gave the text.
     """
-    found = hour_index(_moment(text, flag), times)
-    if found is None:
+    hour = hour_index(_moment(text, flag), times)
+    if hour is None:
         raise PictureHourError(f"{flag} {text!r}: the weather has no such hour")
-    return found
+    return hour
 
 
 def hour_index(moment: datetime, times: pd.DatetimeIndex) -> int | None:
-    """The index of the hour that holds a moment of any year; None where the year has none."""
+    """The index of the hour that contains a moment of any year; None without such an hour."""
     same_day = (times.month == moment.month) & (times.day == moment.day)
-    found = np.flatnonzero(same_day & (times.hour == moment.hour))
-    return int(found[0]) if len(found) else None
+    hours = np.flatnonzero(same_day & (times.hour == moment.hour))
+    return int(hours[0]) if len(hours) else None
 
 
 def _moment(text: str, flag: str) -> datetime:

@@ -1,387 +1,213 @@
-"""One room on its way from Python objects to its results; no file is read or written."""
+"""The year of one room: stages from its inputs to daylight, glare and heat, in order.
+
+    inputs     RoomInputs        building, windows with their systems, weather, skies, operation
+    light      RoomLight         matrices and the light of every lit hour in every shading state
+    state      [H]               the shading state of every hour
+    daylight   DaylightResult    illuminance of the sensors, metrics
+    glare      GlareResults      every hour, pictures, colour
+    zone       RoomZone          surfaces, solar gains, operation
+    heat       ThermalResult     temperatures, comfort, loads
+
+No file is read or written:
+
+    weather = read_weather(Path("city.epw"))
+    system = read_system(Path("blind.xml"))
+    building = read_ifc("house.ifc")                        # or bim.shoebox.shoebox(...)
+    space = building.spaces[0]
+    result = compute_room(building, space, in_all_windows(space, system), weather, RoomOptions())
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
-from typing import TypeVar
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TypedDict, Unpack
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
-from bim.outer_faces import OuterFaces, outer_faces
-from bim.seasons import in_month, season_of, seasons
-from bim.to_thermal import ThermalRoom
-from bim.to_tracer import exterior_surfaces, interior_surfaces
+from bim.model import Building, Space
 from mitsuba_cfs import variants
-from mitsuba_cfs.glare.annual import AnnualGlare
+from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.path_light import PathLight
-from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
-from mitsuba_cfs.metrics.schedules import working_hours
-from mitsuba_cfs.progress import Progress, in_shares, part, silent
-from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
+from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
-from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
-from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
-from scenes.results import (
-    DaylightResult,
-    ExploredRoom,
-    GlareResults,
-    ThermalResult,
-)
-from scenes.room.control import shading_states
-from scenes.room.daylight import NO_SENSORS, HeldSensors, room_daylight, room_scene
-from scenes.room.envelope import enveloped
+from scenes.results import GlareResults, RoomYear
+from scenes.room.control import control_signal, shading_state
+from scenes.room.daylight import room_daylight
 from scenes.room.explorer import explored_room
-from scenes.room.glare import (
-    band_scenes,
-    brightest_picture,
-    default_hours,
-    glare_by_state,
-    glare_of_year,
-    kept_glare,
-    rating_of,
-    room_glare,
-    with_colour,
-    worst_hours,
-)
-from scenes.room.heat import HeatInputs, fenestration_table, heat_alone
-from scenes.room.inner_glass import InnerGlass, inner_glass
-from scenes.room.leaks import hole_problems
-from scenes.room.operation_hours import OperationHours
-from scenes.room.operation_tables import OperationTables
-from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.skies import skies_for
-from scenes.room.solar import RoomSun, SeasonalOutdoors
-from scenes.room.windows import room_windows
-from scenes.room.zone import (
-    RoomZone,
-    internal_gains,
-    operated,
-    plain_services,
-    services_of,
-    under_the_sky,
-    zone_surfaces,
-)
-
-FloatArray = NDArray[np.float64]
-T = TypeVar("T")
-# of the daylight's stage, the sensors' matrices; those of the view are a stage of their own
-TRACED = {"daylight": 0.6}
-WORST = 4  # pictures of an annual glare without hours asked for
+from scenes.room.glare import annual_glare, coloured, rated_hours, rating_of, room_glare
+from scenes.room.heat import DaylitRoom, heat_alone
+from scenes.room.inner_glass import borrowed_share
+from scenes.room.inputs import FileSensors, RoomInputs, room_inputs
+from scenes.room.leaks import leak_issues
+from scenes.room.light import room_light
+from scenes.room.operation import Operation
+from scenes.room.options import RoomOptions
+from scenes.room.picture_hours import wanted_hours
+from scenes.room.solar import seasonal_outdoors
+from scenes.room.zone import RoomZone, reads_work_plane, room_zone, zone_surfaces
 
 
-class RoomSimulation:
-    """A room on its way: each step is computed when it is first asked for, and serves all others.
+class RoomChoices(TypedDict, total=False):
+    """Options of `compute_room` and `lit_room`; see there."""
 
-    `cfs run` and `cfs study` ask for all of them (`lit_room`), `cfs thermal` for `zone`.
-    """
+    operation: Operation | None
+    skies: AnnualSky | None
+    cache: MatrixCache | None
+    pictures: bool
+    colour: bool
+    explore: bool
+    rate: tuple[str, NDArray[np.int64]] | None
+    inner: bool
+    progress: Progress
 
-    def __init__(
-        self,
-        building: Building,
-        space: Space,
-        systems: Mapping[str, States],
-        weather: Weather,
-        options: RoomOptions,
-        *,
-        operation: OperationTables | None = None,
-        skies: AnnualSky | None = None,
-        cache: MatrixCache | None = None,
-        grids: Sequence[SensorGrid] = (),
-        inner: bool = False,
-        held: HeldSensors = NO_SENSORS,
-        progress: Progress = silent,
-    ) -> None:
-        """See `lit_room`; grids: of the sensors in place of the options' one; held: beside them."""
-        if operation is not None:
-            operation = operation.of_room(building, space)
-        self.building, self.space, self.weather, self.options = building, space, weather, options
-        self.sampling, self.outputs = options.sampling, options.outputs
-        self.operation, self.cache, self.progress = operation, cache, progress
-        self.grids, self.held = tuple(grids) or (options.grid,), held
-        self.skies = (
-            skies_for(weather, options.method, options.sampling, cache, **options.sky)
-            if skies is None
-            else skies
-        )
-        self.windows = room_windows(space, systems)
-        self.systems = systems
-        self.seasons = seasons(building)
-        first = self.seasons[0].building
-        self.inner = inner_glass(first, space, systems) if inner else None
-        self.seconds: dict[str, float] = {}
 
-    def timed(self, stage: str, work: Callable[[], T]) -> T:
-        """What the work gives; its time is noted, and memory that it needs no more goes back."""
+@dataclass(frozen=True, slots=True)
+class StageTimes:
+    """Durations of a room's stages."""
+
+    seconds: dict[str, float] = field(default_factory=dict)  # by stage
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Add the duration of the block to a stage, and return memory that is no longer used."""
         start = time.monotonic()
-        result = work()
+        yield
         variants.return_memory()
-        self.seconds[stage] = round(time.monotonic() - start, 2)
-        return result
+        self.add(name, time.monotonic() - start)
 
-    @cached_property
-    def scene(self) -> DaylightScene:
-        """Triangles, window groups, sensors and view in the visible band."""
-        return self._scene(self.seasons[0].building, self.inner)
+    def add(self, name: str, seconds: float) -> None:
+        """Add a duration to a stage."""
+        self.seconds[name] = round(self.seconds.get(name, 0.0) + seconds, 2)
 
-    def _scene(self, building: Building, inner: InnerGlass | None) -> DaylightScene:
-        return room_scene(
-            building,
-            self.space,
-            self.windows,
-            self.grids,
-            self.outputs.picture_size,
-            inner=inner,
-            held=self.held,
-        )
 
-    @cached_property
-    def season(self) -> NDArray[np.int64]:
-        """The season of every lit hour [L], its number among `seasons`."""
-        months = self.weather.midpoints[self.skies.lit].month.to_numpy()
-        return season_of(self.seasons, months)
+def compute_room(
+    building: Building,
+    space: Space,
+    systems: Mapping[str, States],
+    weather: Weather,
+    options: RoomOptions,
+    **choices: Unpack[RoomChoices],
+) -> RoomYear:
+    """Daylight, glare, temperatures and comfort of one room alone, with one method.
 
-    @cached_property
-    def traced(self) -> PhaseScene:
-        """V and D."""
-        return PhaseScene(
-            self.scene,
-            self.sampling,
-            five_phase=self.options.method != "three-phase",
-            cache=self.cache,
-            progress=in_shares(self.progress, TRACED),
-        )
+    Args: see `lit_room`.
 
-    @cached_property
-    def light(self) -> PhaseLight | SeasonalLight:
-        """The light of the lit hours in every state."""
-        steps = part(self.progress, 0.6, 0.9, "daylight")
-        filled = [self._filled(self.traced, self.inner)]
-        for season in self.seasons[1:]:
-            inner = self.inner
-            if inner is not None:
-                inner = inner_glass(season.building, self.space, self.systems)
-            scene = self._scene(season.building, inner)
-            filled.append(self._filled(self.traced.before(scene), inner))
-        if len(filled) == 1:
-            return filled[0].light(self.skies, progress=steps)
-        return SeasonalLight.of(filled, self.skies, self.season, progress=steps)
+    Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
+        `ValueError` for a window without a system.
+    """
+    lit = lit_room(building, space, systems, weather, options, **choices)
+    times = StageTimes(dict(lit.seconds))
+    start, progress = time.monotonic(), choices.get("progress", silent)
+    heat = heat_alone(lit.zone, weather, options.heat_step_s, progress)
+    times.add("thermal", time.monotonic() - start)
+    return replace(lit, seconds=times.seconds).with_heat(heat)
 
-    def _filled(self, traced: PhaseScene, inner: InnerGlass | None) -> PhaseSystems:
-        optics = () if inner is None else inner.optics
-        return PhaseSystems(traced, [*self.windows.optics(), *optics])
 
-    def eye(self) -> NDArray[np.float32]:
-        """Illuminance at the eye in every state [J, L] [lx]."""
-        hours = np.ones(len(self.skies.lit), dtype=np.int64)
-        states = range(self.light.filled.states)
-        return np.stack([self.light.eye(j * hours) for j in states]).astype(np.float32)
+def lit_room(
+    building: Building,
+    space: Space,
+    systems: Mapping[str, States],
+    weather: Weather,
+    options: RoomOptions,
+    *,
+    operation: Operation | None = None,
+    skies: AnnualSky | None = None,
+    cache: MatrixCache | None = None,
+    pictures: bool = True,
+    colour: bool = False,
+    explore: bool = False,
+    rate: tuple[str, NDArray[np.int64]] | None = None,
+    inner: bool = False,
+    progress: Progress = silent,
+) -> DaylitRoom:
+    """Daylight and glare of one room, and the zone from which its heat is computed.
 
-    @cached_property
-    def state(self) -> NDArray[np.int64]:
-        """The shading state of every hour [H]."""
-        if self.operation is None or not self.space.windows:
-            return np.zeros(self.skies.hours, dtype=np.int64)
-        return shading_states(
-            self.operation,
-            self.space,
-            self.weather,
-            self.windows.states,
-            irradiance=lambda: self.sun.irradiance,
-            eye=lambda: self.skies.whole_year(self.eye()),
-            dgp=lambda: glare_by_state(self.light, rating_of(self.outputs), self.progress),
-        )
+    Args:
+        building: its `elements` are the surroundings of the room.
+        systems: by window GUID the `FenestrationSystem` in each shading state, from open to
+            closed; one tuple of one system is the usual case, see `in_all_windows`.
+        options: method, sampling, sensors, occupancy, outputs; `RoomOptions()` is a full run.
+        operation: shading control, gains, set points; without it the first shading state is used
+            all year and the room floats freely.
+        skies: of `skies_for`, shared by several rooms.
+        cache: of traced matrices, `MatrixCache.of_user()`. V and D depend neither on systems nor
+            on weather: variants of these cost only algebra.
+        pictures: False omits the luminance pictures and their glare.
+        colour: True adds the picture with the most light at the eye in colour.
+        explore: True adds every hour's picture in every state, for the explorer.
+        rate: a glare metric (DGP, eDGP, sDGP) and hours of the year with the sun up to rate.
+        inner: True lets light of rooms with windows in through glass; phase methods only.
 
-    @property
-    def lit_state(self) -> NDArray[np.int64]:
-        """The shading state of every lit hour [L]."""
-        return self.state[self.skies.lit]
+    Raises: `RoomError` for a room that cannot be computed (no work plane, no closed zone),
+        `ValueError` for a window without a system, `DataError` for an explorer where the outdoors
+        changes over the year.
+    """
+    if operation is None:
+        systems = {guid: states[:1] for guid, states in systems.items()}
+    room = room_inputs(
+        building, space, systems, weather, options,
+        operation=None if operation is None else operation.tables, skies=skies, cache=cache,
+        file_sensors=FileSensors.of(building, space), inner_glass=inner,
+    )  # fmt: skip
+    if explore and len(room.seasons) > 1:
+        message = "the explorer knows one state of the trees: give them one transmittance"
+        raise DataError(message, file=building.file, field="--explore")
+    hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
+    outdoors = year = dgp = explored = None
+    times = StageTimes()
 
-    @cached_property
-    def daylight(self) -> DaylightResult:
-        """Illuminance of the work plane and its metrics."""
-        self.progress("daylight", 0.0)
-        steps = part(self.progress, 0.9, 1.0, "daylight")
-        found = room_daylight(
-            self.light, self.lit_state, self.weather, self.options.method, steps, held=self.held
-        )
-        self.progress("daylight", 1.0)
-        return found
-
-    @cached_property
-    def pictured(self) -> PhaseLight | PathLight | SeasonalLight:
-        """The light that pictures are made of."""
-        return paths_of(self.light) if self.options.method == "point-in-time" else self.light
-
-    def holes(self) -> tuple[Problem, ...]:
-        """What of the light leaves through no window."""
-        return hole_problems(self.space, self.scene, seed=self.sampling.seed, cache=self.cache)
-
-    def annual_glare(self) -> pd.DataFrame:
-        """Glare of every hour."""
-        return glare_of_year(
-            self.light, self.lit_state, self.weather,
-            rating=rating_of(self.outputs), progress=self.progress,
-        )  # fmt: skip
-
-    def rated(self, metric: str, hours: NDArray[np.int64]) -> AnnualGlare:
-        """A glare metric in some hours of the year with the sun up [n]."""
-        columns = np.searchsorted(self.skies.lit, hours)
-        steps = part(self.progress, 0.0, 1.0, "annual glare")
-        light, rating, kept = self.pictured, rating_of(self.outputs), None
-        if isinstance(light, PhaseLight) and self.inner is None:
-            kept = kept_glare(light, self.windows, metric, columns, rating)
-        return hourly_glare(
-            light, metric, self.lit_state, hours=columns, options=rating, kept=kept, progress=steps
-        )
-
-    def explored(self) -> ExploredRoom:
-        """Every hour in every state, of outdoors that do not change over the year."""
-        names = [state.name for state in max(self.windows.systems, key=len)]
-        steps = part(self.progress, 0.0, 1.0, "explorer")
-        sensors = len(self.daylight.points)
-        return explored_room(self.light, self.state, names, steps, sensors=sensors)
-
-    def glare(self, hours: list[int], year: pd.DataFrame | None) -> GlareResults:
-        """Pictures of the hours asked for, of the year's worst, or of the usual ones."""
-        if not hours and year is not None:
-            hours = worst_hours(year, min(WORST, self.outputs.picture_count))
-        if not hours:
-            eye = self.eye()[self.lit_state, np.arange(len(self.skies.lit))]
-            count = self.outputs.picture_count
-            hours = default_hours(self.weather.midpoints, self.skies.lit, eye, count)
-        return room_glare(
-            self.pictured, self.scene.view, self.lit_state, hours,
-            rating=rating_of(self.outputs), progress=self.progress,
-        )  # fmt: skip
-
-    def coloured(self, glare: GlareResults) -> GlareResults:
-        """The pictures with the brightest of them in colour."""
-        if not glare.pictures:
-            return glare
-        self.progress("colour", 0.0)
-        hour, groups = brightest_picture(glare).hour, self.windows.groups
-        building = in_month(self.building, int(self.weather.midpoints[hour].month))
-        sky = annual_sky(self.weather, self.sampling.subdivision, hours=[hour], **self.options.sky)
-        found = with_colour(
-            glare, band_scenes(building, self.space, groups, glare.view),
-            self.light.filled.systems[: len(groups)], sky, state=int(self.state[hour]),
-            sampling=self.sampling, progress=part(self.progress, 0.0, 1.0, "colour"),
-        )  # fmt: skip
-        self.progress("colour", 1.0)
-        return found
-
-    @cached_property
-    def outdoors(self) -> list[PhaseScene]:
-        """D of the solar band in each season: the visible one's where both bands reflect alike."""
-        first, *rest = (
-            exterior_surfaces(season.building, self.space, "solar") for season in self.seasons
-        )
-        scene = self._solar(first)
-        return [scene, *(scene.before(replace(scene.scene, exterior=one)) for one in rest)]
-
-    def _solar(self, exterior: Surfaces) -> PhaseScene:
-        if (
-            self.inner is None
-            and "scene" in self.__dict__
-            and np.array_equal(exterior.reflectance, self.scene.exterior.reflectance)
-        ):
-            return self.traced
-        scene = DaylightScene(Surfaces.none(), exterior, self.windows.groups)
-        steps = part(self.progress, 0.0, 1.0, "sun")
-        found = PhaseScene(scene, self.sampling, cache=self.cache, progress=steps)
-        if scene.groups:
-            _ = found.daylight
-            steps("sun", 1.0)
-        return found
-
-    @cached_property
-    def outer(self) -> OuterFaces:
-        """Places before the outer faces of the room's walls and windows."""
-        return outer_faces(self.building, self.space, self.surfaces)
-
-    @cached_property
-    def sun(self) -> RoomSun:
-        """The sun outside and what the room does with it."""
-        steps = part(self.progress, 0.0, 0.8, "heat")
-        interior = interior_surfaces(self.space, "solar")
-        seen = SeasonalOutdoors(self.outdoors, self.season)
-        return RoomSun(seen, interior, self.surfaces, self.outer, self.skies, steps)
-
-    @cached_property
-    def thermals(self) -> list[list[ThermalSystem]]:
-        """Thermal data of the windows' systems by group and state [G][J]."""
-        return [[thermal_system(system) for system in states] for states in self.windows.systems]
-
-    @cached_property
-    def occupied(self) -> NDArray[np.bool_]:
-        """The hours with people [H]."""
-        if self.operation is not None:
-            return OperationHours(self.operation, self.weather).present > 0
-        return working_hours(self.weather, *self.options.occupancy.hours)
-
-    @cached_property
-    def surfaces(self) -> ThermalRoom:
-        """The room's surfaces and windows as a zone, with the gains and the air of the options."""
-        gains = internal_gains(self.space, self.occupied, self.options.occupancy)
-        systems = [self.thermals[g] for g in self.windows.group]
-        return zone_surfaces(self.space, systems, gains, self.options.infiltration_ach)
-
-    @cached_property
-    def plane(self) -> FloatArray | None:
-        """Mean illuminance of the work plane [H] [lx]; None where neither lamps nor control ask."""
-        tables = self.operation
-        if tables is None or not self.space.windows:
-            return None
-        dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
-        if tables.control.rule != "glare" and not dimmed:
-            return None
-        return self.daylight.illuminance.mean(axis=1, dtype=float)
-
-    @cached_property
-    def zone(self) -> RoomZone:
-        """The room as the heat balance takes it."""
-        room, lamps = self.surfaces, np.zeros(self.skies.hours)
-        sun, state, plane = self.sun, self.state, self.plane  # stages of their own before this one
-        self.progress("heat", 0.0)
-        if self.operation is not None:
-            area = self.space.floor_area
-            zone, lamps = operated(room.zone, self.operation, area, self.weather, plane)
-            room = enveloped(
-                replace(room, zone=zone), self.building, self.space, self.operation, self.weather
+    with times.stage("daylight"):
+        light = room_light(room, progress=progress)
+        if control_signal(room) == "irradiance":
+            outdoors = seasonal_outdoors(room, light, progress=progress)
+        state = shading_state(room, light, outdoors, progress=progress)
+        daylight = room_daylight(room, light, state, progress=progress)
+    with times.stage("leaks"):
+        leaks = leak_issues(space, light.scene, seed=options.sampling.seed, cache=cache)
+    if options.outputs.annual_glare:
+        with times.stage("annual glare"):
+            year = annual_glare(room, light, state, progress=progress)
+    glare = GlareResults(light.scene.view, (), rating_of(options.outputs).rule)
+    if pictures:
+        with times.stage("glare"):
+            glare = room_glare(room, light, state, hours, year, progress=progress)
+    if colour:
+        with times.stage("colour"):
+            glare = coloured(room, light, state, glare, progress=progress)
+    if rate is not None:
+        with times.stage("glare"):
+            dgp = rated_hours(room, light, state, *rate, progress=progress)
+    if explore:
+        with times.stage("explorer"):
+            explored = explored_room(
+                room, light, state, sensors=len(daylight.points), progress=progress
             )
-            services = services_of(self.operation, area, self.weather)
-        else:
-            services = plain_services(self.space, self.occupied, self.options.occupancy)
-        share = [len(season.months) / 12 for season in self.seasons]
-        exteriors = [outdoors.scene.exterior for outdoors in self.outdoors]
-        room = under_the_sky(
-            room, self.outer, list(zip(exteriors, share, strict=True)),
-            seed=self.sampling.seed, cache=self.cache,
-        )  # fmt: skip
-        solar, gains = sun.switched(self.windows, self.thermals, state)
-        return RoomZone(
-            self.space, room, solar, gains, state, lamps, self.occupied, plane, services
-        )
+    with times.stage("thermal"):
+        surfaces = zone_surfaces(room)
+        if outdoors is None:
+            outdoors = seasonal_outdoors(room, light, progress=progress)
+        zone = room_zone(room, surfaces, outdoors, state, daylight, progress=progress)
+    return DaylitRoom(
+        space, daylight, glare, zone, times.seconds, year, dgp=dgp, issues=leaks,
+        explored=explored, borrowed=borrowed_share(space, light.light, light.inner),
+    )  # fmt: skip
 
-    def heat_inputs(self) -> HeatInputs:
-        """What the heat balance takes, and what its tables name."""
-        table = tuple(fenestration_table(self.windows, self.thermals))
-        names = tuple(system.name for system in max(self.windows.systems, key=len, default=()))
-        return HeatInputs(self.zone, table, names, self.operation)
 
-    def thermal(self) -> ThermalResult:
-        """Temperatures and comfort of the room alone."""
-        step_s, progress = self.options.heat_step_s, self.progress
-        return heat_alone(self.heat_inputs(), self.weather, step_s, progress)[0]
+def operated_zone(room: RoomInputs, *, progress: Progress = silent) -> RoomZone:
+    """The zone of a room whose light is computed only as far as its operation reads it.
+
+    Raises: `RoomError` for a room without a closed zone.
+    """
+    surfaces, daylight = zone_surfaces(room), None
+    light = room_light(room, progress=progress) if reads_work_plane(room) else None
+    outdoors = seasonal_outdoors(room, light, progress=progress)
+    state = shading_state(room, light, outdoors, progress=progress)
+    if light is not None:
+        daylight = room_daylight(room, light, state, progress=progress)
+    return room_zone(room, surfaces, outdoors, state, daylight, progress=progress)

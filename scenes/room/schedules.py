@@ -37,7 +37,7 @@ SATURDAY, SUNDAY = 5, 6
 
 
 def _clock(hours: tuple[int, int]) -> tuple[int, int]:
-    """Two clock times as `working_hours` takes them: 22 to 6 is the night."""
+    """Two clock times for `working_hours`; 22 to 6 is the night."""
     start, end = hours
     if not (0 <= start < CLOCK and 0 <= end <= CLOCK and start != end):
         raise ValueError(
@@ -61,7 +61,7 @@ Date = Annotated[str, AfterValidator(_date)]
 
 
 class RangeTable(TomlTable):
-    """What holds between two clock times of a day; 22 to 6 is its first and its last hours."""
+    """A value between two clock times of a day; 22 to 6 is its first and its last hours."""
 
     hours: Hours
     value: float
@@ -85,7 +85,7 @@ Profile = Annotated[tuple[RangeTable, ...], BeforeValidator(_profile)]
 
 
 class DaysTable(TomlTable):
-    """The days of a week; without its own a day is as `weekend`, and that as `weekday`."""
+    """Profiles of the days of a week; the default of a day is `weekend`, then `weekday`."""
 
     weekday: Profile | None = None
     weekend: Profile | None = None
@@ -102,7 +102,7 @@ class DaysTable(TomlTable):
 
 
 class SeasonTable(DaysTable):
-    """Other days between two dates, both counted; from 10-01 to 03-31 is the winter."""
+    """Profiles between two dates, both included; from 10-01 to 03-31 is the winter."""
 
     dates: tuple[Date, Date]
 
@@ -113,10 +113,10 @@ class ScheduleTable(DaysTable):
     otherwise: float = 0.0  # in hours that no range names: the set-back
     peak: float = 1.0  # multiplies all values
     holidays: tuple[Date, ...] | None = None  # in place of the calendar's
-    season: tuple[SeasonTable, ...] = ()  # the first that holds goes before the days above
+    season: tuple[SeasonTable, ...] = ()  # the first that applies replaces the days above
     csv: Path | None = None  # a row an hour, with a header
     column: str = ""
-    _year: YearSchedule | None = PrivateAttr(None)  # of a building's file, in place of the days
+    _year: YearSchedule | None = PrivateAttr(None)  # of a building's file, in place of the profiles
 
     @model_validator(mode="after")
     def _has_its_days(self) -> ScheduleTable:
@@ -127,15 +127,15 @@ class ScheduleTable(DaysTable):
         return self
 
     @classmethod
-    def held(cls, year: YearSchedule, peak: float = 1.0) -> ScheduleTable:
-        """The table of a schedule that a building's file holds."""
+    def from_file(cls, year: YearSchedule, peak: float = 1.0) -> ScheduleTable:
+        """The table of a schedule in a building's file."""
         table = cls(weekday=0.0, peak=peak)
         table._year = year
         return table
 
     @property
     def stated(self) -> tuple[float, ...]:
-        """Every value that the table itself states."""
+        """Every value in the table itself."""
         if self._year is not None:
             return tuple(float(value) for value in np.unique(self.peak * self._year.values))
         days = (self, *self.season)
@@ -144,7 +144,7 @@ class ScheduleTable(DaysTable):
         return tuple(self.peak * value for value in (self.otherwise, *values))
 
     def hourly(self, weather: Weather, holidays: tuple[str, ...]) -> FloatArray:
-        """The values [H]; `holidays`: MM-DD, for a schedule that names none."""
+        """The values [H]; `holidays`: MM-DD, for a schedule without its own."""
         if self.csv is not None:
             return self.peak * _column(self.csv, self.column, len(weather.times))
         days = weather.midpoints
@@ -174,7 +174,7 @@ class ScheduleTable(DaysTable):
     def _of_year(
         self, days: pd.DatetimeIndex, weekday: NDArray[np.int64], free: NDArray[np.bool_]
     ) -> FloatArray:
-        """The held values [H] of the days of a weather."""
+        """Values [H] of the building file's schedule on the days of a weather."""
         date = 100 * days.month.to_numpy() + days.day.to_numpy()
         numbers = [day_of_year(int(one) // 100, int(one) % 100) for one in np.unique(date)]
         day = np.asarray(numbers)[np.unique(date, return_inverse=True)[1]]
@@ -183,7 +183,7 @@ class ScheduleTable(DaysTable):
 
 
 class CalendarTable(TomlTable):
-    """Which days are free, and on which the year begins."""
+    """Holidays, and the weekday of the first day of the year."""
 
     holidays: tuple[Date, ...] = ()
     starts_on: Literal[WEEK] | None = None  # else the weather file's own first day
@@ -205,9 +205,9 @@ def states_or_name(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class OrSchedule:
-    """Metadata of a field that takes the name of a schedule in place of what it says of all hours.
+    """Metadata of a field whose value is a constant or the name of a schedule.
 
-    `plain` checks that; without, it is a number within the limits, as each value of the schedule.
+    `plain` checks the constant; without it, the constant is a number within the limits.
     """
 
     limits: Limits
@@ -231,17 +231,17 @@ class OrSchedule:
 
 def scheduled_fields(table: TomlTable) -> dict[str, tuple[str, Limits]]:
     """The schedules that a table names, by key, and the limits of their values."""
-    found = {}
+    named = {}
     for key, field in type(table).model_fields.items():
         value = getattr(table, key)
         for metadata in field.metadata:
             if isinstance(metadata, OrSchedule) and isinstance(value, str):
-                found[key] = value, metadata.limits
-    return found
+                named[key] = value, metadata.limits
+    return named
 
 
 def tables_within(table: TomlTable, place: str) -> Iterator[tuple[str, TomlTable]]:
-    """A table and all tables within it, with their places."""
+    """A table and all tables within it, with their paths."""
     yield place, table
     for key in type(table).model_fields:
         value = getattr(table, key)
@@ -254,7 +254,7 @@ def tables_within(table: TomlTable, place: str) -> Iterator[tuple[str, TomlTable
 
 
 def unknown_name(name: str, known: Mapping[str, object]) -> str:
-    """What to say of a schedule that there is not."""
+    """The message on an unknown schedule."""
     near = get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known) or 'none'}"
     return f"no schedule {name!r}; {hint}"

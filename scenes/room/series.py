@@ -12,7 +12,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Effect, Issue
 from bim.seasons import seasons
 from bim.templates import template_rooms
 from bim.to_tracer import exterior_surfaces, window_groups
@@ -26,19 +27,20 @@ from mitsuba_cfs.surfaces import Surfaces
 from scenes.fenestration.systems import States
 from scenes.results import RoomYear
 from scenes.room.heat import DaylitRoom
-from scenes.room.leaks import moved_problem
+from scenes.room.leaks import moved_issue
 
+R = TypeVar("R")
 Moved = TypeVar("Moved", RoomYear, DaylitRoom)
 BANDS = ("visible", "solar")
-SAME_LIGHT = 0.005  # share of the light from anywhere that may come another way
-NEAR = 0.01  # [m] between the places of windows in their rooms
+SAME_LIGHT = 0.005  # greatest share of D by which two rooms with the same outdoors differ
+NEAR = 0.01  # [m] between the positions of windows in their rooms
 
 
 def same_systems(a: Space, b: Space, systems: Mapping[str, States]) -> bool:
-    """Whether the windows at the same places of two equal rooms have the same systems."""
-    places = np.array([window.centre - corner(a) for window in a.windows])
+    """Whether windows at equal positions in two equal rooms have the same systems."""
+    positions = np.array([window.centre - corner(a) for window in a.windows])
     for window in b.windows:
-        distance = np.linalg.norm(places - (window.centre - corner(b)), axis=1)
+        distance = np.linalg.norm(positions - (window.centre - corner(b)), axis=1)
         nearest = int(distance.argmin())
         if distance[nearest] > NEAR:
             return False
@@ -49,24 +51,24 @@ def same_systems(a: Space, b: Space, systems: Mapping[str, States]) -> bool:
 
 
 class OutdoorLight:
-    """The daylight matrices of a room's windows in both bands: what it sees of the outdoors.
+    """Daylight matrices of a room's windows in both bands.
 
-    They are traced with the same random numbers for all rooms: where the same things stand outdoors
-    those of equal rooms differ by rounding only.  Sums over rows and columns alone are kept.
+    They are traced with the same random numbers for all rooms: those of equal rooms with equal
+    outdoors differ by rounding only. Only sums over rows and columns stay in memory.
     """
 
     def __init__(
         self, building: Building, space: Space, sampling: Sampling, cache: MatrixCache | None
     ) -> None:
-        """Nothing is traced before it is asked for."""
+        """Matrices are traced at their first use."""
         self.building, self.space, self.sampling, self.cache = building, space, sampling, cache
 
     def same(self, other: OutdoorLight) -> bool:
-        """Whether an equal room sees the same outdoors."""
-        # sums differ by no more than what they are of: most rooms are told apart by them
-        return all(
-            alike(one, theirs) for one, theirs in zip(self._sums, other._sums, strict=True)
-        ) and all(alike(self._daylight(band), other._daylight(band)) for band in BANDS)
+        """Whether an equal room has the same outdoors."""
+        # sums differ no more than the matrices: they are enough to tell most rooms apart
+        return all(same_matrix(a, b) for a, b in zip(self._sums, other._sums, strict=True)) and all(
+            same_matrix(self._daylight(band), other._daylight(band)) for band in BANDS
+        )
 
     @cached_property
     def _sums(self) -> list[NDArray[np.float64]]:
@@ -74,50 +76,47 @@ class OutdoorLight:
 
     def _daylight(self, band: str) -> NDArray[np.float64]:
         """D of every season [.., K, P], one after the other."""
-        found: list[PhaseScene] = []
+        scenes: list[PhaseScene] = []
         groups = window_groups(self.space)
         for season in seasons(self.building):
             exterior = exterior_surfaces(season.building, self.space, band)
             scene = DaylightScene(Surfaces.none(), exterior, groups)
-            if found:
-                traced = found[0].before(scene)
+            if scenes:
+                traced = scenes[0].before(scene)
             else:
                 traced = PhaseScene(scene, self.sampling, cache=self.cache)
-            found.append(traced)
-        return np.concatenate([traced.daylight.values for traced in found])
+            scenes.append(traced)
+        return np.concatenate([traced.daylight.values for traced in scenes])
 
 
-def alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether no more than `SAME_LIGHT` of the light comes another way."""
-    if one.shape != other.shape:
+def same_matrix(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    """Whether two matrices differ by at most the share `SAME_LIGHT` of their sum."""
+    if a.shape != b.shape:
         return False
-    return bool(np.abs(one - other).sum() <= SAME_LIGHT * one.sum())
+    return bool(np.abs(a - b).sum() <= SAME_LIGHT * a.sum())
 
 
 def moved_light(room: DaylitRoom, space: Space) -> DaylitRoom:
-    """The light of a template room for one equal to it, its zone between that one's neighbours."""
-    inputs = room.inputs
-    return replace(
-        moved_result(room, space), inputs=replace(inputs, zone=inputs.zone.moved_to(space))
-    )
+    """The light of a template room for an equal room, its zone between that room's neighbours."""
+    return replace(moved_result(room, space), zone=room.zone.moved_to(space))
 
 
 def moved_result(result: Moved, space: Space) -> Moved:
-    """The results of a template room for one equal to it, moved to where that stands."""
+    """The results of a template room for an equal room, moved to its position."""
     shift = corner(space) - corner(result.space)
     daylight, glare = result.daylight, result.glare
     table = daylight.sensor_metrics.copy()
     table[["x", "y", "z"]] += shift
     name = result.space.label
-    place = tuple((np.asarray(glare.view.position) + shift).tolist())
+    eye = tuple((np.asarray(glare.view.position) + shift).tolist())
     return replace(
         result,
         space=space,
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
-        glare=replace(glare, view=replace(glare.view, position=place)),
+        glare=replace(glare, view=replace(glare.view, position=eye)),
         seconds={},
-        explored=None,  # the template's serves both
-        problems=tuple(moved_problem(problem, space, name) for problem in result.problems),
+        explored=None,  # the explorer shows that of the template
+        issues=tuple(moved_issue(issue, space, name) for issue in result.issues),
         template=name,
     )
 
@@ -127,14 +126,13 @@ def corner(space: Space) -> NDArray[np.float64]:
     return space.shell.reshape(-1, 3).min(axis=0)
 
 
-R = TypeVar("R")
-# Some rooms to what comes of each, in any order: its result or why it has none
-Beside = Callable[[Sequence[Space]], Generator[tuple[Space, R | BaseException]]]
+# From rooms to the result or the error of each, in any order
+Parallel = Callable[[Sequence[Space]], Generator[tuple[Space, R | BaseException]]]
 
 
 @dataclass(frozen=True, slots=True)
 class RoomSeries(Generic[R]):
-    """What is to be done with each of some rooms."""
+    """A computation for each of several rooms."""
 
     building: Building
     spaces: Sequence[Space]
@@ -142,16 +140,16 @@ class RoomSeries(Generic[R]):
     sampling: Sampling
     cache: MatrixCache | None
     compute: Callable[[Space, Progress], R]
-    move: Callable[[R, Space], R]  # the result of an equal room to where another one is
-    file: Path | None = None  # that messages name
-    alike: Callable[[Space, Space], bool] = lambda one, other: True  # beside shape and light
-    on_room: Callable[[R], None] = lambda result: None  # called with each result in turn
-    given: str = "results are"  # what an equal room has of the one that was computed
-    beside: Beside[R] | None = None  # computes rooms beside each other in place of `compute`
-    kept: Callable[[R], R] = lambda result: result  # what is held of each
+    move: Callable[[R, Space], R]  # the result of a template for an equal room
+    file: Path | None = None  # named in messages
+    alike: Callable[[Space, Space], bool] = lambda one, other: True  # besides shape and light
+    on_room: Callable[[R], None] = lambda result: None  # called with each result, in order
+    shared: str = "results are"  # subject of the note on an equal room
+    parallel: Parallel[R] | None = None  # computes several rooms at a time, in place of `compute`
+    stored: Callable[[R], R] = lambda result: result  # puts a result on disk
 
-    def results(self, progress: Progress = silent) -> tuple[list[R], list[Problem], list[str]]:
-        """The results in the rooms' order, what was left out, and what was given twice.
+    def results(self, progress: Progress = silent) -> tuple[list[R], list[Issue], list[str]]:
+        """The results in the rooms' order, issues of rooms left out, notes on equal rooms.
 
         Raises: `DataError` where the only room cannot be computed.
         """
@@ -164,8 +162,8 @@ class RoomSeries(Generic[R]):
         templates: _Templates,
         ahead: Iterator[tuple[str, R | BaseException]],
         progress: Progress,
-    ) -> tuple[list[R], list[Problem], list[str]]:
-        found, problems, notes = [], [], []
+    ) -> tuple[list[R], list[Issue], list[str]]:
+        results, issues, notes = [], [], []
         computed: dict[str, R | BaseException] = {}
         for number, space in enumerate(self.spaces, 1):
             steps = item(progress, "room", number, len(self.spaces), space.label)
@@ -176,7 +174,7 @@ class RoomSeries(Generic[R]):
                     guid, result = next(ahead, (space.guid, None))
                     result = self.compute(space, steps) if result is None else result
                     if not isinstance(result, BaseException):
-                        result = self.kept(result)
+                        result = self.stored(result)
                     computed[guid] = result
                 result = computed[wanted]
                 if isinstance(result, BaseException):
@@ -185,24 +183,25 @@ class RoomSeries(Generic[R]):
                     result = self.move(result, space)
                     notes.append(
                         f"Room {space.label} is like {twin.label} in shape, orientation, "
-                        f"materials, windows and in what shades it: its {self.given} those."
+                        f"materials, windows and in what shades it: its {self.shared} those."
                     )
             except RoomError as error:
                 templates.drop(space)
                 if len(self.spaces) == 1:
                     where = f"space {space.label}"
                     raise DataError(str(error), file=self.file, element=where) from error
-                problems.append(Problem(space.guid, str(error), "the room was left out of the run"))
+                values = {"room": space.label, "reason": str(error)}
+                issues.append(Issue("room-not-simulated", space.guid, values, Effect("room")))
                 continue
-            found.append(result)
+            results.append(result)
             self.on_room(result)
-        return found, problems, notes
+        return results, issues, notes
 
     def _ahead(
         self, templates: _Templates, progress: Progress
     ) -> Generator[tuple[str, R | BaseException]]:
-        """The rooms that are computed beside each other, as they are ready."""
-        if self.beside is None:
+        """Results of rooms that are computed in parallel, as they become ready."""
+        if self.parallel is None:
             return
         rooms = []
         for number, space in enumerate(self.spaces, 1):
@@ -210,33 +209,33 @@ class RoomSeries(Generic[R]):
                 rooms.append(space)
             progress("equal rooms", number / len(self.spaces))
         progress(Stage("", "room", 1, len(rooms)), 0.0)
-        with closing(self.beside(rooms)) as beside:
-            for done, (space, result) in enumerate(beside, 1):
+        with closing(self.parallel(rooms)) as ready:
+            for done, (space, result) in enumerate(ready, 1):
                 yield space.guid, result
                 progress(Stage("", "room", min(done + 1, len(rooms)), len(rooms)), 0.0)
 
 
 class _Templates:
-    """Of which earlier room each is a copy, in shape and in light."""
+    """Equal rooms: for each room the earlier room of the same shape and light."""
 
     def __init__(self, series: RoomSeries[R]) -> None:
         self._series = series
-        self._group: dict[str, list[OutdoorLight]] = {}  # by room; of those that stand for others
+        self._group: dict[str, list[OutdoorLight]] = {}  # templates, by GUID
         for group in template_rooms(series.spaces):
-            stand: list[OutdoorLight] = []
-            self._group |= dict.fromkeys((space.guid for space in group), stand)
-        self._found: dict[str, Space | None] = {}
+            templates: list[OutdoorLight] = []
+            self._group |= dict.fromkeys((space.guid for space in group), templates)
+        self._template: dict[str, Space | None] = {}
 
     def of(self, space: Space) -> Space | None:
-        """An earlier room that is equal and gets the same light; None: the room stands itself."""
-        if space.guid not in self._found:
+        """An earlier equal room with the same light; None: the room is computed itself."""
+        if space.guid not in self._template:
             series, group = self._series, self._group[space.guid]
             light = OutdoorLight(series.building, space, series.sampling, series.cache)
             twin = next((one.space for one in group if self._same(one, light)), None)
             if twin is None:
                 group.append(light)
-            self._found[space.guid] = twin
-        return self._found[space.guid]
+            self._template[space.guid] = twin
+        return self._template[space.guid]
 
     def _same(self, one: OutdoorLight, other: OutdoorLight) -> bool:
         series, rooms = self._series, (one.space, other.space)
@@ -246,7 +245,7 @@ class _Templates:
         """Let no room be a copy of this one, which could not be computed."""
         group = self._group[space.guid]
         group[:] = [light for light in group if light.space.guid != space.guid]
-        self._found = {
-            guid: twin for guid, twin in self._found.items()
+        self._template = {
+            guid: twin for guid, twin in self._template.items()
             if twin is None or twin.guid != space.guid
         }  # fmt: skip

@@ -1,4 +1,4 @@
-"""The skies of a year and the cached directions of the sun."""
+"""The skies of a year, with cached directions of the sun."""
 
 from __future__ import annotations
 
@@ -12,11 +12,32 @@ from mitsuba_cfs.sky.sun import sun_directions
 from mitsuba_cfs.sky.weather import Weather
 
 
-def kept_sun(weather: Weather, model: str, cache: MatrixCache | None) -> NDArray[np.float64]:
-    """`sun_directions` [H, 3] of a weather, found in a cache or put there.
+def skies_for(
+    weather: Weather,
+    method: str,
+    sampling: Sampling,
+    cache: MatrixCache | None = None,
+    /,
+    **choices: str,
+) -> AnnualSky:
+    """Sky patches and sun of the year as a method needs them; the same for every room.
 
-    The Solar Position Algorithm and the library that brings it take half a second, which a study
-    whose matrices are kept would spend on little else.
+    Args: cache: of the sun's directions; choices: `RoomOptions.sky`.
+    """
+    towards = cached_sun_directions(weather, choices.get("sun_model", "spa"), cache)
+    return annual_sky(
+        weather, sampling.subdivision, sun=method != "three-phase", solar=True, towards=towards,
+        **choices,
+    )  # fmt: skip
+
+
+def cached_sun_directions(
+    weather: Weather, model: str, cache: MatrixCache | None
+) -> NDArray[np.float64]:
+    """Directions to the sun [H, 3] of a weather: `sun_directions`, cached on disk.
+
+    The Solar Position Algorithm and its library take half a second, about as long as all else of a
+    study's case whose matrices are cached.
     """
     place = (weather.latitude_deg, weather.longitude_deg, weather.timezone_h, weather.elevation_m)
     air = (weather.pressure_pa, weather.dry_bulb_c)
@@ -26,22 +47,3 @@ def kept_sun(weather: Weather, model: str, cache: MatrixCache | None) -> NDArray
         by=sun_directions.__module__,
     )  # fmt: skip
     return kept_or_found(entry, lambda: sun_directions(weather, model=model))
-
-
-def skies_for(
-    weather: Weather,
-    method: str,
-    sampling: Sampling,
-    cache: MatrixCache | None = None,
-    /,
-    **choices: str,
-) -> AnnualSky:
-    """The year's skies as a method needs them; the same for every room.
-
-    Args: cache: where the sun's directions are found and kept; choices: `RoomOptions.sky`.
-    """
-    with_sun = method != "three-phase"
-    towards = kept_sun(weather, choices.get("sun_model", "spa"), cache)
-    return annual_sky(
-        weather, sampling.subdivision, sun=with_sun, solar=True, towards=towards, **choices
-    )

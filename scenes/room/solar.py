@@ -1,27 +1,30 @@
-"""The sun on a room: what its windows let in, and where window layers and surfaces absorb it."""
+"""Solar radiation of a room: incident, transmitted, absorbed in window layers and in surfaces."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.outer_faces import OuterFaces
 from bim.to_thermal import ThermalRoom
+from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.gloss import Gloss
 from mitsuba_cfs.methods.phase_scene import BATCHES, PhaseScene
+from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.methods.seasonal_light import hours_by_season, in_order_of_hours
-from mitsuba_cfs.progress import Progress, part
+from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.matrices.absorption import absorption_matrix
 from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
 from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.room.inputs import RoomInputs
+from scenes.room.light import RoomLight
 from scenes.room.windows import RoomWindows
 from thermal.climate import Solar
 from thermal.control import switched
@@ -30,200 +33,262 @@ FloatArray = NDArray[np.float64]
 Gains = dict[str, FloatArray]  # [H] [W] by name: incident_w, transmitted_w, absorbed_..._w
 
 
-def _of_zone(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss | None, ...]:
-    """The gloss of the zone's surfaces; none where one is made of faces that differ in it."""
-    found: dict[int, set[Gloss | None]] = {}
-    for number, face in zip(numbers, interior.surface, strict=True):
-        found.setdefault(int(number), set()).add(interior.gloss[face] if interior.gloss else None)
-    if not interior.glossy:
-        return ()
-    alike = {number: kinds.pop() for number, kinds in found.items() if len(kinds) == 1}
-    return tuple(alike.get(number) for number in range(int(numbers.max()) + 1))
-
-
 @dataclass(frozen=True, slots=True)
 class SeasonalOutdoors:
-    """What stands before a room's windows in each season, in the solar band."""
+    """Solar daylight matrices D outside a room's windows, by season."""
 
-    scenes: list[PhaseScene]  # the same window groups, in the same parts
+    scenes: list[PhaseScene]  # one a season: equal window groups and subgroups
     season: NDArray[np.int64]  # [L] of each lit hour
 
-    def parts(self) -> list[tuple[PhaseScene, NDArray[np.int64]]]:
-        """The scene of each season that has some of the lit hours, with these."""
-        return hours_by_season(self.scenes, self.season)
+    @property
+    def first(self) -> PhaseScene:
+        """The scene of the first season."""
+        return self.scenes[0]
 
-
-class RoomSun:
-    """The sun outside a room and what its surfaces do with it, whatever fills the windows.
-
-    Each matrix is traced when it is first asked for.
-    """
-
-    def __init__(
-        self,
-        outdoors: SeasonalOutdoors,
-        interior: Surfaces,
-        room: ThermalRoom,
-        outer: OuterFaces,
-        skies: AnnualSky,
-        progress: Progress,
-    ) -> None:
-        """From the windows' groups and what stands before them, and the room, in the solar band."""
-        self.seasons, self.outdoors = outdoors, outdoors.scenes[0]
-        self.outer, self.skies, self.progress = outer, skies, progress
-        self.surfaces = len(room.zone.surfaces)
-        # the room's triangles, numbered by the surfaces of the zone
-        numbers = room.surface_of_face[interior.surface]
-        self.interior = Surfaces(
-            interior.triangles, interior.reflectance, numbers, gloss=_of_zone(interior, numbers)
-        )
-        self._absorbed: dict[bytes, FloatArray] = {}
-        self._tracing = {
-            "samples": max(self.outdoors.sampling.patch_samples // BATCHES, 1),
-            "stopping": Stopping(batches=BATCHES),
-            "seed": self.outdoors.sampling.seed,
-            "cache": self.outdoors.cache,
-        }
-
-    def before_windows(self, shares: FloatArray) -> FloatArray:
-        """Sums over the window groups' irradiance by direction [n, L] [W/m2], in lit hours.
-
-        The few sums of D are taken before the many hours, which are multiplied in the skies' single
-        precision.
-
-        Args: shares: [n, G, K] of the irradiance of each group from each patch.
-        """
-        if not self.outdoors.scene.groups:
-            return np.zeros((len(shares), len(self.skies.lit)))
-        weights = (shares * KLEMS_FULL.projected_solid_angles()).reshape(len(shares), -1)
-
-        def of_season(scene: PhaseScene, sky: FloatArray) -> FloatArray:
-            daylight = scene.parts.of_groups(scene.daylight.values)
-            rows = weights @ daylight.reshape(weights.shape[1], -1)
-            return (rows.astype(sky.dtype) @ sky).astype(float)
-
-        return self._by_season(of_season)
-
-    def _by_season(self, of_season: Callable[[PhaseScene, FloatArray], FloatArray]) -> FloatArray:
+    def by_season(
+        self, of_season: Callable[[PhaseScene, FloatArray], FloatArray], sky: FloatArray
+    ) -> FloatArray:
         """Values [.., L] of all lit hours, from the scene and the sky [P, l] of each season."""
-        parts, sky = self.seasons.parts(), self.skies.solar
+        parts = hours_by_season(self.scenes, self.season)
         if len(parts) == 1:
             return of_season(parts[0][0], sky)
         return in_order_of_hours(
             [(of_season(scene, sky[:, hours]), hours) for scene, hours in parts]
         )
 
-    @property
-    def irradiance(self) -> FloatArray:
-        """Irradiance of the window groups [H, G] [W/m2]."""
-        groups = len(self.outdoors.scene.groups)
-        of_each = np.repeat(np.eye(groups)[..., None], KLEMS_FULL.size, axis=2)
-        return self.skies.whole_year(self.before_windows(of_each)).T
 
-    @cached_property
-    def facade(self) -> FloatArray:
-        """Irradiance on the outside of the zone's surfaces [H, F] [W/m2]."""
-        outer, facade = self.outer, np.zeros((self.skies.hours, self.surfaces))
-        if len(outer.surfaces):
-            lit = self._by_season(lambda scene, sky: self._seen_by_faces(scene) @ sky)
-            facade[:, outer.surfaces] = self.skies.whole_year(lit).T
-        return facade
+@dataclass(frozen=True, slots=True)
+class ZoneInSun:
+    """A zone's surfaces F and windows in the solar band."""
 
-    def _seen_by_faces(self, outdoors: PhaseScene) -> FloatArray:
-        """Irradiance of the outer faces per unit radiance of each sky patch [n, P] [sr]."""
-        return sky_irradiance_matrix(
-            outdoors.scene.exterior,
-            self.outer.points,
-            self.outer.normals,
-            subdivision=outdoors.sampling.subdivision,
-            progress=part(self.progress, 0.4, 0.6),
-            **self._tracing,
-        ).values
+    interior: Surfaces  # the room's triangles, numbered by the surfaces of the zone
+    windows: RoomWindows
+    thermals: Sequence[Sequence[ThermalSystem]]  # [G][J]
+    facade: FloatArray  # [H, F] irradiance on the outside [W/m2]
 
-    def absorbed(self, reflectance: FloatArray) -> FloatArray:
-        """Where a unit of flux of each window patch is absorbed [G, K, F + G].
 
-        Args: reflectance: [G] of the windows for diffuse light from the room.
-        """
-        key = reflectance.tobytes()
-        if key not in self._absorbed:
-            self._absorbed[key] = absorption_matrix(
-                self.interior,
-                self.outdoors.scene.groups,
-                window_reflectance=reflectance,
-                progress=part(self.progress, 0.6, 1.0),
-                **self._tracing,
-            ).values
-        return self._absorbed[key]
+def seasonal_outdoors(
+    room: RoomInputs, light: RoomLight | None = None, *, progress: Progress = silent
+) -> SeasonalOutdoors:
+    """The outdoors of a room in the solar band.
 
-    def switched(
-        self,
-        windows: RoomWindows,
-        thermals: Sequence[Sequence[ThermalSystem]],
-        state: NDArray[np.int64],
-    ) -> tuple[Solar, Gains]:
-        """The sun absorbed in the state [H] of every hour, and its sums.
+    Args: light: whose matrices are used again where both bands have equal reflectances outdoors.
+    """
+    first, *others = (
+        exterior_surfaces(season.building, room.space, "solar") for season in room.seasons
+    )
+    if light is not None and light.inner is None and np.array_equal(
+        first.reflectance, light.scene.exterior.reflectance
+    ):  # fmt: skip
+        scene = light.traced
+    else:
+        scene = _traced_outdoors(room, first, progress)
+    later = (scene.before(replace(scene.scene, exterior=exterior)) for exterior in others)
+    return SeasonalOutdoors([scene, *later], room.season)
 
-        Args: thermals: thermal data of the windows' systems by group and state [G][J].
-        """
-        suns = [self._of_state(windows, thermals, j) for j in range(windows.states)]
-        gains = {
-            name: np.stack([sums[name] for _, sums in suns])[state, np.arange(len(state))]
-            for name in suns[0][1]
-        }
-        return switched([solar for solar, _ in suns], state), gains
 
-    def _of_state(
-        self, windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]], state: int
-    ) -> tuple[Solar, Gains]:
-        """Sun absorbed by window layers, room surfaces and facades in one state, and its sums."""
-        group, F = windows.group, self.facade.shape[1]
-        if not len(group):
-            dark = np.zeros((self.skies.hours, 0))
-            return Solar(dark, dark, np.zeros_like(self.facade), self.facade), {}
-        heats = [states[min(state, len(states) - 1)] for states in thermals]
-        area = np.array([g.area for g in windows.groups])
-        T = np.stack(windows.of_state(state, lambda system: system.solar.transmission_matrix()))
-        shares = self._shares(heats, T, area)
-        found = np.split(
-            self.before_windows(np.concatenate(shares)), np.cumsum([len(s) for s in shares[:-1]])
-        )
-        taken, outer, inner, whole = (rows.T for rows in found)
-        kept = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
+def _traced_outdoors(room: RoomInputs, exterior: Surfaces, progress: Progress) -> PhaseScene:
+    scene = DaylightScene(Surfaces.none(), exterior, room.windows.groups)
+    steps = part(progress, 0.0, 1.0, "sun")
+    traced = PhaseScene(scene, room.options.sampling, cache=room.cache, progress=steps)
+    if scene.groups:
+        _ = traced.daylight  # traced now, so that the progress has a stage of its own
+        steps("sun", 1.0)
+    return traced
 
-        def year(values: NDArray) -> NDArray:
-            return self.skies.whole_year(np.ascontiguousarray(values.T)).T
 
-        solar = Solar(
-            absorbed_outer=year(outer[:, group]),
-            absorbed_inner=year(inner[:, group]),
-            inside=year(taken[:, :F]),
-            facade=self.facade,
-            window_inside=year((kept * taken[:, F:] / area)[:, group]),
-        )
-        gains = {
-            "incident_w": whole[:, 0],
-            "transmitted_w": whole[:, 1],
-            "absorbed_outer_w": outer @ area,
-            "absorbed_inner_w": inner @ area,
-            "absorbed_room_w": taken[:, :F].sum(axis=1),
-        }
-        return solar, {name: self.skies.whole_year(values) for name, values in gains.items()}
+def window_irradiance(outdoors: SeasonalOutdoors, skies: AnnualSky) -> FloatArray:
+    """Irradiance of the window groups [H, G] [W/m2]."""
+    groups = len(outdoors.first.scene.groups)
+    of_each = np.repeat(np.eye(groups)[..., None], KLEMS_FULL.size, axis=2)
+    return skies.whole_year(directional_sums(outdoors, skies, of_each)).T
 
-    def _shares(
-        self, heats: Sequence[ThermalSystem], transmission: FloatArray, area: FloatArray
-    ) -> list[FloatArray]:
-        """Of the groups' irradiance by direction [n, G, K], what `before_windows` is asked for.
 
-        What the room's surfaces and windows take [W]; outer and inner layers of each group [W/m2];
-        what comes before all windows and what enters [W].
-        """
-        omega = KLEMS_FULL.projected_solid_angles()
-        entering = omega[:, None] * area[:, None, None] * (transmission / omega)  # [G, K, K] [W]
+def directional_sums(
+    outdoors: SeasonalOutdoors, skies: AnnualSky, shares: FloatArray
+) -> FloatArray:
+    """Weighted sums [n, L] [W/m2] over the directions of the groups' irradiance, in lit hours.
+
+    The n sums of D come before the many hours, which are multiplied in the skies' single precision.
+
+    Args: shares: [n, G, K] weights of the irradiance of each group from each patch.
+    """
+    if not outdoors.first.scene.groups:
+        return np.zeros((len(shares), len(skies.lit)))
+    weights = (shares * KLEMS_FULL.projected_solid_angles()).reshape(len(shares), -1)
+
+    def of_season(scene: PhaseScene, sky: FloatArray) -> FloatArray:
+        daylight = scene.parts.of_groups(scene.daylight.values)
+        rows = weights @ daylight.reshape(weights.shape[1], -1)
+        return (rows.astype(sky.dtype) @ sky).astype(float)
+
+    return outdoors.by_season(of_season, skies.solar)
+
+
+def solar_gains(
+    room: RoomInputs,
+    outdoors: SeasonalOutdoors,
+    zone: ThermalRoom,
+    outer: OuterFaces,
+    state: NDArray[np.int64],
+    *,
+    thermals: Sequence[Sequence[ThermalSystem]],
+    progress: Progress = silent,
+) -> tuple[Solar, Gains]:
+    """Solar radiation absorbed in the shading state of every hour [H], and its sums.
+
+    Args:
+        outer: points in front of the outer faces of the zone's surfaces.
+        thermals: thermal data of the window groups in each state [G][J].
+    """
+    steps = part(progress, 0.0, 0.8, "heat")
+    interior = interior_surfaces(room.space, "solar")
+    numbers = zone.surface_of_face[interior.surface]
+    in_sun = ZoneInSun(
+        Surfaces(
+            interior.triangles, interior.reflectance, numbers, gloss=_zone_gloss(interior, numbers)
+        ),
+        room.windows,
+        thermals,
+        facade_irradiance(
+            outdoors, outer, len(zone.zone.surfaces), room.skies, progress=part(steps, 0.4, 0.6)
+        ),
+    )
+    absorption: dict[bytes, FloatArray] = {}  # states with equal back reflectances share it
+    suns = []
+    for j in range(room.windows.states):
+        heats = _in_state(thermals, j)
         back = np.array([heat.back_reflectance for heat in heats])
-        absorbed = self.absorbed(back).transpose(2, 0, 1)[:, :, None]  # [F + G, G, 1, K]
-        each = np.eye(len(area))[..., None]
-        outer = each * np.stack([heat.absorptances.outer for heat in heats])
-        inner = each * np.stack([heat.absorptances.inner for heat in heats])
-        whole = np.stack([np.tile(area[:, None], len(omega)), entering.sum(axis=1)])
-        return [(absorbed @ entering)[:, :, 0], outer, inner, whole]
+        if heats and back.tobytes() not in absorption:
+            absorption[back.tobytes()] = absorption_matrix(
+                in_sun.interior, outdoors.first.scene.groups, window_reflectance=back,
+                progress=part(steps, 0.6, 1.0), **_sampled(outdoors.first),
+            ).values  # fmt: skip
+        absorbed = absorption.get(back.tobytes())
+        suns.append(_gains_in_state(in_sun, j, outdoors, room.skies, absorbed))
+    gains = {
+        name: np.stack([sums[name] for _, sums in suns])[state, np.arange(len(state))]
+        for name in suns[0][1]
+    }
+    return switched([solar for solar, _ in suns], state), gains
+
+
+def facade_irradiance(
+    outdoors: SeasonalOutdoors,
+    outer: OuterFaces,
+    surfaces: int,
+    skies: AnnualSky,
+    *,
+    progress: Progress = silent,
+) -> FloatArray:
+    """Irradiance on the outside of a zone's surfaces [H, F] [W/m2]; 0 of those indoors."""
+    facade = np.zeros((skies.hours, surfaces))
+
+    def of_season(scene: PhaseScene, sky: FloatArray) -> FloatArray:
+        coefficients = sky_irradiance_matrix(
+            scene.scene.exterior, outer.points, outer.normals,
+            subdivision=scene.sampling.subdivision, progress=progress, **_sampled(outdoors.first),
+        ).values  # [n, P] irradiance per unit radiance of each sky patch [sr]  # fmt: skip
+        return coefficients @ sky
+
+    if len(outer.surfaces):
+        lit = outdoors.by_season(of_season, skies.solar)
+        facade[:, outer.surfaces] = skies.whole_year(lit).T
+    return facade
+
+
+def _sampled(scene: PhaseScene) -> dict:
+    """Sampling of the matrices that are traced for the heat balance alone."""
+    return {
+        "samples": max(scene.sampling.patch_samples // BATCHES, 1),
+        "stopping": Stopping(batches=BATCHES),
+        "seed": scene.sampling.seed,
+        "cache": scene.cache,
+    }
+
+
+def _in_state(thermals: Sequence[Sequence[ThermalSystem]], state: int) -> list[ThermalSystem]:
+    """The thermal data of each group in a state; a group with fewer states is in its last."""
+    return [states[min(state, len(states) - 1)] for states in thermals]
+
+
+def _zone_gloss(interior: Surfaces, numbers: NDArray[np.int64]) -> tuple[Gloss | None, ...]:
+    """The gloss of the zone's surfaces; none for a surface of faces that differ in gloss."""
+    kinds: dict[int, set[Gloss | None]] = {}
+    for number, face in zip(numbers, interior.surface, strict=True):
+        kinds.setdefault(int(number), set()).add(interior.gloss[face] if interior.gloss else None)
+    if not interior.glossy:
+        return ()
+    uniform = {number: gloss.pop() for number, gloss in kinds.items() if len(gloss) == 1}
+    return tuple(uniform.get(number) for number in range(int(numbers.max()) + 1))
+
+
+def _gains_in_state(
+    zone: ZoneInSun,
+    state: int,
+    outdoors: SeasonalOutdoors,
+    skies: AnnualSky,
+    absorption: FloatArray | None,
+) -> tuple[Solar, Gains]:
+    """Solar radiation absorbed by window layers, surfaces and facades in one state, and its sums.
+
+    Args: absorption: [G, K, F + G] share of the flux of each window patch that each surface and
+        window absorbs; None for a room without windows.
+    """
+    group, facade = zone.windows.group, zone.facade
+    F = facade.shape[1]
+    if absorption is None:
+        dark = np.zeros((skies.hours, 0))
+        return Solar(dark, dark, np.zeros_like(facade), facade), {}
+    heats = _in_state(zone.thermals, state)
+    area = np.array([g.area for g in zone.windows.groups])
+    T = np.stack([s.solar.transmission_matrix() for s in zone.windows.in_state(state)])
+    shares = absorbed_shares(heats, T, area, absorption)
+    sums = np.split(
+        directional_sums(outdoors, skies, np.concatenate(shares)),
+        np.cumsum([len(s) for s in shares[:-1]]),
+    )
+    taken, outer, inner, whole = (rows.T for rows in sums)
+    retained = np.array([h.back_absorptance / max(1.0 - h.back_reflectance, 1e-9) for h in heats])
+
+    def year(values: NDArray) -> NDArray:
+        return skies.whole_year(np.ascontiguousarray(values.T)).T
+
+    solar = Solar(
+        absorbed_outer=year(outer[:, group]),
+        absorbed_inner=year(inner[:, group]),
+        inside=year(taken[:, :F]),
+        facade=facade,
+        window_inside=year((retained * taken[:, F:] / area)[:, group]),
+    )
+    gains = {
+        "incident_w": whole[:, 0],
+        "transmitted_w": whole[:, 1],
+        "absorbed_outer_w": outer @ area,
+        "absorbed_inner_w": inner @ area,
+        "absorbed_room_w": taken[:, :F].sum(axis=1),
+    }
+    return solar, {name: skies.whole_year(values) for name, values in gains.items()}
+
+
+def absorbed_shares(
+    heats: Sequence[ThermalSystem],
+    transmission: FloatArray,
+    area: FloatArray,
+    absorption: FloatArray,
+) -> list[FloatArray]:
+    """Weights of the groups' irradiance by direction [n, G, K] for `directional_sums`.
+
+    What the room's surfaces and windows absorb [W]; outer and inner layers of each group [W/m2];
+    what is incident on all windows and what they transmit [W].
+
+    Args: transmission: [G, K, K]; area: [G] [m2]; absorption: [G, K, F + G].
+    """
+    omega = KLEMS_FULL.projected_solid_angles()
+    entering = omega[:, None] * area[:, None, None] * (transmission / omega)  # [G, K, K] [W]
+    absorbed = absorption.transpose(2, 0, 1)[:, :, None]  # [F + G, G, 1, K]
+    each = np.eye(len(area))[..., None]
+    outer = each * np.stack([heat.absorptances.outer for heat in heats])
+    inner = each * np.stack([heat.absorptances.inner for heat in heats])
+    whole = np.stack([np.tile(area[:, None], len(omega)), entering.sum(axis=1)])
+    return [(absorbed @ entering)[:, :, 0], outer, inner, whole]

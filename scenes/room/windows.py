@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.drawn_shades import without_drawn_shades
 from bim.model import Building, Space
+from bim.report.issue import issue_text
 from bim.to_tracer import window_groups
 from mitsuba_cfs.surfaces import WindowGroup
 from scenes.fenestration.systems import FenestrationSystem, States
@@ -19,12 +20,10 @@ from scenes.fenestration.systems import FenestrationSystem, States
 if TYPE_CHECKING:
     from mitsuba_cfs.methods.optics import BsdfOptics
 
-T = TypeVar("T")
-
 
 @dataclass(frozen=True, slots=True)
 class RoomWindows:
-    """The window groups of a room (axis G), each with its systems by state."""
+    """The window groups of a room (axis G) with the systems of each shading state."""
 
     groups: list[WindowGroup]
     systems: tuple[States, ...]  # [G]
@@ -32,11 +31,11 @@ class RoomWindows:
 
     @property
     def states(self) -> int:
-        """J, how many states there are: of the group that has most; 1 of a room without windows."""
+        """Number of shading states J: of the group with the most; 1 for a room without windows."""
         return max((len(states) for states in self.systems), default=1)
 
     def optics(self) -> list[list[BsdfOptics]]:
-        """Each group's systems by state [G][J], as the methods take them."""
+        """Optics of each group's systems by state [G][J]."""
         from mitsuba_cfs.methods.optics import BsdfOptics  # a tracer, which no export needs
 
         known: dict[int, BsdfOptics] = {}
@@ -46,15 +45,17 @@ class RoomWindows:
                     known[id(system)] = BsdfOptics(system.visible, system.fine, system.angular)
         return [[known[id(system)] for system in states] for states in self.systems]
 
-    def of_state(self, state: int, what: Callable[[FenestrationSystem], T]) -> list[T]:
-        """What `what` makes of each group's system in a state; fewer states end with their last."""
-        return [what(states[min(state, len(states) - 1)]) for states in self.systems]
+    def in_state(self, state: int) -> list[FenestrationSystem]:
+        """The system of each group [G] in a state; a group with fewer states is in its last."""
+        return [states[min(state, len(states) - 1)] for states in self.systems]
 
 
 def room_windows(space: Space, systems: Mapping[str, States]) -> RoomWindows:
-    """The windows of a room in groups.
+    """The windows of a room in groups of one orientation and one system.
 
     Args: systems: of each window, by its GUID.
+
+    Raises: `ValueError` for a window without a system.
     """
     missing = [w.name or w.guid for w in space.windows if w.guid not in systems]
     if missing:
@@ -63,14 +64,14 @@ def room_windows(space: Space, systems: Mapping[str, States]) -> RoomWindows:
     for window in space.windows:
         key = tuple(id(system) for system in systems[window.guid])
         members.setdefault(key, []).append(window)
-    found: list[tuple[WindowGroup, States]] = []
+    grouped: list[tuple[WindowGroup, States]] = []
     for windows in members.values():
         states = systems[windows[0].guid]
         for group in window_groups(replace(space, windows=tuple(windows))):
             name = group.name if len(members) == 1 else f"{group.name}, {states[0].name}"
-            found.append((replace(group, name=name), states))
-    groups = [group for group, _ in found]
-    return RoomWindows(groups, tuple(states for _, states in found), _groups(space, groups))
+            grouped.append((replace(group, name=name), states))
+    groups = [group for group, _ in grouped]
+    return RoomWindows(groups, tuple(states for _, states in grouped), _groups(space, groups))
 
 
 def in_all_windows(space: Space, *states: FenestrationSystem) -> dict[str, States]:
@@ -94,32 +95,32 @@ def _groups(space: Space, groups: list[WindowGroup]) -> NDArray[np.int64]:
 
 
 SCATTERED = (
-    0.05  # share of the transmitted light beside the straight ray, above it there is a shade
+    0.05  # share of the transmitted light outside the straight ray; a system with more has a shade
 )
 
 _log = logging.getLogger(__name__)
 
 
 def traced_building(building: Building, systems: Mapping[str, States]) -> Building:
-    """The building without the devices that a window's BSDF holds; the log names each.
+    """The building without drawn shades that the BSDF of their window includes; each is logged.
 
     Args: systems: of each window, by its GUID.
     """
-    held = {id(system): holds_shade(system) for states in systems.values() for system in states}
+    shades = {id(system): has_shade(system) for states in systems.values() for system in states}
     shaded = {
-        guid for guid, states in systems.items() if any(held[id(system)] for system in states)
+        guid for guid, states in systems.items() if any(shades[id(system)] for system in states)
     }
-    building, problems = without_drawn_shades(building, shaded)
-    for problem in problems:
-        _log.warning("%s: %s", problem.what, problem.consequence)
+    building, issues = without_drawn_shades(building, shaded)
+    for issue in issues:
+        _log.warning("%s", issue_text(issue).line)
     return building
 
 
-def holds_shade(system: FenestrationSystem) -> bool:
-    """Whether a system holds a shade: by the stated place of its shade, else by its light.
+def has_shade(system: FenestrationSystem) -> bool:
+    """Whether a system includes a shade: by the stated position of its shade, else by scattering.
 
-    Clear panes pass light straight on, into one patch for each direction; slats and fabrics
-    scatter.  Light of all directions counts as from a uniform sky.
+    Clear panes transmit light straight on, into one patch for each direction; slats and fabrics
+    scatter. All directions count as under a uniform sky.
     """
     if system.shading_position is not None:
         return system.shading_position != "none"

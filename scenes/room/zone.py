@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bim.model import Space
-from bim.outer_faces import OuterFaces
+from bim.outer_faces import OuterFaces, outer_faces
 from bim.to_thermal import (
     ThermalRoom,
     coupled_rooms,
@@ -26,10 +26,15 @@ from mitsuba_cfs.stored_arrays import StoredArrays
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.matrices.view_factors import sky_shares
-from scenes.fenestration.thermal_system import ThermalSystem
+from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
+from scenes.results import DaylightResult
+from scenes.room.envelope import enveloped
+from scenes.room.inputs import RoomInputs
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import Occupancy
+from scenes.room.solar import SeasonalOutdoors, solar_gains
+from scenes.room.windows import RoomWindows
 from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.errors import ThermalInputError
@@ -38,56 +43,16 @@ from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
 from thermal.zone import Gains, Zone
 
-SAMPLES = 4096  # rays from each surface and window
-
-
-def under_the_sky(
-    room: ThermalRoom,
-    outer: OuterFaces,
-    exteriors: Sequence[tuple[Surfaces, float]],
-    *,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-) -> ThermalRoom:
-    """The room, its outer faces and windows with the share of the sky that they see.
-
-    Args:
-        exteriors: what stands outdoors, and the share of the year in which it does.
-        cache: where the shares are found and kept.
-    """
-    points = np.concatenate([outer.points, outer.windows])
-    normals = np.concatenate([outer.normals, outer.window_normals])
-    if not len(points) or not any(len(exterior.triangles) for exterior, _ in exteriors):
-        return room
-
-    def seen(exterior: Surfaces) -> NDArray[np.float64]:
-        inputs, by = (exterior.triangles, points, normals, SAMPLES, seed), sky_shares.__module__
-        entry = cache_entry(cache, "sky shares", *inputs, by=by, stopping=None)
-        return kept_or_found(
-            entry,
-            lambda: sky_shares(exterior, points, normals, samples=SAMPLES, seed=seed)[:, None],
-        )[:, 0]
-
-    shares = sum(share * seen(exterior) for exterior, share in exteriors).tolist()
-    zone, surfaces = room.zone, list(room.zone.surfaces)
-    for number, share in zip(outer.surfaces, shares, strict=False):  # the windows' follow
-        surfaces[number] = replace(surfaces[number], sky_seen=share)
-    windows = tuple(
-        replace(window, sky_seen=share)
-        for window, share in zip(zone.windows, shares[len(outer.surfaces) :], strict=True)
-    )
-    return replace(room, zone=replace(zone, surfaces=tuple(surfaces), windows=windows))
-
-
 FloatArray = NDArray[np.float64]
+SKY_SAMPLES = 4096  # rays from each surface and window to the sky
 COMPILING = "compiling the heat balance, once: about 10 s"
 RADIANT_SHARE = 0.5  # of the heat of people and equipment
-PERSON_VAPOUR = 50.0 / 3.6e6  # of somebody at a desk [kg/s]
+PERSON_VAPOUR = 50.0 / 3.6e6  # of a person at a desk [kg/s]
 
 
 @dataclass(frozen=True, slots=True)
 class RoomServices:
-    """What a room uses and holds besides temperatures: electricity, vapour, humidity."""
+    """Electricity, vapour and humidity control of a room."""
 
     equipment: FloatArray  # [H] power [W]
     vapour: FloatArray  # [H] [kg/s]
@@ -98,17 +63,20 @@ class RoomServices:
 
 @dataclass(frozen=True, slots=True)
 class RoomZone:
-    """A room traced and controlled: all that its heat balance needs, and what it comes from."""
+    """A room as a zone of the heat balance, with its solar gains, control and services."""
 
     space: Space
     room: ThermalRoom  # its zone with the windows' states, gains, air and set points
     solar: Solar
-    gains: dict[str, FloatArray]  # [H] sums of the sun by name [W]
+    gains: dict[str, FloatArray]  # [H] sums of solar radiation by name [W]
     state: NDArray[np.int64]  # [H] shading state
     lamps: FloatArray  # [H] power [W]
     occupied: NDArray[np.bool_]  # [H]
-    daylight: FloatArray | None  # [H] mean on the work plane [lx]; None: nothing asked for it
+    daylight: FloatArray | None  # [H] mean on the work plane [lx]; None: no control reads it
     services: RoomServices
+    fenestration: tuple[dict[str, float | str], ...] = ()  # `fenestration_table` of its windows
+    states: tuple[str, ...] = ()  # names of the shading states
+    operation: OperationTables | None = None
 
     @property
     def zone(self) -> Zone:
@@ -139,7 +107,7 @@ def balances(
 ) -> Sequence[ZoneResult]:
     """The years of rooms that exchange heat through their partitions and doors.
 
-    Args: store: where they lie, and what they come from; None: in memory.
+    Args: store: of the rooms and the results on disk; None: in memory.
     """
     if must_compile(advance):
         progress(COMPILING, 0.0)
@@ -156,34 +124,170 @@ def balances(
 def coupled(
     rooms: Sequence[RoomZone], door_m3_s: float
 ) -> tuple[list[RoomZone], FloatArray, tuple[str, ...]]:
-    """The rooms with heat flowing through the walls between them; see `coupled_rooms`.
+    """The rooms with heat flow through the walls between them; see `coupled_rooms`.
 
-    Args: door_m3_s: air each way through every open door between two of them [m3/s].
+    Args: door_m3_s: air each way through every open door between two rooms [m3/s].
 
-    Returns: the rooms, the air between them [Z, Z], and a sentence for every wall that has no
-        other face.
+    Returns: the rooms, the air between them [Z, Z] [m3/s], and a sentence for every wall without
+        another face.
     """
     spaces = [room.space for room in rooms]
     joined, notes = coupled_rooms(spaces, [room.room for room in rooms])
-    found = [replace(room, room=own) for room, own in zip(rooms, joined, strict=True)]
-    return found, door_links(spaces, door_m3_s), notes
+    zones = [replace(room, room=one) for room, one in zip(rooms, joined, strict=True)]
+    return zones, door_links(spaces, door_m3_s), notes
 
 
-def zone_surfaces(
-    space: Space, systems: Sequence[Sequence[ThermalSystem]], gains: Gains, air: float
-) -> ThermalRoom:
-    """A room's surfaces, and its windows W with their fenestration in every state, as a zone.
+@dataclass(frozen=True, slots=True)
+class ZoneSurfaces:
+    """A room's surfaces and windows as a zone, before its sun and its operation."""
 
-    Args: air: that leaks in [1/h].
+    room: ThermalRoom
+    thermals: list[list[ThermalSystem]]  # [G][J] of the window groups in each state
+    outer: OuterFaces
 
-    Raises: `RoomError` where its faces are no zone.
+
+def zone_surfaces(room: RoomInputs) -> ZoneSurfaces:
+    """The surfaces of a room, and its windows W with their fenestration in every state.
+
+    Raises: `RoomError` where its faces do not form a zone.
     """
+    space, thermals = room.space, thermal_systems(room.windows)
+    systems = [thermals[g] for g in room.windows.group]
+    gains = internal_gains(space, room.occupied, room.options.occupancy)
     first = systems[0][0].fenestration if systems else None
     try:
-        room = thermal_room(space, first, infiltration_ach=air, gains=gains)
+        bare = thermal_room(
+            space, first, infiltration_ach=room.options.infiltration_ach, gains=gains
+        )
     except ThermalInputError as error:
         raise RoomError(f"space {space.label}: {error}") from error
-    return replace(room, zone=_with_states(room.zone, systems))
+    thermal = replace(bare, zone=_with_states(bare.zone, systems))
+    return ZoneSurfaces(thermal, thermals, outer_faces(room.building, space, thermal))
+
+
+def thermal_systems(windows: RoomWindows) -> list[list[ThermalSystem]]:
+    """Thermal data of the window groups in each state [G][J]."""
+    return [[thermal_system(system) for system in states] for states in windows.systems]
+
+
+def work_plane(room: RoomInputs, daylight: DaylightResult | None) -> FloatArray | None:
+    """Mean illuminance of the work plane [H] [lx]; None where neither lamps nor control read it."""
+    if daylight is None or not reads_work_plane(room):
+        return None
+    return daylight.illuminance.mean(axis=1, dtype=float)
+
+
+def reads_work_plane(room: RoomInputs) -> bool:
+    """Whether lamps are dimmed or the shading is moved by daylight in the room."""
+    tables = room.operation
+    if tables is None or not room.space.windows:
+        return False
+    dimmed = tables.gains.lighting_w_m2 and tables.gains.lighting_dimmed
+    return tables.control.rule == "glare" or bool(dimmed)
+
+
+def room_zone(
+    room: RoomInputs,
+    surfaces: ZoneSurfaces,
+    outdoors: SeasonalOutdoors,
+    state: NDArray[np.int64],
+    daylight: DaylightResult | None = None,
+    *,
+    progress: Progress = silent,
+) -> RoomZone:
+    """The zone of a room in the shading state of every hour [H].
+
+    Args: daylight: dims the lamps; needed where `reads_work_plane`.
+    """
+    progress("heat", 0.0)
+    zone, lamps = surfaces.room, np.zeros(room.skies.hours)
+    plane = work_plane(room, daylight)
+    if room.operation is not None:
+        area = room.space.floor_area
+        operated_zone, lamps = operated(zone.zone, room.operation, area, room.weather, plane)
+        zone = enveloped(
+            replace(zone, zone=operated_zone), room.building, room.space, room.operation,
+            room.weather,
+        )  # fmt: skip
+        services = services_of(room.operation, area, room.weather)
+    else:
+        services = plain_services(room.space, room.occupied, room.options.occupancy)
+    shares = [len(season.months) / 12 for season in room.seasons]
+    exteriors = [scene.scene.exterior for scene in outdoors.scenes]
+    zone = with_sky_view(
+        zone, surfaces.outer, list(zip(exteriors, shares, strict=True)),
+        seed=room.options.sampling.seed, cache=room.cache,
+    )  # fmt: skip
+    solar, gains = solar_gains(
+        room, outdoors, surfaces.room, surfaces.outer, state,
+        thermals=surfaces.thermals, progress=progress,
+    )  # fmt: skip
+    return RoomZone(
+        room.space, zone, solar, gains, state, lamps, room.occupied, plane, services,
+        fenestration=tuple(fenestration_table(room.windows, surfaces.thermals)),
+        states=tuple(system.name for system in max(room.windows.systems, key=len, default=())),
+        operation=room.operation,
+    )  # fmt: skip
+
+
+def with_sky_view(
+    room: ThermalRoom,
+    outer: OuterFaces,
+    exteriors: Sequence[tuple[Surfaces, float]],
+    *,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
+) -> ThermalRoom:
+    """The room with the view factors to the sky of its outer faces and windows.
+
+    Args: exteriors: surfaces outdoors, and the share of the year in which they are there.
+    """
+    points = np.concatenate([outer.points, outer.windows])
+    normals = np.concatenate([outer.normals, outer.window_normals])
+    if not len(points) or not any(len(exterior.triangles) for exterior, _ in exteriors):
+        return room
+
+    def sky_view(exterior: Surfaces) -> NDArray[np.float64]:
+        inputs, by = (exterior.triangles, points, normals, SKY_SAMPLES, seed), sky_shares.__module__
+        entry = cache_entry(cache, "sky shares", *inputs, by=by, stopping=None)
+        return kept_or_found(
+            entry,
+            lambda: sky_shares(exterior, points, normals, samples=SKY_SAMPLES, seed=seed)[:, None],
+        )[:, 0]
+
+    shares = sum(share * sky_view(exterior) for exterior, share in exteriors).tolist()
+    zone, surfaces = room.zone, list(room.zone.surfaces)
+    for number, share in zip(outer.surfaces, shares, strict=False):  # then those of the windows
+        surfaces[number] = replace(surfaces[number], sky_seen=share)
+    windows = tuple(
+        replace(window, sky_seen=share)
+        for window, share in zip(zone.windows, shares[len(outer.surfaces) :], strict=True)
+    )
+    return replace(room, zone=replace(zone, surfaces=tuple(surfaces), windows=windows))
+
+
+def fenestration_table(
+    windows: RoomWindows, thermals: Sequence[Sequence[ThermalSystem]]
+) -> Iterator[dict[str, float | str]]:
+    """Properties of the windows at normal incidence, by group and state; each system once."""
+    seen = set()
+    for states, heats in zip(windows.systems, thermals, strict=True):
+        for system, heat in zip(states, heats, strict=True):
+            if id(system) in seen:
+                continue
+            seen.add(id(system))
+            visible = system.visible
+            yield {
+                "system": system.name,
+                "source": system.source,
+                "u_value": heat.fenestration.u_value,
+                "g_value": float(heat.g_value[0]),
+                "solar_transmittance": float(heat.transmittance[0]),
+                "solar_reflectance": float(heat.reflectance[0]),
+                "visible_transmittance": float(
+                    visible.direct_hemispherical(visible.transmission_front)[0]
+                ),
+            }
 
 
 def _with_states(zone: Zone, thermals: Sequence[Sequence[ThermalSystem]]) -> Zone:
@@ -195,7 +299,7 @@ def _with_states(zone: Zone, thermals: Sequence[Sequence[ThermalSystem]]) -> Zon
 
 
 def per_window(solar: Solar, zone: Zone) -> Solar:
-    """The sun with the state of each window: one with fewer states ends with its last."""
+    """The solar gains with the state of each window; one with fewer states is in its last."""
     most = np.array([len(window.states) - 1 for window in zone.windows], dtype=np.int64)
     return replace(solar, state=np.minimum(solar.state, most))
 
@@ -237,14 +341,14 @@ def operated(
 ) -> tuple[Zone, FloatArray]:
     """The zone with the gains, air and set points of the tables, and the lamps' power [H] [W].
 
-    Args: daylight: [H] mean illuminance of the work plane, which dims the lamps [lx]; None: nothing
-        dims them.
+    Args: daylight: [H] mean illuminance of the work plane [lx], by which the lamps are dimmed;
+        None: they are not dimmed.
     """
     hours, gains = OperationHours(tables, weather), tables.gains
     lamps = hours.lamps(floor_area)
     if daylight is not None and gains.lighting_dimmed:
         lamps = lamps * dimmed_share(daylight, gains.lighting_target_lx)
-    found = replace(
+    result = replace(
         zone,
         **hours.outdoor_air(),
         airing=hours.airing(zone.windows),
@@ -253,7 +357,7 @@ def operated(
         ),
         loads=hours.loads(),
     )
-    return found, lamps
+    return result, lamps
 
 
 def climate(weather: Weather) -> Climate:

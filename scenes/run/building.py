@@ -32,7 +32,7 @@ def read_building(
         surroundings_offset: added to their coordinates [m] in place of any georeference.
 
     Raises: `DataError` for a file that cannot be used; faults of the model are the building's
-        `problems`.
+        `issues`.
     """
     steps = summed(progress, "inputs", STAGES)
     options = ReadOptions(

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 
-from bim.model import CUT_OFF, Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Issue, issue_text
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
@@ -43,7 +44,7 @@ def chosen_spaces(
     if names:
         for space in chosen:
             if not lit(space):
-                about = [p for p in _lost(building, "window") if _says(p.what, space.name)]
+                about = [p for p in _lost(building, "window") if _names(p, space.name)]
                 why = f": {_quoted(about)}" if about else ""
                 raise DataError(f"has no window{why}", file=path, element=f"space {space.label}")
         return chosen
@@ -75,7 +76,7 @@ def _space(building: Building, name: str, path: Path) -> Space:
     try:
         return building.space(name)
     except (KeyError, ValueError) as error:
-        lost = [p for p in _lost(building, "room") if p.where == name or _says(p.what, name)]
+        lost = [p for p in _lost(building, "room") if p.where == name or _names(p, name)]
         if isinstance(error, KeyError) and lost:
             message = f"space {name!r} was left out: {_quoted(lost)}"
         else:
@@ -83,26 +84,29 @@ def _space(building: Building, name: str, path: Path) -> Space:
         raise DataError(message, file=path, field="space") from error
 
 
-def _lost(building: Building, kind: str) -> list[Problem]:
+def _lost(building: Building, kind: str) -> list[Issue]:
     """The problems for which a "room" or "window" is not there."""
-    return [problem for problem in building.problems if problem.lost == kind]
+    return [issue for issue in building.issues if issue.effect.lost == kind]
 
 
-def _says(text: str, name: str) -> bool:
-    """Whether a text holds a name as whole words."""
+def _names(issue: Issue, name: str) -> bool:
+    """Whether an issue concerns rooms of that name, or with that name as whole words in theirs."""
+    rooms = issue.values.get("rooms", issue.values.get("room", ""))
+    text = " + ".join(map(str, rooms)) if isinstance(rooms, tuple) else str(rooms)
     return re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text, re.IGNORECASE) is not None
 
 
 def _because(building: Building, kind: str) -> str:
-    cut_off = [problem for problem in building.problems if problem.kind == CUT_OFF]
+    cut_off = [issue for issue in building.issues if issue.code == "file-cut-off"]
     lost = [*cut_off, *_lost(building, kind)]
     return f": {_quoted(lost)}" if lost else ""
 
 
-def _quoted(problems: Sequence[Problem]) -> str:
+def _quoted(issues: Sequence[Issue]) -> str:
     """The first problems in one line, and how many more there are."""
-    shown = "; ".join(f"{p.what} ({p.consequence})" for p in problems[:QUOTED])
-    more = len(problems) - QUOTED
+    texts = [issue_text(issue, "command") for issue in issues[:QUOTED]]
+    shown = "; ".join(f"{text.what} ({text.effect})" for text in texts)
+    more = len(issues) - QUOTED
     return f"{shown}; and {more} more, see cfs ifc check" if more > 0 else shown
 
 

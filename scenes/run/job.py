@@ -13,7 +13,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.resolver import fill_windows, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_file import files_beside
-from scenes.room.inner_glass import lending_rooms, opened
+from scenes.room.inner_glass import opened, source_rooms
 from scenes.room.operation import Operation, check_states, stated_note, used_operation
 from scenes.room.operation_hours import check_schedules
 from scenes.room.windows import traced_building
@@ -62,7 +62,7 @@ def job_inputs(
     beyond: dict[str, list[Space]] = {}
     if inner:
         building = opened(building)
-        beyond = {space.guid: lending_rooms(building, space) for space in building.spaces}
+        beyond = {space.guid: source_rooms(building, space) for space in building.spaces}
     spaces = chosen_spaces(
         building, names, building.file, lambda s: bool(s.windows or beyond.get(s.guid))
     )

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from bim.account import NOT_USABLE
-from bim.model import JOINED, NOT_USED, TREES, Building
+from bim.model import Building
+from bim.report.issue import Issue, issue_text
 from mitsuba_cfs.sky.weather import Weather
 
-AT_THE_HEAD = (JOINED, NOT_USED, TREES)  # kinds of the model's problems that are notes of a run
+TREES = "trees-by-month"
+AT_THE_HEAD = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a run
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
 
 
 def model_notes(building: Building) -> tuple[str, ...]:
     """Whether the model will do, what of it was joined, and what of it no result depends on."""
-    told = (p for p in building.problems if p.kind in AT_THE_HEAD)
-    return (*_account_notes(building), *(f"{p.what}: {p.consequence}." for p in told))
+    issues = (
+        issue for issue in building.issues
+        if issue.severity == "unused" or issue.code in AT_THE_HEAD
+    )  # fmt: skip
+    return (*_account_notes(building), *map(_note, issues))
 
 
 def unused_notes(building: Building) -> tuple[str, ...]:
     """What of a building's file a command with uses, sensors and eyes of its own leaves out."""
     found = [*tree_notes(building)]
-    found += [f"{p.what}: {p.consequence}." for p in building.problems if p.kind == NOT_USED]
+    found += [_note(issue) for issue in building.issues if issue.severity == "unused"]
     held = {
         "uses of rooms": building.uses, "sensor grids": building.grids, "views": building.views,
     }  # fmt: skip
@@ -31,8 +36,11 @@ def unused_notes(building: Building) -> tuple[str, ...]:
 
 def tree_notes(building: Building) -> tuple[str, ...]:
     """How much light the trees outdoors let pass."""
-    told = (p for p in building.problems if p.kind == TREES)
-    return tuple(f"{p.what}: {p.consequence}." for p in told)
+    return tuple(_note(issue) for issue in building.issues if issue.code == TREES)
+
+
+def _note(issue: Issue) -> str:
+    return f"{issue_text(issue, 'command').line}."
 
 
 def _account_notes(building: Building) -> tuple[str, ...]:

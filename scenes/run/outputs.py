@@ -12,6 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from bim.names import folder_names
+from bim.report.issue import COLUMNS, issue_rows
 from mitsuba_cfs.files import write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.progress import Progress, silent
@@ -56,7 +57,7 @@ def write_results(
         names = folder_names([room.space for room in result.spaces])
         places = [temporary / name if several else temporary for name in names]
         _write_rooms(result, places, processes, progress)
-        write_table(_problems(result), temporary / "problems.csv", index=False)
+        write_table(_issues(result), temporary / "problems.csv", index=False)
         if netcdf:
             write_netcdf(result, temporary / NETCDF)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
@@ -176,6 +177,5 @@ def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:
     write_text(path, csv_text(table, index=index))
 
 
-def _problems(result: RunResult) -> pd.DataFrame:
-    rows = [(p.where, p.what, p.consequence) for p in result.problems]
-    return pd.DataFrame(rows, columns=["where", "what", "consequence"])
+def _issues(result: RunResult) -> pd.DataFrame:
+    return pd.DataFrame(issue_rows(result.issues, "command"), columns=list(COLUMNS))

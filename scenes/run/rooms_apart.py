@@ -1,4 +1,4 @@
-"""What computes a room of a run: here, in processes beside each other, or on a Dask cluster."""
+"""Rooms of a run computed in this process, in parallel processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Who computes the rooms of a run beside each other."""
+    """Processes or cluster that compute the rooms of a run in parallel."""
 
-    processes: int = 1  # rooms at a time on this machine
-    scheduler: str | None = None  # address of a Dask scheduler, whose workers then do
+    processes: int = 1  # on this machine, a room each
+    scheduler: str | None = None  # address of a Dask scheduler; its workers replace the processes
 
 
 @dataclass(frozen=True, slots=True)
 class RoomWork(Generic[R]):
-    """What is done with each room of a run."""
+    """The computation of each room of a run."""
 
     function: Callable[..., R]  # `compute_room` or `lit_room`
     inputs: JobInputs
@@ -44,7 +44,7 @@ class RoomWork(Generic[R]):
     options: JobOptions
 
     def __call__(self, space: Space, progress: Progress = silent) -> R:
-        """What comes of a room."""
+        """The result of a room."""
         inputs, options = self.inputs, self.options
         cache = MatrixCache.of_user() if options.cache else None
         return self.function(
@@ -53,10 +53,10 @@ class RoomWork(Generic[R]):
             colour=options.colour, inner=options.inner_glass, progress=progress,
         )  # fmt: skip
 
-    def beside(
+    def parallel(
         self, spaces: Sequence[Space], *, workers: Workers
     ) -> Generator[tuple[Space, R | BaseException]]:
-        """Each room, in any order, with its result or with why it has none."""
+        """Each room with its result or its error, in any order."""
         rooms = {space.guid: space for space in spaces}
         here = workers.scheduler is None
         run = "" if here else _identity(self.options, self.inputs)
@@ -69,13 +69,13 @@ class RoomWork(Generic[R]):
                 yield rooms[guid], result
 
     def of(self, guid: str) -> R:
-        """What comes of the room with a GUID."""
+        """The result of the room with a GUID."""
         return self(next(space for space in self.spaces if space.guid == guid))
 
 
 @dataclass(frozen=True, slots=True)
 class _Here(Generic[R]):
-    """A room by its GUID, with inputs that were read before."""
+    """Computes a room by its GUID, from inputs in memory."""
 
     work: RoomWork[R]
 
@@ -86,14 +86,14 @@ class _Here(Generic[R]):
 
 @dataclass(frozen=True, slots=True)
 class _FromFiles(Generic[R]):
-    """A room by its GUID, with inputs read where it is computed, once in each process.
+    """Computes a room by its GUID, from files read on the worker, once in each process.
 
-    Raises: `DataError` where the files there, or the program, are not those of the command.
+    Raises: `DataError` for a worker with other files or another version of the program.
     """
 
     function: Callable[..., R]
     options: JobOptions
-    run: str  # its identity
+    run: str  # `_identity` of the run
 
     def __call__(self, guid: str) -> tuple[str, R]:
         variants.activate()
@@ -115,7 +115,7 @@ def _failed(guid: str, error: BaseException) -> tuple[str, BaseException]:
 
 
 def _identity(options: JobOptions, inputs: JobInputs) -> str:
-    """What tells the rooms of this run from those of others: options, program, files' contents."""
-    said = [repr(options), code_version(__name__)]
-    said += map(sha256, input_files(options, inputs).values())
-    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:16] + "-"
+    """Hash of options, program and contents of the files, before the keys of a run's rooms."""
+    parts = [repr(options), code_version(__name__)]
+    parts += map(sha256, input_files(options, inputs).values())
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16] + "-"

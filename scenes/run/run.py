@@ -11,7 +11,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import TypeVar
 
-from bim.model import Building, Problem, Space
+from bim.model import Building, Space
+from bim.report.issue import Issue, issue_text
 from bim.sensors import held_grids
 from bim.templates import same_hues
 from bim.to_thermal import same_surfaces
@@ -28,9 +29,9 @@ from scenes.fenestration.thermal_system import thermal_system
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult
 from scenes.room.heat import DaylitRoom, coupled_years
-from scenes.room.inner_glass import lending_rooms
+from scenes.room.inner_glass import source_rooms
 from scenes.room.operation_tables import OperationTables
-from scenes.room.room_year import compute_room, lit_room
+from scenes.room.room import compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
 from scenes.room.skies import skies_for
 from scenes.run.files import JobFiles
@@ -116,10 +117,10 @@ def run_inputs(
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     progress("sky", 1.0)
     heard = {"on_room": on_room, "on_light": on_light, "workers": workers}
-    results, problems, notes = _rooms(inputs, skies, options, progress, **heard)
+    results, issues, notes = _rooms(inputs, skies, options, progress, **heard)
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
-    holes = [problem for result in results for problem in result.problems]
+    holes = [issue for result in results for issue in result.issues]
     manifest = _manifest(options, variant, inputs, used, results)
     manifest["seconds"] = round(time.monotonic() - start, 1)
     notes = [
@@ -132,7 +133,7 @@ def run_inputs(
         *_state_notes(inputs, options),
         *notes,
         *(result.borrowed for result in results if result.borrowed),
-        *(f"{hole.what}: {hole.consequence}." for hole in holes),
+        *(f"{issue_text(hole, 'command').line}." for hole in holes),
         *weather.notes,
         *site_notes(building, weather),
     ]
@@ -141,7 +142,7 @@ def run_inputs(
         weather.midpoints,
         sun,
         results,
-        (*building.problems, *problems, *holes),
+        (*building.issues, *issues, *holes),
         manifest,
         tuple(dict.fromkeys(notes)),
         room.method,
@@ -157,7 +158,7 @@ def _rooms(
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
     workers: Workers | None = None,
-) -> tuple[Sequence[RoomYear], list[Problem], list[str]]:
+) -> tuple[Sequence[RoomYear], list[Issue], list[str]]:
     """The results of the rooms in their order, what was left out, and what was given twice."""
     spaces = run_spaces(inputs, options)
     store = StoredArrays() if len(spaces) > 1 else None
@@ -165,8 +166,8 @@ def _rooms(
         alone = RoomWork(compute_room, inputs, spaces, skies, options)
         series = _series(alone, workers, alone, moved_result, store)
         series = replace(series, on_room=on_room or (lambda room: None))
-        found, problems, notes = series.results(progress)
-        return _passed(found, store), problems, notes
+        found, issues, notes = series.results(progress)
+        return _passed(found, store), issues, notes
 
     def compute_light(space: Space, steps: Progress) -> DaylitRoom:
         found = light(space, steps)
@@ -176,13 +177,13 @@ def _rooms(
     light = RoomWork(lit_room, inputs, spaces, skies, options)
     together = _series(light, workers, compute_light, moved_light, store, same_surfaces)
     heard = on_light or (lambda room: None)
-    together = replace(together, on_room=heard, given="daylight, glare and sun are")
-    lit, problems, notes = together.results(progress)
+    together = replace(together, on_room=heard, shared="daylight, glare and sun are")
+    lit, issues, notes = together.results(progress)
     years, said = _coupled(lit, inputs, options, progress, store)
     found = _passed(years, store)
     for room in found if on_room is not None else ():
         on_room(room)
-    return found, problems, [*notes, *said]
+    return found, issues, [*notes, *said]
 
 
 def _passed(rooms: list[RoomYear], store: StoredArrays | None) -> Sequence[RoomYear]:
@@ -223,9 +224,7 @@ def _series(
 
     def borrows(*spaces: Space) -> bool:
         """Whether what a room gets depends on a neighbour: then none stands for another."""
-        return options.inner_glass and any(
-            lending_rooms(inputs.building, space) for space in spaces
-        )
+        return options.inner_glass and any(source_rooms(inputs.building, space) for space in spaces)
 
     return RoomSeries(
         inputs.building,
@@ -243,8 +242,8 @@ def _series(
             and (not options.colour or same_hues(one, other))
             and alike(one, other)
         ),
-        beside=None if workers is None else partial(work.beside, workers=workers),
-        kept=(lambda result: result) if store is None else store.kept,
+        parallel=None if workers is None else partial(work.parallel, workers=workers),
+        stored=(lambda result: result) if store is None else store.kept,
     )
 
 

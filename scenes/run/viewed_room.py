@@ -16,7 +16,7 @@ from mitsuba_cfs.progress import Progress
 from scenes.fenestration.resolver import fill_windows, source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, Given
 from scenes.room.glare import band_scenes
-from scenes.room.leaks import hole_notes
+from scenes.room.leaks import leak_notes
 from scenes.room.windows import room_windows, traced_building
 from scenes.run.building import read_building
 from scenes.run.inputs import chosen_spaces
@@ -39,7 +39,7 @@ class ViewedRoom:
     def notes(self) -> tuple[str, ...]:
         """What fills the windows, what its data lack, and light that is lost; traces a little."""
         own = (note for system in self.systems for note in system.notes)
-        holes = hole_notes(self.space, cache=MatrixCache.of_user())
+        holes = leak_notes(self.space, cache=MatrixCache.of_user())
         trees = tree_notes(self.seasons[0].building) if self.seasons else ()
         return tuple(dict.fromkeys([*trees, *source_notes(self.sources), *own, *holes]))
 

@@ -32,7 +32,7 @@ from scenes.heat.box import box_building
 from scenes.results import RoomYear
 from scenes.room.operation import Operation, check_states, read_operation, used_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room_year import RoomChoices, compute_room
+from scenes.room.room import RoomChoices, compute_room
 from scenes.room.skies import skies_for
 from scenes.room.windows import traced_building
 from scenes.run.inputs import read_weather

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bim.model import Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue
 from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.calibration.durations import spoken_time
 from scenes.report.glare_figures import compass
@@ -62,12 +63,10 @@ class StudyResult:
         )
 
     @property
-    def problems(self) -> tuple[Problem, ...]:
+    def issues(self) -> tuple[Issue, ...]:
         """The faults of all building models, each once."""
-        found = {}
-        for building, _ in self.plan.rooms.values():
-            found |= {(p.where, p.what): p for p in building.problems}
-        return tuple(found.values())
+        buildings = (building for building, _ in self.plan.rooms.values())
+        return tuple(dict.fromkeys(issue for one in buildings for issue in one.issues))
 
     @property
     def table(self) -> pd.DataFrame:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bim.ifc.results_write import SET_NAME, write_results
-from bim.model import Problem, Space
+from bim.model import Space
+from bim.report.issue import Issue
 from mitsuba_cfs.files import replacing
 from scenes.study.case import Case, InputFile
 from scenes.study.files import one_building
@@ -16,7 +17,7 @@ from scenes.study.study import StudyResult
 OF_WINDOWS = ("fenestration", "u_value", "g_value", "visible_transmittance", "solar_transmittance")
 
 
-def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
+def write_study_ifc(study: StudyResult, out: Path) -> tuple[Issue, ...]:
     """Write `out`: the building with a property set for each case on its space and windows.
 
     A set is named after its case, "CFS results: system, climate, angle, method".
@@ -28,7 +29,7 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
         for case, result in zip(study.plan.cases, study.results, strict=True)
         if not result.error
     ]
-    problems: dict[tuple[str, str], Problem] = {}
+    issues: dict[Issue, None] = {}
     with replacing(out, field="--write-ifc") as part:
         for name, cases in _by_variant(done).items():
             values = {}
@@ -36,9 +37,9 @@ def write_study_ifc(study: StudyResult, out: Path) -> tuple[Problem, ...]:
                 _, space = study.plan.rooms[case.scene]
                 values |= _values(space, case, result)
             found = write_results(source, values, part, set_name=f"{SET_NAME}: {name}")
-            problems |= {(p.where, p.what): p for p in found}
+            issues |= dict.fromkeys(found)
             source = part
-    return tuple(problems.values())
+    return tuple(issues)
 
 
 def _by_variant(

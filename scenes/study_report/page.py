@@ -8,6 +8,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from bim.report.issue import issue_rows
 from mitsuba_cfs.files import write_text
 from scenes.language.catalogue import decimal, in_language, said
 from scenes.page_options import OWN_PAGE, PageOptions
@@ -133,7 +134,7 @@ def problems_table(study: StudyResult) -> tables.Table:
         for label in ("Where", "What", "Consequence and repair")
     )
     return tables.Table(
-        said("By element"), columns, tuple((p.where, p.what, p.consequence) for p in study.problems)
+        said("By element"), columns, tuple(row[:3] for row in issue_rows(study.issues, "command"))
     )
 
 

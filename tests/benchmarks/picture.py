@@ -48,7 +48,7 @@ class PictureScene:
     """The room, its blind and its sky, for both programs."""
 
     def __init__(self, folder: Path) -> None:
-        from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+        from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
 
         fenestration = PicturedSystem("blind", folder)
         moment = moments(read_epw(WEATHER))[MOMENT]

@@ -29,6 +29,7 @@ from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.processes import ProcessEnded, answer_apart, each_apart
 from tests.bim.small_ifc import HEIGHT, WALL, WIDTH, box_model, box_room
 from tests.bim.test_enclosure import box, room
+from tests.issues import of_code
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -132,8 +133,9 @@ def test_room_whose_booleans_end_the_process_is_named_and_the_others_stay(tmp_pa
     small.model.write(str(path))
     building = read_ifc(path)
     assert [space.name for space in building.spaces] == ["B"]
-    (named,) = [p for p in building.problems if "SIGSEGV" in p.consequence]
-    assert named.what == "room A: its boundary cannot be built" and named.lost == "room"
+    (named,) = of_code(building, "room-not-closed")
+    assert "SIGSEGV" in named.values["reason"]
+    assert named.values["room"] == "A" and named.effect.lost == "room"
 
 
 def test_walls_whose_distance_ends_the_process_are_named(tmp_path, monkeypatch):
@@ -142,7 +144,7 @@ def test_walls_whose_distance_ends_the_process_are_named(tmp_path, monkeypatch):
     box_room().write(str(path))
     building = read_ifc(path)
     assert len(building.spaces) == 1
-    assert any("its distance to other walls" in p.what for p in building.problems)
+    assert of_code(building, "wall-distance-not-computed")
 
 
 def two_spaces(path, **more):
@@ -158,23 +160,24 @@ def test_space_whose_solid_ends_the_process_is_named_and_the_others_stay(tmp_pat
     monkeypatch.setattr(bim.guarded, "_space", space_that_dies)
     building = two_spaces(tmp_path / "model.ifc")
     assert [space.name for space in building.spaces] == ["A"]
-    (named,) = [p for p in building.problems if "SIGSEGV" in p.what]
-    assert named.what.startswith("space B: its geometry: ") and named.lost == "room"
+    (named,) = of_code(building, "space-not-computed")
+    assert "SIGSEGV" in named.values["reason"]
+    assert named.values["room"] == "B" and named.effect.lost == "room"
 
 
 @pytest.mark.parametrize(
-    ("function", "what", "done"),
+    ("function", "code", "values"),
     [
-        ("_solid", "IfcWall south: its body: ", "its surfaces are used as they are"),
-        ("_shared", "space A: what it shares with others: ", "taken as nothing"),
-        ("_united", "rooms A, B: ", "not joined"),
+        ("_solid", "body-not-computed", {"element": "IfcWall south"}),
+        ("_shared", "overlap-not-computed", {"room": "A"}),
+        ("_united", "rooms-not-joined", {"rooms": ("A", "B")}),
     ],
 )
-def test_boolean_that_ends_the_process_is_named(tmp_path, monkeypatch, function, what, done):
+def test_boolean_that_ends_the_process_is_named(tmp_path, monkeypatch, function, code, values):
     monkeypatch.setattr(bim.guarded, function, gaps_that_die)
     building = two_spaces(tmp_path / "model.ifc", join=["A + B"])
-    (named, *_) = [p for p in building.problems if p.what.startswith(what)]
-    assert "SIGSEGV" in named.what and named.consequence == done
+    (named, *_) = (i for i in of_code(building, code) if values.items() <= i.values.items())
+    assert "SIGSEGV" in named.values["reason"]
     assert building.spaces
 
 
@@ -183,11 +186,10 @@ def test_wall_whose_opening_ends_the_process_is_left_out_and_named(tmp_path, mon
     small, _ = box_model()
     small.box("IfcWall", "before", (-1.0, -WALL - 0.3, 0.0), (6.0, 0.2, 3.0))
     small.model.write(str(path))
-    (named,) = [p for p in read_ifc(path).problems if "covers the glass" in p.what]
-    assert named.consequence == "cut open there"
+    assert of_code(read_ifc(path), "element-cut-open")
     monkeypatch.setattr(bim.guarded, "_opened", gaps_that_die)
-    (named,) = [p for p in read_ifc(path).problems if "covers the glass" in p.what]
-    assert named.consequence.startswith("left out: a library ended its process by signal SIGSEGV")
+    (named,) = of_code(read_ifc(path), "element-not-cut-open")
+    assert named.values["reason"].startswith("a library ended its process by signal SIGSEGV")
 
 
 @pytest.mark.parametrize(("error", "left_out"), [(RoomError, True), (ValueError, False)])
@@ -245,8 +247,8 @@ def test_element_that_ends_the_search_is_named_and_the_rest_gives_the_room(tmp_p
     building = read_ifc(path)
     (space,) = building.spaces
     assert len(space.windows) == 1
-    (named,) = [p for p in building.problems if "SIGSEGV" in p.what]
-    assert "post" in named.what and named.consequence == "left out of the search for rooms"
+    (named,) = of_code(building, "element-not-in-room-search")
+    assert "post" in named.values["element"] and "SIGSEGV" in named.values["reason"]
 
 
 def test_search_that_takes_too_long_is_stopped_and_named(tmp_path, monkeypatch):
@@ -255,7 +257,8 @@ def test_search_that_takes_too_long_is_stopped_and_named(tmp_path, monkeypatch):
     box_room(space=False).write(str(path))
     building = read_ifc(path)
     assert building.spaces == ()
-    assert any("not finished after" in p.what and p.lost == "room" for p in building.problems)
+    (named,) = of_code(building, "room-search-failed")
+    assert "not finished after" in named.values["reason"] and named.effect.lost == "room"
 
 
 def test_more_work_than_the_budget_is_left_undone_and_counted(monkeypatch):

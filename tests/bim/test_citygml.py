@@ -268,7 +268,7 @@ def test_systems_of_the_states_are_known_by_rule(text, crs):
 def test_other_systems_are_refused_by_name_unless_there_is_an_offset(tmp_path, house):
     system = "urn:adv:crs:DE_DHDN_3GK3*DE_DHHN92_NH"
     path = written(tmp_path, model(WHOLE, system=system))
-    with pytest.raises(DataError, match=r"DHDN_3GK3.*give --surroundings-offset"):
+    with pytest.raises(DataError, match=r"DHDN_3GK3.*give the offset"):
         with_surroundings(house, [path])
     (one,) = with_surroundings(house, [path], offset=-CORNER + (20, 0, 0)).elements
     np.testing.assert_allclose(one.triangles.reshape(-1, 3).max(axis=0), [26, 8, 8], atol=1e-6)

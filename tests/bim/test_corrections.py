@@ -18,6 +18,7 @@ from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
 from scenes.commands.ifc import command
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALLS, WIDTH, box_model, box_room
+from tests.issues import of_code
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ visible = 0.66
     assert (floor.reflectance_visible, floor.reflectance_solar) == (0.11, 0.22)
     values = {round(face.reflectance_visible, 2) for face in faces if face.kind == "wall"}
     assert values == {0.66, 0.5}
-    assert any("corrections are used" in problem.what for problem in building.problems)
+    assert of_code(building, "corrections-used")
     assert "south again" in names(read_ifc(path, corrections=Corrections()))
 
 

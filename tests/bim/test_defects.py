@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from bim.ifc.building import read_ifc
+from bim.ifc.defects import DRAWN_TWICE
 from bim.model import Building
+from bim.report.issue import Phrase, issue_text
 from bim.shell import enclosed_volume, open_edges
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WIDTH, SmallIfc, box_room
+from tests.issues import codes, of_code
 
 VOLUME = WIDTH * DEPTH * HEIGHT
 BOX_FACES = ((3, 2, 1, 0), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -32,10 +35,10 @@ def read(tmp_path, model) -> Building:
     return building
 
 
-def problem(building: Building, text: str):
-    """The one problem of that text."""
-    (found,) = [p for p in building.problems if text in p.what]
-    return found
+def issue(building: Building, code: str):
+    """The one issue of that code."""
+    (result,) = of_code(building, code)
+    return result
 
 
 def named(model, ifc_class: str, name: str):
@@ -75,21 +78,23 @@ def as_brep(model, product, low, size, *, faces=BOX_FACES, inverted: bool = Fals
 @pytest.mark.parametrize("space", [True, False])
 def test_slit_between_walls_is_named_and_closed(tmp_path, schema, gap, space):
     building = read(tmp_path, box_room(schema, gap=gap, space=space))
-    assert f"{gap * 1000:.0f} mm apart" in problem(building, "do not meet").what
+    assert issue(building, "walls-do-not-meet").values["gap_mm"] == pytest.approx(1000 * gap)
     (room,) = building.spaces
     # found rooms reach into the slit, and their details below 1 mm are smoothed
     assert room.room_volume == pytest.approx(VOLUME, rel=1e-9 if space else 2e-3)
     assert room.windows[0].area == pytest.approx(GLASS_AREA, rel=1e-3)
     if not space:
-        closed = problem(building, "has no spaces").consequence
-        assert ("100 mm closed" in closed) == (gap > 0.02)
+        repair = issue(building, "rooms-from-geometry").values["repair"]
+        assert (repair == Phrase("gaps-closed", {"gap_mm": 100.0})) == (gap > 0.02)
 
 
 def test_sound_room_has_no_problem_with_its_walls(tmp_path, schema):
     building = read(tmp_path, box_room(schema))
-    text = " ".join(p.what for p in building.problems)
-    for words in ("do not meet", "no geometry", "not sound", "out of its opening", "drawn twice"):
-        assert words not in text
+    assert not set(codes(building)) & {
+        "walls-do-not-meet", "element-without-geometry", "window-without-geometry",
+        "space-without-geometry", "body-not-sound", "space-repaired", "room-not-sound",
+        "glass-out-of-opening", "glass-moved-into-opening", DRAWN_TWICE,
+    }  # fmt: skip
 
 
 # its opening reaches from 0.1 m before the wall to 0.1 m behind it, and the pane lies in its middle
@@ -101,7 +106,8 @@ def test_window_out_of_its_wall(tmp_path, schema, off, y):
     matrix[1, 3] = -0.25 - off
     ifcopenshell.api.geometry.edit_object_placement(model, product=window, matrix=matrix)
     building = read(tmp_path, model)
-    assert f"{off * 1000:.0f} mm out of its opening" in problem(building, "out of its").what
+    code = "glass-out-of-opening" if off < 1 else "glass-moved-into-opening"
+    assert issue(building, code).values["offset_mm"] == pytest.approx(1000 * off)
     (glass,) = building.windows
     assert glass.area == pytest.approx(GLASS_AREA, rel=1e-5)
     assert glass.centre[1] == pytest.approx(y, abs=1e-5)
@@ -113,7 +119,7 @@ def test_wall_without_items_and_wall_without_representation(tmp_path, schema):
     named(model, "IfcWall", "west").Representation = None
     building = read(tmp_path, model)
     guids = {named(model, "IfcWall", name).GlobalId for name in ("east", "west")}
-    reported = {p.where for p in building.problems if "geometry" in p.what}
+    reported = {p.where for p in building.issues if "geometry" in p.code}
     assert guids <= reported
     assert building.spaces[0].room_volume == pytest.approx(VOLUME, rel=1e-9)
 
@@ -136,14 +142,16 @@ def test_open_shells_of_a_wall_and_a_space(tmp_path, schema):
     as_brep(model, wall, (WIDTH, 0, 0), (WALL, DEPTH, HEIGHT), faces=BOX_FACES[:5])
     as_brep(model, space, (0, 0, 0), (WIDTH, DEPTH, HEIGHT), faces=BOX_FACES[1:])
     building = read(tmp_path, model)
-    assert "holes capped" in problem(building, "east: its body is not sound").what
-    assert problem(building, "its shell was not sound").consequence == "holes capped"
+    body = issue(building, "body-not-sound").values
+    assert body == {"element": "IfcWall east", "repair": Phrase("holes-capped")}
+    assert issue(building, "space-repaired").values["repair"] == Phrase("holes-capped")
     assert building.spaces[0].room_volume == pytest.approx(VOLUME, rel=1e-9)
 
 
 def test_missing_material_gets_a_stated_default(tmp_path, schema):
     building = read(tmp_path, box_room(schema))
-    assert "EN ISO 10456" in problem(building, "material unnamed").consequence
+    incomplete = issue(building, "material-incomplete")
+    assert incomplete.where == "unnamed" and "EN ISO 10456" in issue_text(incomplete).effect
 
 
 def test_repeated_guid_of_rooms_keeps_both(tmp_path, schema):
@@ -153,7 +161,7 @@ def test_repeated_guid_of_rooms_keeps_both(tmp_path, schema):
                      model.by_type("IfcBuildingStorey")[0], 1.0)  # fmt: skip
     small.box("IfcSpace", "R2", (10, 0, 0), (3, 3, 3), GlobalId=one.GlobalId)
     building = read(tmp_path, model)
-    assert "used 2 times" in problem(building, "GlobalId is used 2").what
+    assert issue(building, "guid-repeated").values["count"] == 2
     assert len({space.guid for space in building.spaces}) == len(building.spaces) >= 1
 
 

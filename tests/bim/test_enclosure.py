@@ -13,9 +13,11 @@ from bim.enclosure import (
     touching_parts,
 )
 from bim.ifc.building import read_ifc
+from bim.report.issue import Phrase
 from bim.shell import enclosed_volume, open_edges
 from bim.solids import solid_of, triangles_of
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WALL, WALLS, WIDTH, box_room
+from tests.issues import of_code
 
 VOLUME = WIDTH * DEPTH * HEIGHT
 
@@ -108,5 +110,6 @@ def test_file_without_spaces_gets_its_room_and_window(tmp_path, schema):
     assert space.room_volume == pytest.approx(VOLUME, rel=1e-3)  # details below 1 mm are smoothed
     assert space.windows[0].area == pytest.approx(GLASS_AREA, rel=1e-3)
     assert open_edges(space.shell) == 0
-    assert any("has no spaces" in problem.what for problem in building.problems)
+    (found,) = of_code(building, "rooms-from-geometry")
+    assert found.values["lack"] == Phrase("no-spaces")
     assert space.guid == read_ifc(path).spaces[0].guid  # the same in every run

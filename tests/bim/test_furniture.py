@@ -9,6 +9,7 @@ import pytest
 
 from bim.defaults import FURNITURE_REFLECTANCE
 from bim.ifc.building import read_ifc
+from bim.report.issue import issue_text
 from bim.sensors import sensor_grid, view_point
 from bim.templates import room_features
 from bim.to_radiance import write_radiance
@@ -18,6 +19,7 @@ from mitsuba_cfs.methods.sampling import Sampling
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
 from tests.bim.small_ifc import DEPTH, OPENING, WIDTH, box_model
+from tests.issues import of_code
 
 CABINET = (1.5, 2.5, 0.0), (1.0, 1.0, 2.0)  # in the middle of the room: low corner, size [m]
 SHELF = (0.05, DEPTH / 2, 0.9), (WIDTH - 0.1, DEPTH / 2 - 0.05, 0.02)  # over its northern half
@@ -46,10 +48,9 @@ def room(path):
 def test_furniture_is_left_out_and_counted_unless_it_is_wanted(path):
     building = read_ifc(path)
     assert building.spaces[0].furniture == ()
-    (said,) = [p for p in building.problems if "furniture" in p.what]
-    assert (said.what, said.consequence) == (
-        "6 piece(s) of furniture", "left out; --furniture counts them",
-    )  # fmt: skip
+    (said,) = of_code(building, "furniture-left-out")
+    assert said.values["count"] == 6 and "--furniture" in issue_text(said, "command").fix
+    assert "furniture=True" in issue_text(said).fix
 
 
 def test_each_piece_stands_in_its_room_with_its_reflectance(path, room):
@@ -60,9 +61,11 @@ def test_each_piece_stands_in_its_room_with_its_reflectance(path, room):
         "Folding screen": FURNITURE_REFLECTANCE, "Gardine": FURNITURE_REFLECTANCE,
     }  # fmt: skip
     assert not {e.name for e in building.elements} & {*found, "Vorhang", "Bench"}
-    said = {p.what: p.consequence for p in building.problems}
-    assert said["IfcFurniture Bench: stands in no room"] == "left out"
-    assert "cfs ifc attach" in said["IfcFurniture Vorhang: hangs at window W1"]
+    (bench,) = of_code(building, "furniture-in-no-room")
+    assert bench.values["element"] == "IfcFurniture Bench"
+    (curtain,) = of_code(building, "curtain-at-window")
+    assert (curtain.values["element"], curtain.values["window"]) == ("IfcFurniture Vorhang", "W1")
+    assert "cfs ifc attach" in issue_text(curtain, "command").fix
 
 
 def test_heat_knows_no_furniture_and_light_does(room):

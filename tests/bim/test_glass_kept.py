@@ -13,9 +13,11 @@ from bim.ifc.defects import DRAWN_TWICE
 from bim.outdoors import SHUT_IN
 from bim.planes import plane_through
 from bim.rays import hemisphere, ray_mesh
+from bim.report.issue import Phrase
 from bim.rooms import Attachment, room_pieces, room_solid
 from bim.solids import prism
 from tests.bim.small_ifc import DEPTH, FRAME, GLASS_AREA, HEIGHT, OPENING, WIDTH, box_model
+from tests.issues import of_code
 
 RECESS = 0.15  # from the room's faces to the glass [m]
 LOW_WINDOW = (1.0, 1.8, 1.2, 0.4)  # x, sill, width, height [m]
@@ -69,9 +71,9 @@ def test_glass_that_is_lost_in_the_cutting_is_said(tmp_path, monkeypatch):
         return faces, [], assumed
 
     monkeypatch.setattr(reading, "faces_and_windows", without_windows)
-    (problem,) = lost(path)
-    assert problem.glass == pytest.approx(GLASS_AREA, rel=1e-6)
-    assert problem.what.startswith("IfcWindow W1: 3.64 m2 before R1")
+    (issue,) = lost(path)
+    assert issue.effect.glass == pytest.approx(GLASS_AREA, rel=1e-6)
+    assert (issue.values["element"], issue.values["room"]) == ("IfcWindow W1", "R1 Room")
 
 
 def test_a_window_that_is_drawn_twice_has_lost_nothing(tmp_path):
@@ -81,8 +83,7 @@ def test_a_window_that_is_drawn_twice_has_lost_nothing(tmp_path):
     small.model.write(str(path))
     building = read_ifc(path)
     assert sum(window.area for window in building.spaces[0].windows) == pytest.approx(GLASS_AREA)
-    assert any(problem.kind == DRAWN_TWICE for problem in building.problems)
-    assert not [problem for problem in building.problems if problem.kind == "lost glass"]
+    assert of_code(building, DRAWN_TWICE) and not of_code(building, "glass-lost")
 
 
 def test_a_window_that_is_drawn_twice_sees_what_it_sees_alone(tmp_path):
@@ -114,8 +115,9 @@ def test_a_wall_beyond_every_horizon_is_left_out(tmp_path):
     building = read_ifc(path)
     names = {element.name for element in building.elements}
     assert "beside" in names and "stray" not in names
-    (said,) = [problem.what for problem in building.problems if "km away" in problem.what]
-    assert said == "IfcWall stray: stands 1726 km away from every room"
+    (said,) = of_code(building, "element-far-away")
+    assert said.values["element"] == "IfcWall stray"
+    assert said.values["distance_km"] == pytest.approx(1726, abs=0.5)
 
 
 @pytest.mark.parametrize("closed", [True, False])
@@ -133,9 +135,9 @@ def test_a_window_to_a_closed_porch_is_said(tmp_path, closed):
     path = tmp_path / "model.ifc"
     small.model.write(str(path))
     building = read_ifc(path)
-    said = [problem for problem in building.problems if problem.kind == SHUT_IN]
+    said = of_code(building, SHUT_IN)
     assert len(building.spaces[0].windows) == 1
-    assert [problem.glass for problem in said] == pytest.approx([GLASS_AREA] if closed else [])
+    assert [issue.effect.glass for issue in said] == pytest.approx([GLASS_AREA] if closed else [])
     assert building.account.shut_in == pytest.approx(GLASS_AREA if closed else 0.0)
 
 
@@ -151,9 +153,9 @@ def test_glass_above_a_room_and_behind_a_screen_is_said(tmp_path):
     left = GLASS_AREA - sum(w.area for space in building.spaces for w in space.windows)
     assert left > 0.4 * GLASS_AREA
     assert building.account.glass_out == pytest.approx(GLASS_AREA, rel=1e-3)
-    (problem,) = [p for p in building.problems if p.glass > 0]
-    assert problem.glass == pytest.approx(left, rel=1e-3)
-    assert "lie above the top of room R1" in problem.what or "no room behind" in problem.what
+    (issue,) = [p for p in building.issues if p.effect.glass > 0]
+    assert issue.effect.glass == pytest.approx(left, rel=1e-3)
+    assert issue.code in ("glass-above-room", "window-partly-without-room")
 
 
 @pytest.mark.parametrize("clear", [False, True], ids=["nothing clear", "all clear"])
@@ -191,9 +193,8 @@ def test_a_drawn_frame_without_a_pane_leaves_its_glass_free(hosted, tmp_path):
     small.model.write(str(path))
     building = read_ifc(path)
     assert sum(w.area for w in building.spaces[0].windows) == pytest.approx(GLASS_AREA, rel=1e-3)
-    assert any(
-        p.consequence == "glass from what its drawn frame leaves free" for p in building.problems
-    )
+    (said,) = of_code(building, "window-without-glass")
+    assert said.values["source"] == Phrase("free-of-frame")
 
 
 @pytest.mark.parametrize("frame_first", [True, False])
@@ -217,9 +218,9 @@ def test_a_frame_drawn_for_itself_around_a_window_is_no_second_one(frame_first, 
     expected = GLASS_AREA if glazed else 0.7 * width * height
     assert sum(w.area for w in building.spaces[0].windows) == pytest.approx(expected, rel=2e-3)
     assert building.account.glass_out == pytest.approx(expected, rel=2e-3)
-    assert [p.kind for p in building.problems].count("frame of a window") == 1
+    assert len(of_code(building, "frame-of-window")) == 1
 
 
 def lost(path) -> list:
     """What is said of glass that became no window."""
-    return [problem for problem in read_ifc(path).problems if problem.kind == "lost glass"]
+    return of_code(read_ifc(path), "glass-lost")

@@ -26,6 +26,7 @@ from bim.to_tracer import exterior_surfaces, interior_surfaces
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import dielectric, lacquer, mirror, pane
 from tests.bim.small_ifc import SmallIfc, box_room
+from tests.issues import of_code
 
 
 def building_with(tmp_path, style: str = "wall", **entries):
@@ -102,14 +103,17 @@ def test_panes_that_a_window_sees_mirror_as_clear_glazing():
     opposite = pane_before_the_window((0, -12.02, 0), (4, 0.02, 3))
     beside = pane_before_the_window((5, -0.05, 0), (2, 0.02, 3))
     behind = pane_before_the_window((0, 9, 0), (2, 0.02, 3))
-    parts, problems = mirrors_in_view([opposite, beside, behind], [window])
+    parts, issues = mirrors_in_view([opposite, beside, behind], [window])
     bright = [part for part in parts if part.gloss is not None]
     assert [part.triangles[..., 1].mean() for part in bright] == [pytest.approx(-12.0)]
     assert bright[0].gloss is CLEAR_GLAZING and bright[0].reflectance_visible == 0.0
     assert sum(len(part.triangles) for part in parts) == 3 * len(opposite.triangles)
     assert {part.reflectance_visible for part in parts if part.gloss is None} == {0.15}
-    (problem,) = problems
-    assert problem.what.startswith("1 panes outdoors before a window (first pane)")
+    (issue,) = issues
+    assert (issue.code, issue.values) == (
+        "panes-assumed-mirroring",
+        {"count": 1, "element": "pane"},
+    )
 
 
 def test_clear_glazing_mirrors_as_two_panes():
@@ -133,7 +137,7 @@ def test_the_outdoors_of_a_file_mirror_by_default(tmp_path):
     found = read_ifc(path)
     panes = [e for e in found.elements if e.name == "opposite" and e.gloss is not None]
     assert panes and all(e.gloss is CLEAR_GLAZING for e in panes)
-    assert any("panes outdoors" in problem.what for problem in found.problems)
+    assert of_code(found, "panes-assumed-mirroring")
 
 
 def test_corrections_give_a_gloss(tmp_path):

@@ -18,7 +18,7 @@ def path(tmp_path):
     return path
 
 
-def test_check_shows_rooms_and_problems(path, tmp_path):
+def test_check_shows_rooms_and_issues(path, tmp_path):
     table = tmp_path / "problems.csv"
     result = CliRunner().invoke(
         command, ["check", str(path), "--csv", str(table)], catch_exceptions=False

@@ -7,11 +7,13 @@ import pytest
 
 from bim.ifc.building import read_ifc
 from bim.ifc.corrections import Corrections
+from bim.report.issue import issue_text
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import WEATHER
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WALLS, WIDTH, empty_project
+from tests.issues import of_code, texts
 
 THICK = 0.2  # of the partition [m]
 PASSAGE = (1.0, 2.1)  # width, height of the opening in it [m]
@@ -38,16 +40,19 @@ def two_rooms(tmp_path, *, depth: float = THICK, cut: bool = True):
 
 
 def reported(building, text: str) -> bool:
-    return any(text in problem.what for problem in building.problems)
+    return text in texts(building)
 
 
 def test_open_rooms_are_reported_and_kept_apart(tmp_path):
     building = read_ifc(two_rooms(tmp_path))
     assert len(building.spaces) == 2
-    (problem,) = [p for p in building.problems if "open to each other" in p.what]
-    assert problem.what == "rooms North and South are open to each other by 2.1 m2"
-    assert "--join 'North + South'" in problem.consequence
-    assert 'join = [["North", "South"]] in two.corrections.toml' in problem.consequence
+    (issue,) = of_code(building, "rooms-open-to-each-other")
+    assert issue.values["rooms"] == ("North", "South")
+    assert issue.values["area"] == pytest.approx(2.1, abs=0.05)
+    fix = issue_text(issue, "command").fix
+    assert "--join 'North + South'" in fix
+    assert 'join = [["North", "South"]] in two.corrections.toml' in fix
+    assert "join=('North + South',)" in issue_text(issue).fix
 
 
 def test_niche_is_no_passage(tmp_path):

@@ -10,10 +10,12 @@ import shapely
 
 from bim.guarded import united
 from bim.ifc.building import read_ifc
-from bim.model import JOINED, Building
+from bim.model import Building
 from bim.planes import plane_through
+from bim.report.issue import issue_text
 from bim.solids import packed, unpacked
 from tests.bim.small_ifc import DEPTH, HEIGHT, WIDTH, SmallIfc, box_model
+from tests.issues import of_code, texts
 
 SOUTH = 3.0  # depth of the room with the window [m]
 DOORWAY = (1.5, 0.0, 1.0, 2.1)  # x, sill, width, height
@@ -101,8 +103,9 @@ def test_rooms_drawn_to_the_axis_of_a_wall_are_open_at_its_doorway_once(tmp_path
     partition(small, SOUTH - 0.15, 0.3, DOORWAY)
     building = read(small, tmp_path)
     assert open_areas(building, "dark") == pytest.approx([2.1], rel=1e-6)
-    (said,) = [p for p in building.problems if "open to each other" in p.what]
-    assert said.what == "rooms dark and lit are open to each other by 2.1 m2"
+    (said,) = of_code(building, "rooms-open-to-each-other")
+    assert said.values["rooms"] == ("dark", "lit") and said.values["count"] == 1
+    assert said.values["area"] == pytest.approx(2.1, abs=0.05)
 
 
 def test_rooms_open_by_a_door_and_by_more_are_reported_once(tmp_path):
@@ -110,9 +113,10 @@ def test_rooms_open_by_a_door_and_by_more_are_reported_once(tmp_path):
     partition(small, SOUTH, 0.2, (0.2, 0.0, 0.9, 2.0), (1.5, 0.0, 2.0, 2.5))
     building = read(small, tmp_path)
     assert open_areas(building, "dark") == pytest.approx([1.8, 5.0], rel=1e-6)
-    (said,) = [p for p in building.problems if "open to each other" in p.what]
-    assert said.what == "rooms dark and lit are open to each other by 6.8 m2 in 2 openings"
-    assert "--join open joins all" in said.consequence
+    (said,) = of_code(building, "rooms-open-to-each-other")
+    assert said.values["rooms"] == ("dark", "lit") and said.values["count"] == 2
+    assert said.values["area"] == pytest.approx(6.8, abs=0.05)
+    assert "--join open joins all" in issue_text(said, "command").fix
     assert read(small, tmp_path, join=["open"]).space("dark").name == "lit + dark"
 
 
@@ -133,14 +137,14 @@ def test_rooms_are_joined_where_they_open_by_more_than_a_door(tmp_path):
     small = two_rooms()
     small.box("IfcWall", "half", (0, SOUTH - 0.1, 0), (WIDTH - 1.1, 0.2, HEIGHT))
     apart = read(small, tmp_path)
-    assert any("--join open joins all" in problem.consequence for problem in apart.problems)
+    assert "--join open joins all" in texts(apart)
     building = read(small, tmp_path, join=["open"])
     (room,) = building.spaces
     assert room.name == "lit + dark"
     assert room.room_volume == pytest.approx(WIDTH * DEPTH * HEIGHT, rel=1e-5)
-    (said,) = [p for p in building.problems if p.kind == JOINED]
-    assert said.what == "Rooms lit, dark: open to each other by up to 3.3 m2"
-    assert said.consequence == "joined as one room: larger than a door (3 m2)"
+    (said,) = of_code(building, "rooms-joined-by-size")
+    assert said.values["rooms"] == ("lit", "dark") and said.values["limit"] == 3
+    assert said.values["area"] == pytest.approx(3.3, abs=0.05)
 
 
 def test_a_doorway_does_not_join(tmp_path):

@@ -9,6 +9,7 @@ import ifcopenshell.api.spatial
 import pytest
 
 from bim.ifc.building import read_ifc
+from bim.report.issue import issue_text
 from bim.shell import open_edges
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, OPENING, WALL, WIDTH, box_model
 
@@ -23,8 +24,8 @@ def read(tmp_path, small):
 
 
 def said(building) -> str:
-    (problem,) = [p for p in building.problems if "with no slab between" in p.what]
-    return problem.consequence
+    (issue,) = (i for i in building.issues if i.code in ("room-raised", "room-too-low"))
+    return issue_text(issue).effect
 
 
 def test_space_below_its_glass_is_raised_to_the_roof(tmp_path):
@@ -35,7 +36,7 @@ def test_space_below_its_glass_is_raised_to_the_roof(tmp_path):
     assert open_edges(room.shell) == 0
     assert building.account.glass_used == pytest.approx(GLASS_AREA, rel=1e-3)
     assert (building.account.low, building.account.raised) == ((), ("R1 Room",))
-    assert said(building) == f"raised by 1.50 m, {WIDTH * DEPTH * 1.5:.1f} m3 more"
+    assert said(building) == (f"it is raised by 1.50 m, which adds {WIDTH * DEPTH * 1.5:.1f} m3")
     ceiling = max(room.faces, key=lambda face: face.triangles[..., 2].mean())
     assert (ceiling.kind, ceiling.reflectance_visible) == ("roof", pytest.approx(0.8))
 
@@ -64,7 +65,8 @@ def test_ceiling_that_nobody_drew_is_assumed_where_little_would_be_won(tmp_path)
     building = read(tmp_path, box_model(space_height=2.0)[0])
     assert building.spaces[0].raised == 0.0
     assert (
-        said(building) == "kept: the 1.00 m above it may be the void of a ceiling that is not drawn"
+        said(building)
+        == "it is kept as drawn: the 1.00 m above it may be the void of a ceiling that is not drawn"
     )
     assert building.account.low == ("R1 Room",)
 
@@ -88,7 +90,7 @@ def test_stated_ceiling_is_believed(tmp_path, relation):
         ifcopenshell.api.pset.edit_qto(small.model, qto=quantities, properties=heights)
     building = read(tmp_path, small)
     assert building.spaces[0].raised == 0.0
-    assert "kept: " in said(building) and "eiling" in said(building)
+    assert "kept as drawn: " in said(building) and "eiling" in said(building)
 
 
 @pytest.mark.parametrize("height", [LOW, HEIGHT])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from bim.building_file import read_building_file
 from bim.gbxml.building import read_gbxml
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
+from tests.issues import of_code
 
 MATERIALS = """
 <Construction id="wall"><Name>Wall</Name><LayerId layerIdRef="l1"/>
@@ -111,8 +113,8 @@ def test_rooms_have_their_areas_and_volumes(building):
 
 
 def test_what_a_space_states_otherwise_is_said(building):
-    (said,) = [p for p in building.problems if "states" in p.what]
-    assert "Hall: states 30.00 m2 floor area, drawn 32.00 m2" in said.what
+    (said,) = of_code(building, "floor-area-differs")
+    assert said.values == {"room": "Hall", "stated": 30.0, "drawn": pytest.approx(32.0)}
 
 
 def test_the_window_looks_out_and_states_its_type(building):
@@ -146,8 +148,8 @@ def test_level_surfaces_that_are_named_walls_are_floors_and_ceilings(tmp_path):
     assert kinds["Office-roof"] == ("ceiling", "adiabatic")
     assert kinds["Office-floor"] == ("floor", "adiabatic")
     assert kinds["Office-south"] == ("wall", "outside")
-    (said,) = [p for p in found.problems if "lie level" in p.what]
-    assert said.what == "4 surface(s) of type InteriorWall lie level"
+    (said,) = of_code(found, "walls-level")
+    assert said.values == {"count": 4, "type": "InteriorWall"}
 
 
 def test_a_space_without_surfaces_or_area_is_no_room(tmp_path):
@@ -155,9 +157,9 @@ def test_a_space_without_surfaces_or_area_is_no_room(tmp_path):
     empty = '<Space id="Shades"><Name>Shades</Name></Space><Space id="Room"><Area>9</Area></Space>'
     text = two_rooms().replace("<BuildingStorey", empty + "<BuildingStorey", 1)
     found = read_gbxml(written(tmp_path, text))
-    lost = [p.where for p in found.problems if p.lost == "room"]
+    lost = [p.where for p in found.issues if p.effect.lost == "room"]
     assert (len(found.spaces), lost) == (2, ["Room"])
-    assert "space Shades: no surface bounds it" in " ".join(p.what for p in found.problems)
+    assert [i.where for i in of_code(found, "space-without-surfaces")] == ["Shades"]
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("Meters", 0.2), ("Feet", 0.2 * 0.3048)])
@@ -179,7 +181,7 @@ def test_a_window_type_of_noughts_states_nothing(tmp_path):
     found = read_gbxml(written(tmp_path, text))
     (window,) = found.windows
     assert (window.u_value, window.g_value, window.visible_transmittance) == (None, None, None)
-    assert "window type Unit: its U and g are 0" in [p.what for p in found.problems]
+    assert [i.values["type"] for i in of_code(found, "window-type-of-zeros")] == ["Unit"]
 
 
 def test_a_material_without_resistance_is_left_out(tmp_path):
@@ -187,7 +189,7 @@ def test_a_material_without_resistance_is_left_out(tmp_path):
     found = read_gbxml(written(tmp_path, text))
     south = next(f for f in found.spaces[0].faces if f.name == "Office-south")
     assert [layer.name for layer in south.construction.layers] == ["Brick"]
-    assert any("material Wool: states neither" in p.what for p in found.problems)
+    assert [i.values["material"] for i in of_code(found, "resistance-missing")] == ["Wool"]
 
 
 def test_north_is_turned(tmp_path):
@@ -217,7 +219,6 @@ def test_air_between_rooms_is_joined(tmp_path):
          "Opening window: Coordinate: expected a number, got 'low'"),
         ('spaceIdRef="Hall"', 'spaceIdRef="Attic"', ": AdjacentSpaceId: no Space 'Attic'"),
         ('materialIdRef="wool"', 'materialIdRef="straw"', "Layer l1: no Material 'straw'"),
-        ('unit="WPerMeterK"', 'unit="x"', "Material brick: Conductivity: unit 'x'"),
         ('lengthUnit="Meters"', 'lengthUnit="Ells"', "gbXML: lengthUnit: 'Ells'"),
         ("gbXML", "cityXML", "expected gbXML, got cityXML"),
         ("</Campus>", "", "is no XML: mismatched tag"),
@@ -231,6 +232,39 @@ def test_faults_are_one_line_with_element_and_field(tmp_path, old, new, said):
         read_gbxml(path)
     assert str(caught.value).startswith(str(path)) and said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where", "reason"),
+    [
+        ('unit="WPerMeterK"', 'unit="x"', "Material brick", "unit 'x'"),
+        ('unit="WPerSquareMeterK">1.1', 'unit="y">1.1', "WindowType unit", "unit 'y'"),
+        ('type="IntVis" unit="Fraction">0.6', 'type="IntVis" unit="Fraction">six',
+         "Reflectance", "got 'six'"),
+    ],
+)  # fmt: skip
+def test_a_value_that_cannot_be_read_is_an_issue_and_refuses_no_file(
+    tmp_path, old, new, where, reason
+):
+    text = two_rooms()
+    assert old in text
+    building = read_gbxml(written(tmp_path, text.replace(old, new)))
+    (issue,) = [one for one in building.issues if one.code == "value-not-read"]
+    assert issue.where == where and reason in issue.values["reason"]
+    assert len(building.spaces) == 2
+
+
+def test_glass_with_one_room_on_both_sides_is_an_issue(tmp_path):
+    """The surface of the window is made inner, and names its own room twice."""
+    text = two_rooms()
+    start = text.rindex("<Surface ", 0, text.index('<Opening id="window"'))
+    end = text.index("</Surface>", start)
+    surface = text[start:end].replace("ExteriorWall", "InteriorWall")
+    (room,) = re.findall(r'<AdjacentSpaceId spaceIdRef="[^"]*"\s*/>', surface)
+    path = written(tmp_path, text[:start] + surface.replace(room, 2 * room) + text[end:])
+    (issue,) = [one for one in read_gbxml(path).issues if one.code == "glass-within-room"]
+    assert (issue.where, issue.effect.lost) == ("window", "window")
+    assert issue.effect.glass == pytest.approx(4.5)
 
 
 def test_the_suffix_leads_to_it(tmp_path):

@@ -14,6 +14,7 @@ from bim.building_file import read_building_file
 from bim.honeybee.building import read_honeybee
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
+from tests.issues import of_code
 from thermal.glazing_unit import Environment, GlazingLayer, GlazingUnit
 from thermal.iso15099 import Conditions, iso15099_g_values, iso15099_u_value
 
@@ -74,7 +75,7 @@ def test_faces_drawn_inside_out_are_turned(tmp_path):
     model["rooms"][0]["faces"][4]["geometry"]["boundary"].reverse()
     found = read_honeybee(write(model, tmp_path))
     assert found.space("Office").volume == pytest.approx(120)
-    assert any("inside out" in problem.what for problem in found.problems)
+    assert of_code(found, "polygons-inside-out")
 
 
 def test_rooms_open_to_each_other_become_one(tmp_path):
@@ -83,7 +84,7 @@ def test_rooms_open_to_each_other_become_one(tmp_path):
         model["rooms"][room]["faces"][face] |= {"face_type": "AirBoundary", "doors": None}
     path = write(model, tmp_path)
     apart = read_honeybee(path)
-    assert any("open to another room" in problem.what for problem in apart.problems)
+    assert of_code(apart, "room-boundary-open")
     (one,) = read_honeybee(path, join=["Office + Hall"]).spaces
     assert (one.floor_area, one.volume, len(one.windows)) == pytest.approx((72, 216, 2))
     assert not open_edges(one.shell)
@@ -109,8 +110,8 @@ def test_a_window_beside_its_wall_is_lost_and_said(tmp_path):
         point[1] -= 0.5
     found = read_honeybee(write(model, tmp_path))
     assert not found.space("Office").windows
-    (lost,) = [p for p in found.problems if p.lost == "window"]
-    assert lost.glass == pytest.approx(4.5)
+    (lost,) = [p for p in found.issues if p.effect.lost == "window"]
+    assert lost.effect.glass == pytest.approx(4.5)
     assert found.account.glass_used == pytest.approx(2.0)
 
 
@@ -175,10 +176,10 @@ def test_sensors_and_views_come_along_and_what_is_not_used_is_named(tmp_path):
     assert (view.name, view.view.kind, view.view.horizontal_deg) == ("desk", "angular", 180)
     np.testing.assert_allclose(view.view.position, [2.0, 3.0, 1.2])
     np.testing.assert_allclose(view.view.direction, [0, -1, 0], atol=1e-12)
-    said = {p.what: p.consequence for p in found.problems if p.kind == "not used"}
-    assert said["view nowhere: its fields give no view"] == "left out"
-    assert said["1 shade(s) with states: Overhang"] == "their own modifier holds all year"
-    assert said["1 shade(s) let light through by a schedule: Overhang"] == "opaque"
+    unused = {i.code: i.values for i in found.issues if i.severity == "unused"}
+    assert unused["view-unreadable"] == {"view": "nowhere"}
+    assert unused["shades-with-states"] == {"count": 1, "shades": ("Overhang",)}
+    assert unused["shades-by-schedule"] == {"count": 1, "shades": ("Overhang",)}
 
 
 def test_states_of_glass_are_states_of_the_window(tmp_path):
@@ -203,8 +204,8 @@ def test_states_of_glass_are_states_of_the_window(tmp_path):
         assert through == pytest.approx(passed, rel=1e-3)
         assert state.u_value == 1.1
     assert found.states[0].g_normal == 0.5 and found.states[1].g_normal is None
-    (lost,) = [p.what for p in building.problems if "its states" in p.what]
-    assert lost == "Window: 1 of its states are neither a BSDF nor a pane of glass"
+    (lost,) = of_code(building, "states-not-optical")
+    assert lost.values == {"element": "Window", "count": 1}
 
 
 def test_u_is_of_nfrcs_winter_and_g_of_its_summer(tmp_path):

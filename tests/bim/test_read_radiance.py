@@ -207,11 +207,12 @@ def test_what_is_not_used_is_named_once_with_its_count(tmp_path):
     )
     scene = read_radiance(write(tmp_path, text))
     assert len(scene.objects) == 2
-    told = [problem.what for problem in scene.problems]
-    assert [line.split(" (")[0] for line in told] == [
-        "patterns and textures of materials", "source", "mixfunc", "surfaces of mixfunc",
+    assert [(issue.code, issue.values["type"]) for issue in scene.issues] == [
+        ("material-patterns-left-out", ""), ("primitives-not-read", "source"),
+        ("primitives-not-read", "mixfunc"), ("surfaces-not-read", "mixfunc"),
     ]  # fmt: skip
-    assert "(3, first square)" in told[3]
+    last = scene.issues[3].values
+    assert (last["count"], last["first"]) == (3, "square")
 
 
 @pytest.mark.parametrize(

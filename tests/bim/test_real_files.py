@@ -12,6 +12,7 @@ from bim.to_radiance import write_radiance
 from mitsuba_cfs.errors import DataError
 from tests.bim.test_exports import run_energyplus
 from tests.bim.test_to_radiance import SKY_ALL_ROUND, TRACE, blackened, radiance, run, sky_share
+from tests.issues import of_code
 
 __all__ = ["radiance"]  # a fixture
 FILES = {  # rooms, windows: counted by eye in the files' own lists of spaces and windows
@@ -70,9 +71,7 @@ def test_every_file_is_read_or_refused_in_one_line(real_data):
             assert path.name in str(error) and "\n" not in str(error)
             continue
         for space in building.spaces:
-            reported = any(
-                "open edges" in p.what for p in building.problems if p.where == space.guid
-            )
+            reported = any(i.where == space.guid for i in of_code(building, "room-with-open-edges"))
             assert (open_edges(space.shell) > 0) == reported
             areas = space.area_as_stated, space.stated_area
             volumes = space.drawn_volume, space.stated_volume

@@ -51,8 +51,8 @@ def test_results_are_found_again_and_replaced(path, tmp_path):
 def test_rooms_without_an_entity_and_wrong_values(path, tmp_path):
     out = tmp_path / "out.ifc"
     space = read_ifc(path).spaces[0].guid
-    (problem,) = write_results(path, {space: {"DA": 1.0}, NOBODY: {"DA": 2.0}}, out)
-    assert problem.where == NOBODY
+    (issue,) = write_results(path, {space: {"DA": 1.0}, NOBODY: {"DA": 2.0}}, out)
+    assert issue.where == NOBODY
     out.unlink()
     with pytest.raises(DataError, match="none of the elements"):
         write_results(path, {NOBODY: {"DA": 2.0}}, out)

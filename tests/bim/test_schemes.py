@@ -11,6 +11,7 @@ from bim.ifc.building import read_ifc
 from bim.ifc.materials import default_material
 from tests.bim.small_ifc import DEPTH, GLASS_AREA, HEIGHT, WIDTH, add_material, box_model
 from tests.bim.test_account import read
+from tests.issues import of_code
 
 GROSS = ((-0.1, -0.1, 0.0), (WIDTH + 0.2, DEPTH + 0.2, HEIGHT))
 NET = ((0.0, 0.0, 0.0), (WIDTH, DEPTH, HEIGHT))
@@ -38,8 +39,8 @@ def test_gross_and_net_of_one_room_are_one_and_the_scheme_is_named(tmp_path, att
     (room,) = building.spaces
     assert room.name == "net"
     assert [window.area for window in room.windows] == [pytest.approx(GLASS_AREA, rel=1e-4)]
-    (said,) = [p for p in building.problems if "drawn several times" in p.what]
-    assert f"those of {schemes[1]} are the rooms" in said.consequence
+    (said,) = of_code(building, "rooms-of-several-schemes")
+    assert said.values["chosen"] == schemes[1]
     account = building.account
     assert (account.rooms, account.spaces, account.overlapping, account.missing) == (1, 1, (), ())
 
@@ -105,4 +106,4 @@ def test_heat_capacity_in_kilojoules_is_taken_as_such_and_named(tmp_path):
     layers = [layer for face in building.spaces[0].faces for layer in face.construction.layers]
     (found,) = {layer.heat_capacity for layer in layers if layer.name == "Strange stuff"}
     assert found == pytest.approx(920.0)
-    assert any("taken as kJ/(kg K)" in p.consequence for p in building.problems)
+    assert of_code(building, "heat-capacity-in-kilojoules")

@@ -6,6 +6,7 @@ import ifcopenshell
 import pytest
 
 from bim.ifc.building import read_ifc
+from bim.report.issue import Issue
 from tests.bim.small_ifc import DEPTH, HEIGHT, OPENING, WIDTH, box_model
 
 OPENED = OPENING[2] * OPENING[3]
@@ -43,7 +44,7 @@ def boundary(model, space, element, width, height, *, hole, beyond, curve="IfcPo
     )  # fmt: skip
 
 
-def problems(tmp_path, changed=None, schema="IFC4", **how) -> list[str]:
+def issues(tmp_path, changed=None, schema="IFC4", **how) -> list[Issue]:
     """What is said of the box room's boundaries, some of them changed."""
     small, _ = box_model(schema)
     model = small.model
@@ -53,7 +54,7 @@ def problems(tmp_path, changed=None, schema="IFC4", **how) -> list[str]:
         boundary(model, space, elements[name], width, height, hole=hole, beyond=beyond, **how)
     path = tmp_path / "model.ifc"
     model.write(str(path))
-    return [p.what for p in read_ifc(path).problems if "boundaries" in p.what]
+    return [i for i in read_ifc(path).issues if i.code.startswith("boundar")]
 
 
 @pytest.mark.parametrize("curve", ["IfcPolyline", "IfcCompositeCurve"])
@@ -61,11 +62,9 @@ def problems(tmp_path, changed=None, schema="IFC4", **how) -> list[str]:
 @pytest.mark.parametrize("hole", [False, True])
 def test_boundaries_that_agree_are_counted(tmp_path, curve, schema, hole):
     south = {"south": (WIDTH, HEIGHT, hole, "EXTERNAL")}
-    (said,) = problems(tmp_path, south, schema, curve=curve)
-    assert said == (
-        "has 5 second-level space boundaries of 5 pairs of room and element: 5 agree with ours"
-        " within 5 %"
-    )
+    (said,) = issues(tmp_path, south, schema, curve=curve)
+    assert said.code == "boundaries-compared"
+    assert said.values == {"count": 5, "pairs": 5, "agreeing": 5, "percent": 5, "unread": 0}
 
 
 def test_each_difference_is_named(tmp_path):
@@ -73,18 +72,21 @@ def test_each_difference_is_named(tmp_path):
         "north": (WIDTH, 0.8 * HEIGHT, False, "EXTERNAL"),
         "west": (DEPTH, HEIGHT, False, "INTERNAL"),
     }
-    head, *rest = problems(tmp_path, changed)
-    assert ": 3 agree" in head
-    north, west = sorted(rest)
+    head, *rest = issues(tmp_path, changed)
+    assert head.values["agreeing"] == 3
+    north, west = sorted(rest, key=lambda issue: issue.code)
     area = WIDTH * HEIGHT
-    label = "at room R1 Room"
-    assert north == (
-        f"IfcWall north {label}: {0.8 * area:.2f} m2 by the file's boundaries, {area:.2f} m2 by"
-        " ours"
-    )
-    assert west == f"IfcWall west {label}: internal by the file's boundaries, outside by ours"
+    assert [i.code for i in (north, west)] == [
+        "boundary-area-differs",
+        "boundary-neighbour-differs",
+    ]
+    assert (north.values["element"], north.values["room"]) == ("IfcWall north", "R1 Room")
+    areas = [north.values[name] for name in ("stated", "net", "gross")]
+    assert areas == pytest.approx([0.8 * area, area, area])
+    assert (west.values["element"], west.values["room"]) == ("IfcWall west", "R1 Room")
+    assert (west.values["stated"], west.values["computed"]) == ("internal", "outside")
 
 
 def test_boundaries_of_the_first_level_are_not_compared(tmp_path):
-    (said,) = problems(tmp_path, level=1)
-    assert said == "has 5 space boundaries, none of the second level"
+    (said,) = issues(tmp_path, level=1)
+    assert (said.code, said.values["count"]) == ("boundaries-first-level", 5)

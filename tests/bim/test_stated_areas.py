@@ -9,6 +9,7 @@ import pytest
 from bim.ifc.building import read_ifc
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_room
 from tests.bim.test_joining import THICK, two_rooms
+from tests.issues import texts
 
 
 def state(path, areas: dict[str, float]) -> None:
@@ -18,10 +19,6 @@ def state(path, areas: dict[str, float]) -> None:
         pset = ifcopenshell.api.pset.add_pset(model, product=space, name="Dimensions")
         ifcopenshell.api.pset.edit_pset(model, pset=pset, properties={"Area": areas[space.Name]})
     model.write(str(path))
-
-
-def texts(building) -> str:
-    return "\n".join(problem.what for problem in building.problems)
 
 
 @pytest.mark.parametrize("cut", [True, False])
@@ -45,15 +42,15 @@ def test_area_of_no_definition_is_reported(tmp_path):
     state(path, {"R1": 30.0})
     building = read_ifc(path)
     assert building.spaces[0].area_to_middles is None
-    assert "states 30.00 m2 floor area, drawn 24.00 m2" in texts(building)
+    assert "stated as 30.00 m2 and drawn as 24.00 m2" in texts(building)
 
 
 @pytest.mark.parametrize(
     ("unit", "height", "stated", "said"),
     [
-        ("MILLIMETRE", HEIGHT, HEIGHT, "1000 times the drawn one"),
+        ("MILLIMETRE", HEIGHT, HEIGHT, "1000 times the drawn volume"),
         ("MILLIMETRE", HEIGHT + 0.5, None, "times its height of 3500 in another unit (3.50 m)"),
-        ("METRE", HEIGHT + 0.5, HEIGHT + 0.5, "drawn 72.00 m3"),  # a volume, and a wrong one
+        ("METRE", HEIGHT + 0.5, HEIGHT + 0.5, "drawn as 72.00 m3"),  # a volume, and a wrong one
     ],
 )
 def test_volume_of_area_times_height_in_mixed_units(tmp_path, unit, height, stated, said):

@@ -18,6 +18,7 @@ from bim.shell import enclosed_volume
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from tests.bim.small_ifc import box_room
+from tests.issues import of_code
 
 
 @pytest.fixture
@@ -99,15 +100,15 @@ def test_the_building_itself_is_left_out(house, tmp_path):
     path = written(tmp_path, quarter, "quarter.city.json")
     found = with_surroundings(house, [path], offset=(0, 0, 0))
     assert [element.name for element in found.elements] == ["other"]
-    (said,) = found.problems
-    assert "itself: 1 object(s) where rooms" in said.what
+    (said,) = found.issues
+    assert said.code == "objects-of-building" and said.values["objects"] == ("itself",)
 
 
 def test_what_lies_beyond_all_sight_is_left_out(house, tmp_path):
     path = written(tmp_path, city({"far": ((5e5, 0, 0), (5e5 + 9, 9, 9))}), "far.city.json")
     found = with_surroundings(house, [path], offset=(0, 0, 0))
     assert not found.elements
-    assert "further than 20 km" in found.problems[0].what
+    assert found.issues[0].code == "objects-far-away" and found.issues[0].values["limit_km"] == 20
 
 
 def test_solids_of_a_quarter_keep_their_volume(tmp_path):
@@ -160,8 +161,8 @@ def test_far_objects_have_fewer_triangles_and_say_how_far_corners_moved(house, t
     near, far = (with_surroundings(house, [path], (0, -y, 0)) for y in (14, 2000))
     count = [sum(len(e.triangles) for e in b.elements) for b in (near, far)]
     assert count[1] < 0.05 * count[0]
-    (said,) = [p for p in far.problems if "far objects" in p.what]
-    assert float(said.consequence.split("moved by ")[1].split()[0]) <= 0.2
+    (said,) = of_code(far, "far-objects-simplified")
+    assert said.values["moved_deg"] <= 0.2
     volume = enclosed_volume(far.elements[0].triangles)
     assert volume == pytest.approx(4 / 3 * np.pi * 125, rel=0.35)  # still a body of that size
 
@@ -189,7 +190,7 @@ def test_systems_have_one_spelling():
 def test_what_cannot_be_placed_is_refused(house, tmp_path):
     house = replace(house, latitude_deg=None)
     path = written(tmp_path, city({"a": ((0, 0, 0), (9, 9, 9))}), "a.city.json")
-    with pytest.raises(DataError, match=r"EPSG:25832.*give --surroundings-offset"):
+    with pytest.raises(DataError, match=r"EPSG:25832.*give the offset"):
         with_surroundings(house, [path])
 
 
@@ -208,7 +209,7 @@ def test_what_cannot_be_placed_is_refused(house, tmp_path):
          "feature 0: height: expected metres, got 'tall'"),
         ("a.gltf", {"buffers": [{"uri": "../../etc/passwd"}]},
          "buffers.uri: ../../etc/passwd: files beside a mesh are not read"),
-        ("a.dwg", {}, "--surroundings: expected a file of"),
+        ("a.dwg", {}, "surroundings: expected a file of"),
         ("horizon.json", {"outputs": {}}, "expected outputs.horizon_profile"),
     ],
 )  # fmt: skip

@@ -122,7 +122,7 @@ def test_a_bad_list_is_one_line(tmp_path, text):
 
 
 def test_without_a_map_an_offset_is_asked_for(house, tmp_path):
-    with pytest.raises(DataError, match="surroundings-offset"):
+    with pytest.raises(DataError, match="offset of the surroundings"):
         with_surroundings(replace(house, georeference=None), [written(tmp_path, HEAD + ROWS)])
 
 

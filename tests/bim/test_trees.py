@@ -12,11 +12,12 @@ import trimesh
 from bim.context.crowns import crown_elements
 from bim.context.surroundings import read_context, with_surroundings
 from bim.context.trees import BARE, LEAFED, monthly_transmittance, tree_of
-from bim.model import TREES
 from bim.rays import ray_mesh
+from bim.report.issue import issue_text
 from bim.seasons import in_month, season_of, seasons
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
+from tests.issues import of_code
 
 WINTER = (0.46,) * 4 + (0.033,) * 6 + (0.46,) * 2
 FIELDS = {"height": 10.0, "crown_radius": 4.0, "crown_base": 2.0, "transmittance": 0.2}
@@ -88,9 +89,9 @@ def test_leaves_come_and_go_with_the_months(house, tmp_path):
     assert len(in_month(found, 6).elements) == len(found.elements)
     assert len(seasons(in_month(found, 6))) == 1
     assert season_of(seasons(found), np.array([1, 5, 10, 12])).tolist() == [1, 0, 0, 1]
-    (one, other) = (p for p in found.problems if p.kind == TREES)
-    assert "3 % from May to October, 46 % from November to April" in one.consequence
-    assert "50 %" in other.consequence
+    (one, other) = map(issue_text, of_code(found, "trees-by-month"))
+    assert "3 % from May to October, 46 % from November to April" in one.effect
+    assert "50 %" in other.effect
     (only,) = seasons(house)
     assert only.building is house and len(only.months) == 12
 

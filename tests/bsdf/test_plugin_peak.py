@@ -241,7 +241,7 @@ def test_the_sun_and_paths_have_the_beam_and_the_rest_of_a_tree(variant, real_da
     import mitsuba as mi
 
     from mitsuba_cfs.trace.kernels.scattering import sun_scattering
-    from mitsuba_cfs.trace.paths.systems import lit_system
+    from mitsuba_cfs.trace.paths.scene import lit_system
 
     if rank == 3:
         tree = TensorTreeBsdf(transmission_front=isotropic_glass(0.5, 0.2))

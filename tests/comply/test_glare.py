@@ -16,8 +16,11 @@ from scenes.comply.glare import seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
+from scenes.room.control import shading_state
+from scenes.room.glare import annual_glare
+from scenes.room.inputs import room_inputs
+from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation
 from scenes.room.skies import skies_for
 from scenes.room_views import eyes_of
 
@@ -51,18 +54,19 @@ def test_seats_and_blinds(variant):
     )  # fmt: skip
     skies = skies_for(weather, "five-phase", options.sampling)
     skies = skies.part(np.arange(0, len(skies.lit), EVERY))
-    room = RoomSimulation(building, space, systems, weather, options, skies=skies)
+    room = room_inputs(building, space, systems, weather, options, skies=skies)
+    light = room_light(room)
     chosen = {"directions": 1, "eye_height": 1.2}
-    one = seat_glare(room, None, grid=None, **chosen)
+    one = seat_glare(room, light, None, grid=None, **chosen)
     used = working_hours(weather, *options.occupancy.hours)
-    run = room.annual_glare()["dgp"].fillna(0.0).to_numpy()[used]
+    run = annual_glare(room, light, shading_state(room))["dgp"].fillna(0.0).to_numpy()[used]
     np.testing.assert_allclose(one.dgp[0], run, atol=1e-9)
     assert not one.operated and one.exceeded(0.35) == np.mean(run > 0.35)
     closed = np.ones((len(room.windows.groups), len(skies.lit)), dtype=np.int64)
-    dim = seat_glare(room, closed, grid=None, **chosen)
+    dim = seat_glare(room, light, closed, grid=None, **chosen)
     lit = one.dgp[0] > 0.3
     assert lit.any() and (dim.dgp[0][lit] < one.dgp[0][lit]).all() and dim.operated
-    seats = seat_glare(room, None, grid=1.0, **chosen)
+    seats = seat_glare(room, light, None, grid=1.0, **chosen)
     mean, y = seats.dgp.mean(axis=1), seats.eyes[:, 1]  # the window is at y = 0
     assert np.ptp(y) > 1.5 and mean[y == y.min()].mean() > mean[y == y.max()].mean()
 

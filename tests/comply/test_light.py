@@ -20,8 +20,9 @@ from scenes.comply.rules import GridTable, read_rule
 from scenes.comply.view_out import view_out
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
+from scenes.room.inputs import room_inputs
+from scenes.room.light import room_light
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.room import RoomSimulation
 from scenes.room.skies import skies_for
 
 EVERY = 23  # hour with the sun up: all hours of the day and all seasons come
@@ -87,13 +88,14 @@ def room(variant):
     same = {w.guid: systems[space.windows[0].guid] for w in space.windows}
     grids = [sensor_grid_of(space, GridTable(height=0.76, margin=0.3, spacing=1.5)),
              sensor_grid_of(space, GridTable(height=0.85, margin=0.5, spacing=1.0))]  # fmt: skip
-    return RoomSimulation(building, space, same, weather, options, skies=skies, grids=grids)
+    return room_inputs(building, space, same, weather, options, skies=skies, grids=grids)
 
 
 @pytest.mark.slow
 def test_blinds_are_moved_group_by_group(room):
     """East closes in the morning, west in the afternoon; the light is that of these states."""
-    operated, other = lights_of(room, {0})
+    light = room_light(room)
+    operated, other = lights_of(room, light, {0})
     assert other.operated is None and len(other.points) != len(operated.points)
     np.testing.assert_allclose(operated.points[:, 2], 0.76)
     np.testing.assert_allclose(other.points[:, 2], 0.85)
@@ -105,14 +107,14 @@ def test_blinds_are_moved_group_by_group(room):
     assert closed[before_noon, east].any() and not closed[~before_noon, east].any()
     # by hand: state by state through the same matrices
     count = len(operated.points)
-    through = [part[:count] for part in room.light.direct_sun_by_group()]
+    through = [part[:count] for part in light.light.direct_sun_by_group()]
     over = lm83.blinds_operated([part.T for part in through])
     np.testing.assert_array_equal(closed.T, over)
     np.testing.assert_allclose(sum(through).T, operated.direct[lit], rtol=1e-6)
     for states in ((0, 0), (1, 0), (0, 1)):
         hours = np.all(over == np.array(states, dtype=bool)[:, None], axis=0)
         row = np.tile(np.array(states)[:, None], len(lit))
-        wanted = room.light.illuminance(row)[:count, hours].T
+        wanted = light.light.illuminance(row)[:count, hours].T
         np.testing.assert_allclose(operated.operated[lit][hours], wanted, rtol=ROUNDING)
     np.testing.assert_array_equal(operated.free, ~operated.closed)  # the default shade is no view
     # with closed blinds it is darker, with open ones the same

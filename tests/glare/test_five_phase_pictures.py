@@ -140,7 +140,7 @@ def test_the_disc_ends_where_the_eye_does(beyond, share):
 def test_paths_see_the_same_disc():
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
     from mitsuba_cfs.trace.paths.disc import disc_seen, with_disc
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     room, groups = rooms.test_room()
@@ -261,7 +261,7 @@ def test_pictures_are_rated_as_traced_ones(kind, obstructed):
     import mitsuba as mi
 
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
+    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
     from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
     from tests.trace.test_point_in_time import diffuser as diffusing_system

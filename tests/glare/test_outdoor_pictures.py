@@ -12,7 +12,7 @@ from mitsuba_cfs.images.view import fisheye, pixel_directions
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.sky.sun import direction
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.kernels.pixel_sharing import Tiles, smoothing
+from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, smoothing
 from tests.trace import rooms
 
 pytestmark = [pytest.mark.early, pytest.mark.usefixtures("variant")]

@@ -15,8 +15,8 @@ pytestmark = pytest.mark.usefixtures("variant")
 def test_what_stands_outdoors_is_lit_by_the_sky_and_not_by_the_sun_alone():
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups = rooms.test_room()

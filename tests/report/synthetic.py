@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bim.model import Building, Element, Problem, Space
+from bim.model import Building, Element, Space
+from bim.report.issue import Issue
 from bim.sensors import sensor_grid, view_point
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS
@@ -37,7 +38,7 @@ def run_result(*, picture_size: int = 320, pictures: int = 4) -> RunResult:
         for i, space in enumerate(building.spaces)
     )
     return RunResult(
-        building, times, sun, rooms, problems(), manifest(),
+        building, times, sun, rooms, issues(), manifest(),
         ("The venetian blind stays at 45° all year; it is not moved.",), "five-phase",
     )  # fmt: skip
 
@@ -55,7 +56,7 @@ def two_rooms() -> Building:
         Element("g1", "Neighbour", "IfcWall", neighbour, 0.3, 0.3),
         Element("g2", "Overhang", "IfcSlab", overhang, 0.5, 0.5),
     )
-    return Building("Demo office", (first, second), elements, problems(), 45.75, 4.85, 170.0)
+    return Building("Demo office", (first, second), elements, issues(), 45.75, 4.85, 170.0)
 
 
 def moved(space: Space, offset: list[float]) -> Space:
@@ -252,11 +253,13 @@ def thermal_result(space: Space, times, beam, cloud, rng) -> ThermalResult:
     return ThermalResult(temperatures, gains, comfort, summary, (fenestration,))
 
 
-def problems() -> tuple[Problem, ...]:
+def issues() -> tuple[Issue, ...]:
     """Faults as the IFC reader reports them."""
     return (
-        Problem("2O2Fr$t4X7Zf8NOew3FLOH", "wall without material", "default construction used"),
-        Problem("office.ifc", "no IfcSite latitude <blank>", "taken from the weather file"),
+        Issue(
+            "construction-assumed", "2O2Fr$t4X7Zf8NOew3FLOH", {"room": "Office <blank>", "count": 2}
+        ),
+        Issue("site-without-position", "office.ifc"),
     )
 
 

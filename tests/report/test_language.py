@@ -89,7 +89,7 @@ def result():
     manifest = {k: v for k, v in run.manifest.items() if k != "options"}
     manifest |= {"quick": True, "options": {"seed": 3}}
     return replace(run, spaces=spaces, notes=(), manifest=manifest,
-                   building=replace(run.building, problems=()), problems=())  # fmt: skip
+                   building=replace(run.building, issues=()), issues=())  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from bim.account import Account, StoreyAccount
-from bim.model import Problem
+from bim.report.issue import Effect, Issue, issue_text
 from scenes.report import write_report
 from scenes.report.glare_figures import gallery
 from scenes.report.page import report_html
@@ -65,7 +65,7 @@ def test_every_anchor_of_the_contents_is_there(page) -> None:
 def test_names_from_files_cannot_become_markup(page) -> None:
     assert "102 &lt;corner&gt; Meeting room west &amp; archive" in page
     assert "<corner>" not in page
-    assert "<blank>" not in page
+    assert "Office <blank>" not in page
 
 
 def test_key_numbers_are_those_of_the_result(result, page) -> None:
@@ -88,27 +88,27 @@ def test_key_numbers_are_those_of_the_result(result, page) -> None:
         assert cards["Adaptive comfort"] == f"{room.heat.comfort_summary['within_80']:.0f}"
 
 
-def test_hashes_versions_seed_problems_and_notes_are_shown(result, page) -> None:
+def test_hashes_versions_seed_issues_and_notes_are_shown(result, page) -> None:
     for entry in result.manifest["inputs"].values():
         assert entry["sha256"] in page
     for text in (result.manifest["versions"]["mitsuba"], result.notes[0], "llvm_ad_mono"):
         assert text in page
-    for problem in result.problems:
-        assert problem.consequence in page
+    for issue in result.issues:
+        assert issue_text(issue, "command").consequence in page
 
 
-def test_account_stands_in_the_head_and_alike_problems_once(result) -> None:
+def test_account_stands_in_the_head_and_alike_issues_once(result) -> None:
     storey = StoreyAccount("E0", 3, 4, 20.0, 9.0)
     account = Account((storey,), 9, 4, 0.0, 11.0, 0.0, 0.0, 0.0, low=("A gym",))
     building = replace(result.building, account=account)
-    dull = [Problem(str(i), f"wall {i}: is {i} mm off", "kept") for i in range(19)]
-    lost = Problem("W1", "window W1: no room behind it", "no daylight", "window", 11.0)
-    page = report_html(replace(result, building=building, problems=(*dull, lost)))
+    dull = [Issue("body-not-closed", str(i), {"element": f"wall {i}"}) for i in range(19)]
+    lost = Issue("window-without-room", "W1", {"element": "window W1"}, Effect("window", 11.0))
+    page = report_html(replace(result, building=building, issues=(*dull, lost)))
     head, _, rest = page.replace("\u00a0", " ").partition("</header>")
     assert "9.0 of 20.0 m² that looks out used" in head
     assert "not usable: only 45 % of the glass that looks out is used" in head
     assert "3 of 4 spaces" in head and "A gym" in head
-    assert "19 times: wall 0: is 0 mm off" in rest and "wall 7: is" not in rest
+    assert "19 times: wall 0: its body is no closed solid" in rest and "wall 7: its" not in rest
     assert rest.index("no room behind it") < rest.index("19 times")
 
 
@@ -165,7 +165,7 @@ def test_report_of_little(result) -> None:
     )  # fmt: skip
     few = replace(room, heat=thermal, daylight=daylight, glare=GlareResults(room.glare.view, ()))
     small = replace(
-        result, times=result.times[hours], sun=result.sun[hours], spaces=(few,), problems=(),
+        result, times=result.times[hours], sun=result.sun[hours], spaces=(few,), issues=(),
         notes=(), manifest={"inputs": {"weather": "a.epw"}},
     )  # fmt: skip
     page = report_html(small)

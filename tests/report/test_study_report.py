@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bim.model import Problem
+from bim.report.issue import Issue
 from scenes.report.daylight_figures import plans
 from scenes.report.numbers import percent
 from scenes.study.case import Case, InputFile
@@ -131,10 +131,10 @@ def test_all_that_a_reader_asks_for_is_there(page):
     assert page.count('<section class="case"') == 4 and len(page) < 5e6
 
 
-def test_problems_of_the_building_are_those_of_its_file():
+def test_issues_of_the_building_are_those_of_its_file():
     found = study()
-    assert Problem in {type(p) for p in found.problems}
-    assert len(found.problems) == len({(p.where, p.what) for p in found.problems})
+    assert Issue in {type(p) for p in found.issues}
+    assert len(found.issues) == len(set(found.issues))
 
 
 def test_few_cases_stand_side_by_side_at_once():

@@ -78,7 +78,7 @@ def _pv(_building, weather, _study, **_options):
     steps = np.arange(100)
     return SimpleNamespace(
         weather=weather, irradiance=SimpleNamespace(steps=steps, diffuse_error=0.01),
-        yields=(SimpleNamespace(name="roof", alternating_current=np.ones(100)),), problems=(),
+        yields=(SimpleNamespace(name="roof", alternating_current=np.ones(100)),), issues=(),
         yield_table=lambda: yields, module_table=lambda: yields,
     )  # fmt: skip
 

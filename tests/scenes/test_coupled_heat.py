@@ -18,9 +18,10 @@ from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from scenes.room.heat import DaylitRoom, coupled_years, heat_alone
+from scenes.room.inputs import room_inputs
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import OperationTables
-from scenes.room.room import RoomSimulation
+from scenes.room.room import operated_zone
 from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.run import run
@@ -52,8 +53,8 @@ def lit(space: Space, tables: dict, weather, skies) -> DaylitRoom:
     """A room in the dark as the run has it before its heat."""
     building = Building("box", (space,), (), ())
     operation = OperationTables.model_validate(EMPTY | tables)
-    room = RoomSimulation(building, space, {}, weather, SMALL, operation=operation, skies=skies)
-    return DaylitRoom(space, None, None, room.heat_inputs(), {})
+    room = room_inputs(building, space, {}, weather, SMALL, operation=operation, skies=skies)
+    return DaylitRoom(space, None, None, operated_zone(room), {})
 
 
 def test_heat_flows_through_the_wall_as_its_resistance_says(variant, weather, skies) -> None:
@@ -66,14 +67,14 @@ def test_heat_flows_through_the_wall_as_its_resistance_says(variant, weather, sk
     rooms = [lit(s, {"loads": WARM} if s.name == "w" else {}, cold, skies) for s in spaces]
     for room in rooms:
         for name in ("inside", "facade"):
-            getattr(room.inputs.zone.solar, name)[:] = 0.0
+            getattr(room.zone.solar, name)[:] = 0.0
     found, said = coupled_years(rooms, cold, 3600.0, OperationTables())
     warm, between = found[0], f"wall {_shared(rooms[0])} (e)_c"
     through = (
         warm.heat.temperatures[between]
         - found[1].heat.temperatures[f"wall {_shared(rooms[1])} (w)_c"]
     )
-    wall = rooms[0].inputs.zone.zone.surfaces[_shared(rooms[0]) - 1]
+    wall = rooms[0].zone.zone.surfaces[_shared(rooms[0]) - 1]
     expected = wall.area * through / sum(layer.resistance for layer in wall.layers)
     late = slice(4000, 8000)
     got = warm.operation.hours["heating_w"]
@@ -81,13 +82,13 @@ def test_heat_flows_through_the_wall_as_its_resistance_says(variant, weather, sk
     assert got[late].mean() == pytest.approx(expected[late].mean(), rel=1e-3)
     assert 2.0 < found[1].heat.air_c[late].mean() < 20.0
     assert "15.0 m2" in said
-    alone, _ = heat_alone(rooms[1].inputs, cold, 3600.0)
+    alone, _ = heat_alone(rooms[1].zone, cold, 3600.0)
     assert alone.air_c[late].mean() < 0.5
 
 
 def _shared(room: DaylitRoom) -> int:
     """The number of the surface that another room lies behind, from 1."""
-    (found,) = [i for i, guid in enumerate(room.inputs.zone.room.neighbours) if guid]
+    (found,) = [i for i, guid in enumerate(room.zone.room.neighbours) if guid]
     return found + 1
 
 
@@ -113,7 +114,7 @@ def test_a_room_moved_to_its_equal_has_that_ones_neighbours(variant, weather, sk
     assert same_surfaces(west, twin)
     shut = tuple(replace(f, adjacency="adiabatic", neighbour=None) for f in faces)
     assert not same_surfaces(west, replace(twin, faces=shut))
-    zone = lit(west, {}, weather, skies).inputs.zone.moved_to(twin)
+    zone = lit(west, {}, weather, skies).zone.moved_to(twin)
     assert zone.zone.name == twin.label and zone.space is twin
     assert [guid for guid in zone.room.neighbours if guid] == ["other"]
 
@@ -156,13 +157,13 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     options = JobOptions(OFFICE, WEATHER, cache=False, room=room)
     heard: list[str] = []
-    found, problems, notes = run._rooms(
+    found, issues, notes = run._rooms(
         inputs, skies, options, silent,
         on_light=lambda room: heard.append(f"light of {room.space.name}"),
         on_room=lambda room: heard.append(room.space.name),
     )  # fmt: skip
     names = [space.name for space in building.spaces]
-    assert heard == [f"light of {name}" for name in names] + names and not problems
+    assert heard == [f"light of {name}" for name in names] + names and not issues
     assert "flows between them through 18.0 m2" in notes[-1]
     for year, theirs in zip(found, expected, strict=True):
         np.testing.assert_allclose(year.heat.air_c, theirs.hours["air_c"], atol=1e-3)

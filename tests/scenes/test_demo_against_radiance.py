@@ -21,7 +21,7 @@ def our_year(name: str) -> Year:
     from bim.ifc.building import read_ifc
     from scenes.fenestration.systems import read_system
     from scenes.room.options import RoomOptions
-    from scenes.room.room_year import compute_room
+    from scenes.room.room import compute_room
     from scenes.room.windows import in_all_windows
     from scenes.run.inputs import read_weather
 

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from bim.ifc.building import read_ifc
+from bim.report.issue import issue_text
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.progress import silent
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.room.windows import holds_shade
+from scenes.room.windows import has_shade
 from scenes.run.job import read_inputs
 from scenes.run.options import JobOptions
 from tests.bim.small_ifc import OPENING, WALL, WIDTH, SmallIfc, box_room
+from tests.issues import of_code
 
 X, SILL, W, H = OPENING
 SPACING, DEPTH, THICK = 0.07, 0.08, 0.002  # of the slats [m]
@@ -74,13 +76,15 @@ def inputs(model, folder, toml: str):
 def test_the_blind_of_the_bsdf_is_left_out_and_named_with_its_area(model, tmp_path, caplog):
     building = inputs(model, tmp_path, "u_value = 1.1\n")
     assert devices(building) == set(DEVICES) - DRAWN
-    said = {p.what.split(":")[0].removeprefix("IfcShadingDevice "): p for p in building.problems
-            if "left out of the tracing" in p.consequence and "Proxy" not in p.what}  # fmt: skip
+    issues = of_code(building, "shade-drawn-and-in-system")
+    elements = {str(i.values["element"]).partition(" ")[::2]: i.values for i in issues}
+    said = {name: values for (kind, name), values in elements.items() if "Proxy" not in kind}
     assert set(said) == DRAWN
     # the outline of the slats: from the lowest to the highest, as wide as the window
     high = SPACING * (len(slats(0)) - 1) + THICK
-    assert f"its {W * high:.2f} m2" in said["blind outside"].what
-    assert "window W1" in said["blind outside"].what and "keep" in said["blind inside"].consequence
+    assert said["blind outside"]["area"] == pytest.approx(W * high, abs=0.005)
+    assert said["blind outside"]["windows"] == ("W1",)
+    assert all("keep = [" in issue_text(issue).fix for issue in issues)
     assert "blind outside" in caplog.text  # which the command line shows
 
 
@@ -103,9 +107,9 @@ def test_the_corrections_keep_what_they_name(model, tmp_path):
 
 
 def test_a_shade_is_known_by_the_light_that_it_scatters():
-    assert holds_shade(read_system(VENETIAN_BLIND))
+    assert has_shade(read_system(VENETIAN_BLIND))
     straight = np.diag(0.7 / KLEMS_FULL.projected_solid_angles())
     none = np.zeros_like(straight)
     clear = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, straight, straight, none, none)
-    assert not holds_shade(FenestrationSystem("clear", clear, clear))
-    assert holds_shade(FenestrationSystem("clear", clear, clear, shading_position="internal"))
+    assert not has_shade(FenestrationSystem("clear", clear, clear))
+    assert has_shade(FenestrationSystem("clear", clear, clear, shading_position="internal"))

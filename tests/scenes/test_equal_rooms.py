@@ -13,7 +13,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.progress import silent
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
-from scenes.room.room_year import compute_room, lit_room
+from scenes.room.room import compute_room, lit_room
 from scenes.room.series import OutdoorLight, moved_result, same_systems
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions
@@ -84,8 +84,8 @@ def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeyp
     )  # fmt: skip
     options = JobOptions(Path(), Path(), cache=False, room=room)
     inputs = run.JobInputs(building, spaces, weather, systems, None)
-    results, problems, notes = run._rooms(inputs, skies, options, silent)
-    assert computed == ["room", "other"] and not problems
+    results, issues, notes = run._rooms(inputs, skies, options, silent)
+    assert computed == ["room", "other"] and not issues
     assert [r.space.name for r in results] == ["room", "other", "twin"]
     assert [r.template for r in results] == ["", "", "room"]
     assert len(notes) == 2 and "twin" in notes[0] and "sun are those" in notes[0]

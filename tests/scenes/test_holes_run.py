@@ -7,7 +7,7 @@ import pytest
 from mitsuba_cfs.surfaces import Surfaces
 from scenes.cli import run as main
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.room import daylight, leaks
+from scenes.room import leaks, light
 
 pytestmark = pytest.mark.usefixtures("variant")
 FEW_RAYS = ["--quick", "--size", "64", "--method", "three-phase"]
@@ -16,7 +16,7 @@ FEW_RAYS = ["--quick", "--size", "64", "--method", "three-phase"]
 @pytest.fixture
 def holed(monkeypatch) -> list[str]:
     """The biggest triangle of every room is left out of what is traced; the demo's files."""
-    whole = daylight.furnished_surfaces
+    whole = light.furnished_surfaces
 
     def without(space, band="visible"):
         found = whole(space, band)
@@ -24,7 +24,7 @@ def holed(monkeypatch) -> list[str]:
         parts = (part[keep] for part in (found.triangles, found.reflectance, found.surface))
         return Surfaces(*parts, found.names)
 
-    for module in (daylight, leaks):
+    for module in (light, leaks):
         monkeypatch.setattr(module, "furnished_surfaces", without)
     return [str(OFFICE), "--weather", str(WEATHER), "--cfs", str(VENETIAN_BLIND), "--space", "A"]
 

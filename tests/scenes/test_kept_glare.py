@@ -16,8 +16,10 @@ from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
+from scenes.room.glare import rated_hours
+from scenes.room.inputs import room_inputs
+from scenes.room.light import room_light
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation
 from scenes.room.skies import skies_for
 
 EVERY = 211  # hour with the sun up
@@ -43,11 +45,11 @@ def rated(skies, folder: Path, states, state=0, width: float = 2.0) -> AnnualGla
     building = shoebox(3.0, 4.0, windows=[WindowRectangle(0.5, 0.8, width, 1.8)])
     (space,) = building.spaces
     systems = {window.guid: tuple(states) for window in space.windows}
-    room = RoomSimulation(
+    room = room_inputs(
         building, space, systems, read_epw(WEATHER), OPTIONS, skies=skies, cache=MatrixCache(folder)
     )
-    room.__dict__["state"] = np.broadcast_to(state, skies.hours)
-    return room.rated("DGP", skies.lit)
+    of_hours = np.broadcast_to(state, skies.hours)
+    return rated_hours(room, room_light(room), of_hours, "DGP", skies.lit)
 
 
 def test_each_hour_is_that_of_its_state(variant, skies, tmp_path, monkeypatch) -> None:

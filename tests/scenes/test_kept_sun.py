@@ -43,5 +43,5 @@ def test_what_is_kept_is_what_is_computed_for_each_weather(tmp_path, weather, mo
     for again in (False, True):
         for one, model in cases:
             expected = sun_directions(one, model=model)
-            np.testing.assert_array_equal(module.kept_sun(one, model, cache), expected)
+            np.testing.assert_array_equal(module.cached_sun_directions(one, model, cache), expected)
         assert len(asked) == len(cases), again

@@ -15,11 +15,12 @@ from mitsuba_cfs.progress import silent
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
+from scenes.room.inputs import room_inputs
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation
-from scenes.room.room_year import compute_room
+from scenes.room.room import compute_room
 from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
+from scenes.room.zone import zone_surfaces
 from scenes.run import run as job
 from scenes.run.options import JobOptions
 from scenes.study import schedule
@@ -67,11 +68,12 @@ def rooms_of(inputs: job.JobInputs):
 
 def test_a_room_too_low_for_its_sensors_is_left_out(variant, monkeypatch, no_pictures) -> None:
     only_high_rooms_are_made_up(monkeypatch)
-    found, problems, _ = rooms_of(inputs_of(box("low", 0.7), box("high", 2.8)))
+    found, issues, _ = rooms_of(inputs_of(box("low", 0.7), box("high", 2.8)))
     assert [room.name for room in found] == ["high"]
-    (problem,) = problems
-    assert problem.where == "low" and "no room at 0.8 m above the floor" in problem.what
-    assert problem.consequence == "the room was left out of the run"
+    (issue,) = issues
+    assert (issue.where, issue.code) == ("low", "room-not-simulated")
+    assert "no room at 0.8 m above the floor" in issue.values["reason"]
+    assert issue.effect.lost == "room"
 
 
 def test_the_only_room_names_itself_and_its_file(variant) -> None:
@@ -111,6 +113,6 @@ def test_surfaces_that_are_no_zone_are_the_rooms_fault(variant) -> None:
     """A model whose faces enclose nothing: the heat balance's own check finds it."""
     space = replace(box("open", 2.8), volume=0.0)
     inputs, options = inputs_of(space), OPTIONS.room
-    room = RoomSimulation(inputs.building, space, inputs.systems, inputs.weather, options)
+    room = room_inputs(inputs.building, space, inputs.systems, inputs.weather, options)
     with pytest.raises(RoomError, match=r"space open: .*volume must be positive"):
-        _ = room.surfaces
+        zone_surfaces(room)

@@ -19,11 +19,13 @@ from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system
 from scenes.heat.study import rooms_of, run_study
 from scenes.heat.study_file import read_study
+from scenes.room.inputs import RoomInputs, room_inputs
+from scenes.room.light import room_light
 from scenes.room.operation import read_operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
-from scenes.room.room import RoomSimulation
-from scenes.room.room_year import compute_room
+from scenes.room.room import compute_room, operated_zone
+from scenes.room.solar import seasonal_outdoors, window_irradiance
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions
 from scenes.run.run import run_job
@@ -166,8 +168,9 @@ def test_sun_on_the_windows_is_reflected_by_solar_reflectances(variant, weather)
         opposite = Element("w", "wall", "IfcWall", wall, visible, solar)
         building = replace(box, elements=(opposite,))
         room = office(building, weather, RoomOptions.of(**SAMPLING))
-        assert room.scene.groups  # light is asked for as well, as in `cfs run`
-        return room.sun.irradiance
+        light = room_light(room)  # as in `cfs run`, whose matrices may serve both bands
+        assert light.scene.groups
+        return window_irradiance(seasonal_outdoors(room, light), room.skies)
 
     dark, bright, reflecting = irradiance(0.1, 0.1), irradiance(0.9, 0.1), irradiance(0.1, 0.9)
     np.testing.assert_array_equal(dark, bright)
@@ -179,7 +182,7 @@ def test_a_room_without_windows_has_a_zone_in_the_dark(variant, weather) -> None
     box = shoebox(3.0, 4.0, 2.8, windows=(WindowRectangle(0.5, 0.9, 2.0, 1.5),))
     blind = replace(box, spaces=(replace(box.spaces[0], windows=()),))
     tables = OperationTables.model_validate({"control": {"rule": "glare"}})
-    zone = office(blind, weather, RoomOptions.of(**SAMPLING), tables).zone
+    zone = operated_zone(office(blind, weather, RoomOptions.of(**SAMPLING), tables))
     assert not zone.solar.inside.any() and zone.daylight is None and not zone.state.any()
     assert zone.solar.facade.max() > 100  # the sun still warms its walls
 
@@ -189,12 +192,12 @@ def office(
     weather: Weather,
     options: RoomOptions,
     tables: OperationTables | None = None,
-) -> RoomSimulation:
+) -> RoomInputs:
     """The building's only room with the demo's blind."""
     (space,) = building.spaces
     systems = in_all_windows(space, read_system(VENETIAN_BLIND))
     cache = MatrixCache.of_user()
-    return RoomSimulation(building, space, systems, weather, options, operation=tables, cache=cache)
+    return room_inputs(building, space, systems, weather, options, operation=tables, cache=cache)
 
 
 def test_heat_is_computed_in_one_place() -> None:

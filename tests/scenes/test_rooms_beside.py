@@ -43,7 +43,7 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
     """Rooms whose result is their name, computed last room first, and which were asked for."""
     asked: list[list[str]] = []
 
-    def beside(rooms):
+    def parallel(rooms):
         asked.append([room.name for room in rooms])
         for room in reversed(rooms):
             yield room, RoomError("no floor") if room.name == fails else room.name
@@ -55,7 +55,7 @@ def named(spaces: list[Space], fails: str = "", alike: bool = True) -> tuple[Roo
     return RoomSeries(
         replace(BOX, spaces=tuple(spaces)), spaces, {}, SMALL.sampling, None, here,
         lambda result, space: f"{space.name} like {result}",
-        alike=lambda one, other: alike, beside=beside,
+        alike=lambda one, other: alike, parallel=parallel,
     ), asked  # fmt: skip
 
 
@@ -69,9 +69,9 @@ def seen_alike(monkeypatch):
 def test_results_come_in_the_rooms_order_and_equal_rooms_are_computed_once():
     twin, heard = moved(BOX, (10.0, 0.0, 3.0), "twin"), []
     rooms, asked = named([ROOM, box("deep", 6.0), twin])
-    found, problems, notes = replace(rooms, on_room=heard.append).results()
+    found, issues, notes = replace(rooms, on_room=heard.append).results()
     assert found == heard == ["room", "deep", "twin like room"]
-    assert asked == [["room", "deep"]] and not problems and len(notes) == 1
+    assert asked == [["room", "deep"]] and not issues and len(notes) == 1
     rooms, asked = named([ROOM, twin], alike=False)
     assert rooms.results()[0] == ["room", "twin"] and asked == [["room", "twin"]]
 
@@ -79,16 +79,16 @@ def test_results_come_in_the_rooms_order_and_equal_rooms_are_computed_once():
 def test_a_room_that_fails_leaves_the_others_and_is_no_template():
     twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
     rooms, asked = named([ROOM, box("deep", 6.0), twin], fails="room")
-    found, problems, _ = rooms.results()
+    found, issues, _ = rooms.results()
     assert found == ["deep", "here twin"] and asked == [["room", "deep"], ["twin"]]
-    assert [problem.what for problem in problems] == ["no floor"]
+    assert [issue.values["reason"] for issue in issues] == ["no floor"]
 
 
 def test_what_is_no_fault_of_a_room_ends_the_run():
     rooms, _ = named([ROOM, box("deep", 6.0)])
     ended = []
 
-    def beside(some):
+    def parallel(some):
         try:
             yield some[0], DataError("file is gone")
             raise AssertionError("asked for another")
@@ -96,7 +96,7 @@ def test_what_is_no_fault_of_a_room_ends_the_run():
             ended.append("the processes")
 
     with pytest.raises(DataError, match="file is gone"):
-        replace(rooms, beside=beside).results()
+        replace(rooms, parallel=parallel).results()
     assert ended
 
 

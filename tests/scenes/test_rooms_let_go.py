@@ -19,16 +19,16 @@ from mitsuba_cfs.methods.reflected_sun import ReflectedSun, ReflectedSunLight
 from mitsuba_cfs.trace.kernels import scene as traced_scenes
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from scenes.comply.light import lights_of
+from scenes.room.inputs import room_inputs
+from scenes.room.light import RoomLight, room_light
 from scenes.room.options import SensorGrid
-from scenes.room.room import RoomSimulation
-from scenes.room.room_year import compute_room
-from scenes.room.solar import RoomSun
+from scenes.room.room import compute_room
 from scenes.room.windows import in_all_windows
 from tests.scenes.small_box import BOX, ROOM, SMALL
 
 OF_A_ROOM = (
-    RoomSimulation, PhaseScene, PhaseSystems, PhaseLight, PathSystems, PathLight, ReflectedSun,
-    ReflectedSunLight, RoomSun,
+    RoomLight, PhaseScene, PhaseSystems, PhaseLight, PathSystems, PathLight, ReflectedSun,
+    ReflectedSunLight,
 )  # fmt: skip
 FEW = SMALL.changed(
     sensor_samples=256, patch_samples=64, sun_points=16, picture_size=32, picture_samples=2,
@@ -73,8 +73,9 @@ def test_nothing_of_a_checked_room_is_left(variant, made, weather, skies, blind,
     """Light on two grids with blinds that move, as `cfs comply` asks for it."""
     filled = {window.guid: (glass, blind) for window in ROOM.windows}
     grids = [SensorGrid(spacing=1.0), SensorGrid(spacing=1.5)]
-    room = RoomSimulation(BOX, ROOM, filled, weather, FEW, skies=skies, grids=grids)
-    found = lights_of(room, {0})
+    room = room_inputs(BOX, ROOM, filled, weather, FEW, skies=skies, grids=grids)
+    light = room_light(room)
+    found = lights_of(room, light, {0})
     assert found[0].operated is not None and "PhaseLight" in living(made)
-    del room
+    del room, light
     assert not living(made)

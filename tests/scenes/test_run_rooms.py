@@ -16,10 +16,10 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.room.control import shading_states
+from scenes.room.control import signal_of, states_by_rule
 from scenes.room.glare import worst_hours
 from scenes.room.operation import check_states, read_operation
-from scenes.room.room_year import compute_room
+from scenes.room.room import compute_room
 from scenes.room.windows import in_all_windows, room_windows
 from tests.scenes.small_box import BOX, HOURS, ROOM, SMALL, clear
 
@@ -222,20 +222,20 @@ def test_rules_of_the_control(tmp_path, weather) -> None:
     eye = np.zeros((3, H))
     eye[0, 200], eye[1, 200] = 9000.0, 5000.0
 
-    def states(text: str, dgp=None):
-        operated = read_operation(operation_file(tmp_path, text)).tables
-        return shading_states(
-            operated, ROOM, weather, 3,
-            irradiance=lambda: bright, eye=lambda: eye, dgp=dgp or pytest.fail,
-        )  # fmt: skip
-
-    by_sun = states('[control]\nrule = "irradiance"\nclose_above = 300')
-    assert np.flatnonzero(by_sun).tolist() == [100] and by_sun[100] == 2
-    by_eye = states('[control]\nrule = "glare"\nlimit_lx = 3000')
-    assert np.flatnonzero(by_eye).tolist() == [200] and by_eye[200] == 2
     picture = np.full((3, H), 0.2)
     picture[0, 300] = 0.5
-    by_dgp = states('[control]\nrule = "glare"\nlimit_dgp = 0.4', lambda: picture)
+    signals = {"irradiance": bright, "eye": eye, "dgp": picture}
+
+    def states(text: str, signal: str):
+        tables = read_operation(operation_file(tmp_path, text)).tables
+        assert signal_of(tables.control) == signal  # nothing else is computed
+        return states_by_rule(tables, ROOM, weather, 3, signals[signal])
+
+    by_sun = states('[control]\nrule = "irradiance"\nclose_above = 300', "irradiance")
+    assert np.flatnonzero(by_sun).tolist() == [100] and by_sun[100] == 2
+    by_eye = states('[control]\nrule = "glare"\nlimit_lx = 3000', "eye")
+    assert np.flatnonzero(by_eye).tolist() == [200] and by_eye[200] == 2
+    by_dgp = states('[control]\nrule = "glare"\nlimit_dgp = 0.4', "dgp")
     assert np.flatnonzero(by_dgp).tolist() == [300] and by_dgp[300] == 1
     assert len(by_dgp) == len(hours)
 

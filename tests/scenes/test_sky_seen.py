@@ -7,7 +7,8 @@ import pytest
 
 from bim.model import Building
 from bim.shoebox import Plate, WindowRectangle, shoebox
-from scenes.room.room import RoomSimulation
+from scenes.room.inputs import room_inputs
+from scenes.room.room import operated_zone
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import RoomZone
 from tests.scenes.small_box import SMALL
@@ -27,7 +28,7 @@ def overhung(*plates: Plate) -> Building:
 def zone_of(building: Building, glass, weather, skies) -> RoomZone:
     (space,) = building.spaces
     systems = in_all_windows(space, glass)
-    return RoomSimulation(building, space, systems, weather, SMALL, skies=skies).zone
+    return operated_zone(room_inputs(building, space, systems, weather, SMALL, skies=skies))
 
 
 def test_an_overhang_hides_the_sky_from_what_is_below_it(variant, glass, weather, skies) -> None:

@@ -7,47 +7,41 @@ from types import SimpleNamespace
 import numpy as np
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from scenes.room.solar import RoomSun
+from scenes.room.solar import SeasonalOutdoors, absorbed_shares, directional_sums
 
 G, F, L, P, K = 2, 3, 4, 5, KLEMS_FULL.size
 AREA = np.array([1.5, 4.0])
 
 
-def sun(rng: np.random.Generator) -> RoomSun:
-    """Two groups of windows under a sky of five patches, and where what enters is absorbed."""
-    found = RoomSun.__new__(RoomSun)
-    daylight = rng.random((G, K, P))
-    parts = SimpleNamespace(of_groups=lambda values: values)
-    scene = SimpleNamespace(groups=[1, 2])
-    found.outdoors = SimpleNamespace(
-        scene=scene, parts=parts, daylight=SimpleNamespace(values=daylight)
+def traced(rng: np.random.Generator) -> SimpleNamespace:
+    """D of two groups of windows."""
+    return SimpleNamespace(
+        scene=SimpleNamespace(groups=[1, 2]),
+        parts=SimpleNamespace(of_groups=lambda values: values),
+        daylight=SimpleNamespace(values=rng.random((G, K, P))),
     )
-    found.seasons = SimpleNamespace(parts=lambda: [(found.outdoors, np.arange(L))])
-    whole = rng.random((P, L)).astype(np.float32)
-    found.skies = SimpleNamespace(solar=whole, lit=np.arange(L))
-    found._absorbed = {np.array([0.1, 0.2]).tobytes(): rng.random((G, K, F + G))}
-    return found
 
 
 def test_what_is_asked_of_the_windows_irradiance_is_what_its_directions_give() -> None:
     """Few sums before many hours; here direction by direction, hour by hour."""
     rng = np.random.default_rng(0)
-    room = sun(rng)
+    outdoors = SeasonalOutdoors([traced(rng)], np.zeros(L, dtype=np.int64))
+    skies = SimpleNamespace(solar=rng.random((P, L)).astype(np.float32), lit=np.arange(L))
+    absorbed = rng.random((G, K, F + G))
     sides = [SimpleNamespace(outer=rng.random(K), inner=rng.random(K)) for _ in range(G)]
     heats = [
         SimpleNamespace(absorptances=side, back_reflectance=back)
         for side, back in zip(sides, (0.1, 0.2), strict=True)
     ]
     T, omega = rng.random((G, K, K)), KLEMS_FULL.projected_solid_angles()
-    incident = omega[:, None] * (room.outdoors.daylight.values @ room.skies.solar)  # [G, K, L]
+    incident = omega[:, None] * (outdoors.first.daylight.values @ skies.solar)  # [G, K, L]
     entering = np.stack([t / omega @ i for t, i in zip(T, incident, strict=True)])
     entering *= omega[:, None] * AREA[:, None, None]
-    (absorbed,) = room._absorbed.values()
     expected = (
         np.einsum("gkf,gkl->fl", absorbed, entering),
         np.stack([side.outer @ i for side, i in zip(sides, incident, strict=True)]),
         np.stack([side.inner @ i for side, i in zip(sides, incident, strict=True)]),
         np.stack([AREA @ incident.sum(axis=1), entering.sum(axis=(0, 1))]),
     )
-    for shares, values in zip(room._shares(heats, T, AREA), expected, strict=True):
-        np.testing.assert_allclose(room.before_windows(shares), values, rtol=1e-5)
+    for shares, values in zip(absorbed_shares(heats, T, AREA, absorbed), expected, strict=True):
+        np.testing.assert_allclose(directional_sums(outdoors, skies, shares), values, rtol=1e-5)

@@ -16,12 +16,12 @@ from mitsuba_cfs.images.view import View, fisheye
 from scenes.demo import WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
-from scenes.room.daylight import HeldSensors
+from scenes.room.inputs import FileSensors
 from scenes.room.operation import stated_note, with_stated_uses
 from scenes.room.operation_hours import OperationHours
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
-from scenes.room.room_year import compute_room
+from scenes.room.room import compute_room
 from scenes.room_views import held_fisheyes, held_view
 from scenes.run.inputs import read_weather
 from scenes.run.notes import unused_notes
@@ -112,7 +112,7 @@ def test_fisheyes_of_the_file_are_the_views_of_its_room(used):
     assert [one.name for one in held_fisheyes(building, hall, 64)] == ["hall"]
     assert held_view(building, office).name == "wide"
     assert held_view(used, office) is None
-    assert HeldSensors.of(building, hall).view == views[2].view
+    assert FileSensors.of(building, hall).view == views[2].view
 
 
 def test_a_grid_of_the_file_has_the_light_of_its_own_sensors(used, weather, variant):
@@ -127,7 +127,7 @@ def test_a_grid_of_the_file_has_the_light_of_its_own_sensors(used, weather, vari
     )  # fmt: skip
     from scenes.fenestration.resolver import fill_windows
     from scenes.fenestration.systems import Given
-    from scenes.room.daylight import grid_points
+    from scenes.room.light import grid_points
 
     points = grid_points(office, options.grid)
     up = np.tile([0.0, 0.0, 1.0], (len(points), 1))

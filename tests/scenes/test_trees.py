@@ -18,10 +18,16 @@ from bim.seasons import seasons
 from mitsuba_cfs.errors import DataError
 from scenes import cli
 from scenes.demo import WEATHER
-from scenes.room.room import RoomSimulation
-from scenes.room.room_year import lit_room
+from scenes.room.control import shading_state
+from scenes.room.daylight import room_daylight
+from scenes.room.glare import annual_glare, room_glare
+from scenes.room.inputs import RoomInputs, room_inputs
+from scenes.room.light import room_light
+from scenes.room.room import lit_room, operated_zone
 from scenes.room.skies import skies_for
+from scenes.room.solar import facade_irradiance, seasonal_outdoors, window_irradiance
 from scenes.room.windows import in_all_windows
+from scenes.room.zone import zone_surfaces
 from scenes.run.notes import model_notes, unused_notes
 from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, HOURS, SMALL
@@ -45,10 +51,23 @@ def behind(tmp_path_factory) -> Building:
     return with_surroundings(replace(BOX, latitude_deg=41.98), [path])
 
 
-def room_of(building, system, weather, skies, options=SMALL, **more) -> RoomSimulation:
+def room_of(building, system, weather, skies, options=SMALL, **more) -> RoomInputs:
     (space,) = building.spaces
     systems = in_all_windows(space, system)
-    return RoomSimulation(building, space, systems, weather, options, skies=skies, **more)
+    return room_inputs(building, space, systems, weather, options, skies=skies, **more)
+
+
+def illuminance(room: RoomInputs) -> np.ndarray:
+    """Illuminance of the work plane in `HOURS` [hours, S] [lx]."""
+    return room_daylight(room, room_light(room), shading_state(room)).illuminance[list(HOURS)]
+
+
+def sun_of(room: RoomInputs) -> tuple[np.ndarray, np.ndarray]:
+    """Irradiance of the window groups [H, G] and of the outside of the zone [H, F] [W/m2]."""
+    outdoors, surfaces = seasonal_outdoors(room, room_light(room)), zone_surfaces(room)
+    count = len(surfaces.room.zone.surfaces)
+    facade = facade_irradiance(outdoors, surfaces.outer, count, room.skies)
+    return window_irradiance(outdoors, room.skies), facade
 
 
 @pytest.mark.parametrize(
@@ -61,10 +80,10 @@ def room_of(building, system, weather, skies, options=SMALL, **more) -> RoomSimu
 )
 def test_light_of_an_hour_is_that_of_its_month(method, variant, behind, weather, skies, milk):
     options = replace(SMALL, method=method)
-    found = room_of(behind, milk, weather, skies, options).daylight.illuminance[list(HOURS)]
+    found = illuminance(room_of(behind, milk, weather, skies, options))
     for season, hours in zip(seasons(behind), (SUMMER, WINTER), strict=True):
         alone = room_of(season.building, milk, weather, skies, options)
-        expected = alone.daylight.illuminance[list(HOURS)]
+        expected = illuminance(alone)
         np.testing.assert_allclose(found[hours], expected[hours], rtol=0.05)
         others = [hour for hour in range(len(HOURS)) if hour not in hours]
         assert not np.allclose(found[others], expected[others], rtol=0.2)
@@ -74,29 +93,35 @@ def test_light_of_an_hour_is_that_of_its_month(method, variant, behind, weather,
 def test_heat_and_glare_of_an_hour_are_those_of_its_month(variant, behind, weather, skies, glass):
     room = room_of(behind, glass, weather, skies)
     lit = np.array(HOURS)
-    sun, year = room.sun.irradiance[lit].T, room.annual_glare()
-    shown = room.glare(list(HOURS), None)
-    zone = room.zone
+    light, state = room_light(room), shading_state(room)
+    (irradiance, facade), year = sun_of(room), annual_glare(room, light, state)
+    sun, facade = irradiance[lit].T, facade[lit]
+    shown = room_glare(room, light, state, list(HOURS))
+    zone = operated_zone(room)
     seen = []
     for season, hours in zip(seasons(behind), (SUMMER, WINTER), strict=True):
         alone = room_of(season.building, glass, weather, skies)
-        np.testing.assert_allclose(sun[:, hours], alone.sun.irradiance[lit[hours]].T, rtol=0.03)
-        facade = alone.sun.facade[lit[hours]]
-        np.testing.assert_allclose(room.sun.facade[lit[hours]], facade, rtol=1e-6)
-        expected = alone.annual_glare()
+        irradiance, outside = sun_of(alone)
+        np.testing.assert_allclose(sun[:, hours], irradiance[lit[hours]].T, rtol=0.03)
+        np.testing.assert_allclose(facade[hours], outside[lit[hours]], rtol=1e-6)
+        light = room_light(alone)
+        expected = annual_glare(alone, light, state)
         assert year.dgp.iloc[lit[hours]].to_numpy() == pytest.approx(
             expected.dgp.iloc[lit[hours]].to_numpy(), abs=0.02
         )
         assert year.ev.iloc[lit[hours]].to_numpy() == pytest.approx(
             expected.ev.iloc[lit[hours]].to_numpy(), rel=0.06
         )
-        of_month = {one.hour: one.glare["ev"] for one in alone.glare(list(HOURS), None).pictures}
+        of_month = {
+            one.hour: one.glare["ev"]
+            for one in room_glare(alone, light, state, list(HOURS)).pictures
+        }
         for one in shown.pictures:
             if one.hour in lit[hours]:
                 assert one.glare["ev"] == pytest.approx(of_month[one.hour], rel=0.06)
-        seen.append(alone.zone.room.zone.windows[0].sky_seen)
+        seen.append(operated_zone(alone).zone.windows[0].sky_seen)
     # of the longwave from the sky, the mean of the year
-    assert zone.room.zone.windows[0].sky_seen == pytest.approx(np.mean(seen))
+    assert zone.zone.windows[0].sky_seen == pytest.approx(np.mean(seen))
     assert seen[0] < seen[1] - 0.1
 
 
@@ -124,7 +149,8 @@ def test_the_sun_through_a_crown_by_month_is_that_of_beers_law(variant, weather,
     inside = (root > 1.0).all(axis=0) & (skies.direction[:, 1] < 0)
 
     def scattered(building: Building) -> np.ndarray:
-        sun = room_of(building, milk, weather, skies, options).light.direct_sun().mean(axis=0)
+        room = room_of(building, milk, weather, skies, options)
+        sun = room_light(room).light.direct_sun().mean(axis=0)
         return np.where(inside, sun, 0.0)
 
     free = scattered(replace(BOX, latitude_deg=41.98))

@@ -40,15 +40,15 @@ def black_room(gloss) -> tuple[Surfaces, Surfaces]:
 
 def clear():
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-    from mitsuba_cfs.trace.paths.path_scene import PathOptics
+    from mitsuba_cfs.trace.paths.scene import PathOptics
 
     return PathOptics(None, AngularBeam(np.ones(16)))
 
 
 def traced(exterior, sky, *, interior=None, samples=16384, points=POINTS, normals=UP):
     from mitsuba_cfs.trace.kernels.estimate import Stopping
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+    from mitsuba_cfs.trace.paths.scene import LitRoom
 
     room, groups = rooms.test_room()
     lit = LitRoom(room if interior is None else interior, exterior, groups, [clear()])
@@ -57,7 +57,7 @@ def traced(exterior, sky, *, interior=None, samples=16384, points=POINTS, normal
 
 
 def lit_by(patches, sun=NO_SUN, luminance=0.0):
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     return Sky(patches, sun, luminance)
 

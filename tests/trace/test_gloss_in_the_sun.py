@@ -82,7 +82,7 @@ def test_five_phases_have_the_sun_of_a_mirror_facade():
 def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom
+    from mitsuba_cfs.trace.paths.scene import LitRoom
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     sky = lit_by(np.zeros(146), SUN, 50_000.0 / SUN_SOLID_ANGLE)

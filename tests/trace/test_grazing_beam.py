@@ -22,7 +22,7 @@ def beam_of(bsdf, theta) -> dict:
     import mitsuba as mi
 
     from mitsuba_cfs.trace.kernels.scattering import sun_scattering
-    from mitsuba_cfs.trace.paths.systems import lit_system
+    from mitsuba_cfs.trace.paths.scene import lit_system
 
     local = np.stack([np.sin(theta) * 0.6, np.sin(theta) * 0.8, np.cos(theta)])
     towards = mi.Vector3f(local.astype(np.float32))

@@ -28,7 +28,7 @@ PATHS = {2: [148.4, 109.7, 86.7, 74.1, 93.8], 3: [21.9, 18.0, 16.0, 16.4, 16.4]}
 def test_straight_on_the_glass_has_what_the_window_before_it_has() -> None:
     """Both normal patches: nothing between, so the glass has T D of the window, and no more."""
     from mitsuba_cfs.trace.kernels.estimate import Stopping
-    from mitsuba_cfs.trace.matrices.adjacent_daylight import borrowed_daylight
+    from mitsuba_cfs.trace.matrices.adjacent import borrowed_daylight
 
     def group(name: str, y: float, place: tuple) -> WindowGroup:
         return WindowGroup(name, (WindowSurface(name, upright(y, place, north=False)),))

@@ -11,8 +11,7 @@ import pytest
 
 import mitsuba_cfs as cfs
 from mitsuba_cfs.images.view import pixel_directions
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows
-from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.sampling import vectors
 from mitsuba_cfs.trace.kernels.scene import kept_scene
 from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix

@@ -5,7 +5,7 @@ import pytest
 
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.trace.kernels.sampling import pixel_places
-from mitsuba_cfs.trace.sun.picture_edges import EDGE_PLACES, edge_pixels
+from mitsuba_cfs.trace.sun.pixels import EDGE_PLACES, edge_pixels
 
 VIEW = View(width=9, height=6)
 

@@ -23,7 +23,7 @@ DARK = np.zeros(146)
 
 
 def picture(systems, sky, scene, view=VIEW, **options):
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom
+    from mitsuba_cfs.trace.paths.scene import LitRoom
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups, exterior = scene
@@ -82,8 +82,8 @@ def test_no_light_of_a_picture_comes_through_the_room_from_behind():
 def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+    from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
 
     half = AngularBeam(np.full(16, 0.3))
     system = {
@@ -103,7 +103,7 @@ def test_a_picture_has_the_illuminance_of_a_sensor_at_its_eye(kind):
 
 
 def test_tiles_do_not_change_the_mean_of_a_face():
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.NOTHING), Sky(SKY, SUN, SUN_LUMINANCE)
@@ -120,7 +120,7 @@ def test_tiles_do_not_change_the_mean_of_a_face():
 
 
 def test_light_is_smoothed_over_a_face_and_never_over_its_edge():
-    from mitsuba_cfs.trace.kernels.pixel_sharing import SharedLight, Tiles
+    from mitsuba_cfs.trace.kernels.pixel_rows import SharedLight, Tiles
 
     tiles = Tiles(4, 40)
     pixel = np.arange(40 * 40)
@@ -144,7 +144,7 @@ def test_light_is_smoothed_over_a_face_and_never_over_its_edge():
 def test_noise_of_few_paths_makes_no_glare_sources():
     """Four paths a pixel: DGP varies by less than 0.005, and nothing on the walls glares."""
     from mitsuba_cfs.glare.evaluation import evaluate
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.NOTHING), Sky(SKY, SUN, SUN_LUMINANCE)
@@ -159,7 +159,7 @@ def test_noise_of_few_paths_makes_no_glare_sources():
 
 def test_a_colour_picture_has_the_bands_luminance():
     from mitsuba_cfs.images.hdr import EFFICACY, LUMINANCE_WEIGHTS, luminance
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+    from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import colour_picture
 
     interior, groups = rooms.test_room()
@@ -180,7 +180,7 @@ def test_a_colour_picture_has_the_bands_luminance():
 def test_other_views_show_the_same_luminance_in_the_same_direction(kind):
     from dataclasses import replace
 
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     interior, groups = rooms.test_room()
     scene, sky = (interior, groups, rooms.NOTHING), Sky(SKY, SUN, SUN_LUMINANCE)
@@ -201,7 +201,7 @@ def test_windows_reflect_the_rooms_light_in_the_phase_methods():
     from mitsuba_cfs import phases
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
     from mitsuba_cfs.trace.matrices.pixel_view import luminance_pictures
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
     from mitsuba_cfs.trace.pictures.annual import view_matrices
 
     tau, back = 0.3, 0.6
@@ -226,8 +226,7 @@ def test_windows_reflect_the_rooms_light_in_the_phase_methods():
 def test_sun_of_several_groups_with_trees_is_that_of_paths():
     """Two windows, a tensor tree in one and glass in the other, before a wall that shades."""
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering, sun_scattering
-    from mitsuba_cfs.trace.paths.path_scene import Sky
-    from mitsuba_cfs.trace.paths.systems import lit_system
+    from mitsuba_cfs.trace.paths.scene import Sky, lit_system
     from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
     K = KLEMS_FULL.size

@@ -23,8 +23,8 @@ NO_SUN = [0, 0, -1]
 
 def traced(systems, sky, *, scene=None, **options):
     from mitsuba_cfs.trace.kernels.estimate import Stopping
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom
     from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+    from mitsuba_cfs.trace.paths.scene import LitRoom
 
     interior, groups, exterior = scene or (*rooms.test_room(), rooms.NOTHING)
     room = LitRoom(interior, exterior, groups, systems)
@@ -44,14 +44,14 @@ def diffuser(*values):
     import mitsuba as mi
 
     from mitsuba_cfs.bsdf.plugin import klems_plugin
-    from mitsuba_cfs.trace.paths.path_scene import PathOptics
+    from mitsuba_cfs.trace.paths.scene import PathOptics
 
     return PathOptics(mi.load_dict(klems_plugin(klems(*values))))
 
 
 def glass(tau: float = 1.0):
     from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-    from mitsuba_cfs.trace.paths.path_scene import PathOptics
+    from mitsuba_cfs.trace.paths.scene import PathOptics
 
     return PathOptics(None, AngularBeam(np.full(16, tau)))
 
@@ -64,7 +64,7 @@ def agree(found, expected, error=0.0):
 
 def test_a_clear_hole_is_the_two_phase_matrix():
     from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     found = traced([glass()], Sky(SKY, NO_SUN, 0))
     room, _ = rooms.test_room()
@@ -76,7 +76,7 @@ def test_a_diffuser_under_sky_and_sun_is_the_three_phase_method():
     from mitsuba_cfs import phases
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
     from mitsuba_cfs.trace.matrices.view import view_matrix
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
     from mitsuba_cfs.trace.sun.direct import SUN_SOLID_ANGLE
 
     tau = 0.5
@@ -94,7 +94,7 @@ def test_a_diffuser_under_sky_and_sun_is_the_three_phase_method():
 
 def test_the_sun_through_glass_is_the_direct_matrix_and_its_reflections():
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
     from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     dark = np.zeros(146)
@@ -111,7 +111,7 @@ def test_the_sun_through_glass_is_the_direct_matrix_and_its_reflections():
 
 def test_a_white_back_returns_light_to_the_room():
     """Closed form: a room seen as an integrating sphere gains where the window reflects."""
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     black, white = (
         traced([diffuser(0.3, back)], Sky(SKY, NO_SUN, 0)).values for back in (0.0, 0.7)
@@ -122,7 +122,7 @@ def test_a_white_back_returns_light_to_the_room():
 def test_an_obstacle_before_one_of_two_windows_does_not_bias_the_paths():
     """In an L-shaped room paths that aim at a hidden window are given up, not counted twice."""
     from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     interior, groups, _ = rooms.l_shaped_room()
     scene = (interior, groups, rooms.NOTHING)
@@ -133,7 +133,7 @@ def test_an_obstacle_before_one_of_two_windows_does_not_bias_the_paths():
 
 def test_picture_shows_sky_ground_and_the_suns_disc():
     from mitsuba_cfs.images.view import fisheye, pixel_directions, pixel_solid_angles
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+    from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     interior, groups = rooms.test_room()
@@ -156,7 +156,7 @@ def test_picture_shows_sky_ground_and_the_suns_disc():
 
 
 def test_sky_must_be_a_reinhart_sky():
-    from mitsuba_cfs.trace.paths.path_scene import Sky
+    from mitsuba_cfs.trace.paths.scene import Sky
 
     assert ReinhartSky(1).size == 146
     with pytest.raises(ValueError, match="Reinhart"):
@@ -169,7 +169,7 @@ def test_daylight_coefficients_of_a_diffuser_are_the_three_phase_matrix():
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
     from mitsuba_cfs.trace.matrices.view import view_matrix
     from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
-    from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+    from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
 
     interior, groups = rooms.test_room()
     exterior = rooms.NOTHING  # something near lights parts of the window: V T D knows their mean

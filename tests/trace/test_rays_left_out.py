@@ -24,8 +24,7 @@ def test_discs_that_no_window_can_show_are_those_of_all_pairs(monkeypatch):
     """Among them suns whose disc alone reaches the window, from sensors near and far."""
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
-    from mitsuba_cfs.trace.sun.discs import SunDiscs
+    from mitsuba_cfs.trace.sun.direct import SunDiscs, direct_sun_matrix
 
     room, groups = rooms.test_room()
     sensors = np.array([[1.8, 0.05, 0.8], [1.8, 1.0, 0.8], [1.0, 4.0, 0.8], [1.8, 4.0, 1.7]])

@@ -12,13 +12,13 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
-from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows
-from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
 from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks
 from mitsuba_cfs.trace.sun.lit_points import Places
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
+from mitsuba_cfs.trace.sun.room_cells import RoomCells
 from mitsuba_cfs.trace.sun.room_sun import (
     FACE_STEPS,
     EdgePlaces,
@@ -39,6 +39,17 @@ STRIP = 0.1  # [m] of sun at the foot of a wall, how high
 EYE = np.array([0.4, 3.0, 0.6])
 
 
+def strip_on_cells(cells: RoomCells, tracer: TracedScene) -> np.ndarray:
+    """Irradiance of the cells where the strip of sun has 1 [lx]."""
+    y, z = np.meshgrid(np.linspace(0, box.DEPTH, 4001)[1:], STRIP * (np.arange(40) + 0.5) / 40)
+    at = np.stack([np.zeros(y.size), y.ravel(), z.ravel()], axis=1) - tracer.centre
+    at[:, 0] += tracer.epsilon[0]
+    points = Places(at.astype(np.float32), np.tile(np.float32([1, 0, 0]), (len(at), 1)))
+    cell = cells.numbers(points)
+    assert (cell >= 0).all()
+    return np.bincount(cell, minlength=cells.size) * (box.DEPTH * STRIP / y.size) / cells.area
+
+
 def test_a_strip_of_sun_at_a_walls_foot_lights_the_floor_beside_it_evenly() -> None:
     """Tile by tile as a strip of infinite length does: (1 - cos of its height as an angle) / 2."""
     view = cfs.fisheye(tuple(EYE), (0.0, 0.05, -1.0), 100)
@@ -46,11 +57,12 @@ def test_a_strip_of_sun_at_a_walls_foot_lights_the_floor_beside_it_evenly() -> N
     tracer = kept_scene(interior, box.window_groups())
     rows = PictureRows.of_view(tracer, view, tile_size(view))
     times = np.ones(len(rows.pixels), dtype=np.int64)
-    elements, _ = sun_elements(tracer, float(interior.areas.sum()), view, rows, times)
+    elements, _ = sun_elements(tracer, interior, view, rows, times)
     point = elements.places.point + tracer.centre
     lit = (point[:, 0] < 0.01) & (point[:, 2] < STRIP) & (elements.places.normal[:, 0] > 0.9)
+    on_cells = strip_on_cells(elements.cells, tracer)
     mean, _ = rows.of_halves(np.ones(len(rows.pixels), dtype=np.float32), 0.01)
-    found = mean @ elements.rows(lit.astype(np.float32)[:, None])[:, 0]
+    found = mean @ elements.rows(on_cells[:, None], lit.astype(np.float32)[:, None])[:, 0]
     way = pixel_directions(view)[0].reshape(-1, 3)[rows.pixels]
     place = EYE - EYE[2] / np.minimum(way[:, 2:], -0.1) * way
     near = (place[:, 0] > 0.05) & (place[:, 0] < 0.15) & (np.abs(place[:, 1] - EYE[1]) < 0.5)
@@ -71,9 +83,8 @@ def test_a_window_low_above_a_wide_floor_sees_the_sun_on_it_in_half_of_its_view(
     interior = rooms.surfaces([(floor, 0.4)])
     pane = rooms.quad((-0.1, 0, 0.1), (0.1, 0, 0.1), (0.1, 0, 0.3), (-0.1, 0, 0.3))
     groups = [WindowGroup("low", (WindowSurface("low", pane),))]
-    found = window_elements(kept_scene(interior, groups), 1.0, samples=64)
-    irradiance = np.ones((found.places.size, 1), dtype=np.float32)
-    luminance = found.rows(irradiance)[:, 0]
+    found = window_elements(kept_scene(interior, groups), interior, samples=64)
+    luminance = found.far_rows(np.ones((found.cells.size, 1), dtype=np.float32))[:, 0]
     # E = rho / pi * pi * the floor's half of the view
     lux = KLEMS_FULL.projected_solid_angles() @ luminance
     assert lux == pytest.approx(0.4 / 2, rel=0.02)
@@ -118,7 +129,7 @@ def test_sun_near_by_is_what_all_places_of_each_element_say(monkeypatch) -> None
     tracer = kept_scene(interior, groups)
     rows = PictureRows.of_view(tracer, view, 4)
     times = np.ones(len(rows.pixels), dtype=np.int64)
-    elements, _ = sun_elements(tracer, float(interior.areas.sum()), view, rows, times)
+    elements, _ = sun_elements(tracer, interior, view, rows, times)
     elements = replace(elements, share=sparse.csr_array(elements.share.shape, dtype=np.float32))
     clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.ones(145))
     sun = PictureSun(interior, box.NOTHING, groups, [clear], view)

@@ -41,8 +41,7 @@ def floor_places(outside, count: int, seed: int = 0):
 
 def both(surfaces: Surfaces, count: int, suns: np.ndarray):
     """By the grid and by a ray of each pair [m, h]."""
-    from mitsuba_cfs.trace.sun.grid import sunlight_of_many
-    from mitsuba_cfs.trace.sun.lit_points import sunlight
+    from mitsuba_cfs.trace.sun.lit_points import sunlight, sunlight_of_many
 
     outside = outdoors(surfaces)
     places = floor_places(outside, count)
@@ -60,7 +59,7 @@ def fence() -> Surfaces:
 
 
 def test_directions_lie_between_the_nodes_about_them():
-    from mitsuba_cfs.trace.sun.grid import STEP, SunGrid
+    from mitsuba_cfs.trace.sun.lit_points import STEP, SunGrid
 
     suns = suns_of_a_year()
     grid = SunGrid.about(suns)
@@ -98,7 +97,7 @@ def test_what_is_thinner_than_the_grid_has_its_right_mean():
 
 
 def test_an_hour_has_the_same_light_whatever_others_are_computed_with_it():
-    from mitsuba_cfs.trace.sun.grid import sunlight_of_many
+    from mitsuba_cfs.trace.sun.lit_points import sunlight_of_many
 
     suns = suns_of_a_year()
     outside = outdoors(fence())
@@ -109,8 +108,7 @@ def test_an_hour_has_the_same_light_whatever_others_are_computed_with_it():
 
 
 def test_mirrors_send_on_as_much_sun_as_by_rays_to_each():
-    from mitsuba_cfs.trace.sun.grid import sunlight_of_many
-    from mitsuba_cfs.trace.sun.lit_points import sunlight
+    from mitsuba_cfs.trace.sun.lit_points import sunlight, sunlight_of_many
 
     pane = rooms.quad((0, -10, 0), (4, -11, 0), (4, -11, 3), (0, -10, 3))
     there = Surfaces(pane, np.zeros(2), np.zeros(2, dtype=int), (), (mirror(0.8),))

@@ -29,7 +29,7 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
-from mitsuba_cfs.trace.paths.path_scene import LitRoom
+from mitsuba_cfs.trace.paths.scene import LitRoom
 from tests.validation.cie171_cases import GLASS, SKIES, Case, cases, cie_sky, reported
 from tests.validation.cie171_quadrature import INDEX, Array
 

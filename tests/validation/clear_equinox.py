@@ -36,8 +36,9 @@ from scenes.comply.light import lights_of
 from scenes.comply.needs import Equinox, SunlightExposure
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
+from scenes.room.inputs import room_inputs
+from scenes.room.light import room_light
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.room import RoomSimulation
 from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from tests.benchmarks import radiance
@@ -114,21 +115,21 @@ def compared(
         sun_points=128, seed=seed,
     )  # fmt: skip
     skies = skies_for(weather, "five-phase", options.sampling)
-    room = RoomSimulation(
+    room = room_inputs(
         building, space, in_all_windows(space, glass()), weather, options, skies=skies, grids=[GRID]
     )
-    calendar = calendar_of(weather)
+    light, calendar = room_light(room), calendar_of(weather)
     hours = np.unique(np.concatenate([calendar.clear_hours(clock) for clock in NEED.clocks]))
     scene = _scene(building, folder)
-    up = np.tile([0.0, 0.0, 1.0], (len(room.scene.points), 1))
-    sensors = radiance.sensors_text(room.scene.points, up)
+    up = np.tile([0.0, 0.0, 1.0], (len(light.scene.points), 1))
+    sensors = radiance.sensors_text(light.scene.points, up)
     options_of_point = f"{POINT} -ad {DIVISIONS + 7 * seed}"
     clear = [
         _traced(scene, skies, int(h), sensors, options_of_point)
         for h in np.searchsorted(skies.lit, hours)
     ]
     direct = _direct(scene, skies, sensors)
-    (ours,) = lights_of(room, ())
+    (ours,) = lights_of(room, light, ())
     whole = skies.whole_year(direct.astype(np.float32).T).T
     return Sides(ours, np.array(clear), hours, whole, calendar)
 

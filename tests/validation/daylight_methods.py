@@ -41,9 +41,8 @@ from mitsuba_cfs.trace.kernels.scattering import Scattering, sun_scattering
 from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from mitsuba_cfs.trace.matrices.view import view_matrix
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-from mitsuba_cfs.trace.paths.systems import lit_system
+from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky, lit_system
 from tests.validation.blind_room import (
     TILTS,
     BlindRoom,

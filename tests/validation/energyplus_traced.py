@@ -30,7 +30,8 @@ from scenes.fenestration.systems import FenestrationSystem
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.heat.box import box_building
 from scenes.heat.study_file import StudyFile, read_study
-from scenes.room.room import RoomSimulation
+from scenes.room.inputs import room_inputs
+from scenes.room.room import operated_zone
 from scenes.room.skies import skies_for
 from scenes.room.windows import in_all_windows
 from scenes.room.zone import RoomZone, balances
@@ -107,10 +108,11 @@ def traced_case(
     (space,) = building.spaces
 
     def under(solar: NDArray[np.floating]) -> RoomZone:
-        return RoomSimulation(
+        room = room_inputs(
             building, space, in_all_windows(space, system), place.weather, study.options,
             operation=study, skies=replace(place.skies, solar=solar), cache=cache,
-        ).zone  # fmt: skip
+        )  # fmt: skip
+        return operated_zone(room)
 
     whole = place.skies.solar
     room = under(whole)

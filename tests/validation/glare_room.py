@@ -24,7 +24,7 @@ from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-from mitsuba_cfs.trace.paths.path_scene import PathOptics
+from mitsuba_cfs.trace.paths.scene import PathOptics
 from tests.validation import blind_room
 from tests.validation.glare_systems import tree_optics
 

@@ -11,7 +11,7 @@ from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam, KlemsScattering
-from mitsuba_cfs.trace.paths.path_scene import PathOptics
+from mitsuba_cfs.trace.paths.scene import PathOptics
 
 
 class TreeBehind:

@@ -33,8 +33,8 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance

@@ -34,8 +34,8 @@ from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from scenes.demo import VENETIAN_BLIND
 from scenes.fenestration.systems import read_system
-from scenes.room.daylight import room_scene
-from scenes.room.inner_glass import PANE, inner_glass, lending_rooms, opened
+from scenes.room.inner_glass import PANE, inner_glass, opened, source_rooms
+from scenes.room.light import room_scene
 from scenes.room.options import SensorGrid
 from scenes.room.windows import in_all_windows, room_windows
 from tests.benchmarks.radiance import polygon, write_surfaces
@@ -58,7 +58,7 @@ def borrowing_scene(building: Building, space: Space) -> DaylightScene | None:
     """A room and all that it borrows from, with few sensors; None where it borrows nothing."""
     blind = read_system(VENETIAN_BLIND)  # what fills the windows is replaced
     systems = {}
-    for room in (space, *lending_rooms(building, space)):
+    for room in (space, *source_rooms(building, space)):
         systems |= in_all_windows(room, blind)
     inner = inner_glass(building, space, systems)
     if inner is None:
@@ -184,7 +184,7 @@ def main(
         scene = borrowing_scene(building, room)
         if scene is None:
             continue
-        lent = ", ".join(other.label for other in lending_rooms(building, room))
+        lent = ", ".join(other.label for other in source_rooms(building, room))
         with tempfile.TemporaryDirectory() as name:
             runs = {
                 "three-phase": [by_phases(scene, seed) for seed in range(seeds)],

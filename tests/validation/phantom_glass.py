@@ -99,7 +99,7 @@ def counted(path: Path) -> Counted:
     before = sum(pane.area * pane.inside for pane in real.values())
     left = {guid: pane.area - ours.get(guid, 0.0) for guid, pane in real.items()}
     left = {guid: area for guid, area in left.items() if area > ROUGH * real[guid].area}
-    named = {problem.where for problem in building.problems}
+    named = {issue.where for issue in building.issues}
     silent = {g: a for g, a in left.items() if named.isdisjoint(_with_wholes(model, g))}
     misses += [f"{_said(model, g)}: {area:.2f} left in silence" for g, area in silent.items()]
     left_area = sum(left.values())

@@ -37,8 +37,7 @@ from mitsuba_cfs.sky.matrix import sky_matrix, sky_series
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE, is_up
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, PathOptics, Sky
-from mitsuba_cfs.trace.paths.systems import lit_system
+from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky, lit_system
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance

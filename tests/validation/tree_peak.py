@@ -35,7 +35,7 @@ from mitsuba_cfs.images.view import View, fisheye
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.sampling import lattice_2d
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks.annual_product import WEATHER

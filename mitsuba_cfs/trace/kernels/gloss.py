@@ -1,4 +1,4 @@
-"""The gloss of a scene's triangles as tables: its reflectance, its lobe, and its mirror planes."""
+"""Gloss of a scene's triangles as kernel tables: specular reflectance, lobe, mirror planes."""
 
 from __future__ import annotations
 

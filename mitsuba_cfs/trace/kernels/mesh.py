@@ -1,4 +1,4 @@
-"""Acceleration structures: of one mesh, or of one that scenes with the same triangles share."""
+"""Meshes and their acceleration structures, which scenes with the same triangles can share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The luminance of the windows' patches in some hours, which paths add up in the patches' place."""
+"""Luminance of the window patches in some hours, which paths accumulate instead of patches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random walks over diffuse surfaces: where paths start, where they go on, and when they end."""
+"""Random walks over diffuse surfaces: starts, directions after a reflection, roulette."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import mitsuba as mi
 
 @dataclass
 class PathStarts:
-    """The starts of paths, one for each lane, and what ends them."""
+    """Start of one path per lane, and its largest depth."""
 
     row: mi.UInt32  # of the matrix or result that each path adds to
     position: mi.Point3f
@@ -27,7 +27,7 @@ def diffuse_direction(normal: mi.Vector3f, generator: mi.PCG32) -> mi.Vector3f:
 
 
 def roulette(beta: mi.Float, depth: mi.UInt32, generator: mi.PCG32) -> tuple[mi.Bool, mi.Float]:
-    """Which paths Russian roulette lets live after some bounces, and what they then carry."""
+    """Which paths survive Russian roulette after some bounces, and their weights."""
     survival = dr.select(depth > 2, dr.minimum(beta * 2.0, 0.95), 1.0)
     alive = (generator.next_float32() < survival) & (beta > 0)
     return alive, beta / dr.maximum(survival, 1e-6)

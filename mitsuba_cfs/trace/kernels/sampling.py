@@ -54,18 +54,18 @@ def lattice_2d(sample: mi.UInt32, stream: mi.UInt32, dimension: int) -> mi.Point
 
 
 def path_generator(path: mi.UInt32, seed: mi.UInt32) -> mi.PCG32:
-    """The random generator of one path, keyed by its number: chunks do not change the result."""
+    """Random generator keyed by the global path number: chunks do not change the result."""
     a, b = mi.sample_tea_32(path, seed)
     return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
 
 
 def batch_key(seed: int, number: int) -> mi.UInt32:
-    """The key of a seed's batch of that number: apart from those of all seeds near it."""
+    """Key of a batch of a seed, distinct from those of neighbouring seeds."""
     return dr.opaque(mi.UInt32, (seed * 1_000_003 + number) & 0xFFFFFFFF)
 
 
 def opaque(value: int | float, kind: type | None = None) -> Any:
-    """A number that may change between calls without a new compilation of the kernel.
+    """A number that may change between calls without compiling the kernel again.
 
     Args: kind: `mi.Float` by default.
     """
@@ -74,15 +74,15 @@ def opaque(value: int | float, kind: type | None = None) -> Any:
 
 
 def opaque_vector(values: ArrayLike) -> mi.Vector3f:
-    """A direction that may change between calls without a new compilation of the kernel."""
+    """A direction that may change between calls without compiling the kernel again."""
     return mi.Vector3f(*map(opaque, np.asarray(values, dtype=float)))
 
 
 def column(values: ArrayLike, kind: type | None = None) -> Any:
-    """Values [n] as a kernel takes them, one for each lane.
+    """Values [n] as a kernel's argument, one for each lane, in aligned memory.
 
-    Dr.Jit compiles one kernel for memory that begins at the width of its vectors and another for
-    any other; NumPy's begins now here, now there.
+    Dr.Jit compiles one kernel for memory aligned to the width of its vectors and another for any
+    other; NumPy's memory may be either.
 
     Args: kind: `mi.Float` by default.
     """
@@ -99,7 +99,7 @@ def column(values: ArrayLike, kind: type | None = None) -> Any:
 
 
 def vectors(table: ArrayLike, kind: type | None = None) -> Any:
-    """A table [n, 3] as a kernel takes it, axis by axis: as a whole its n would be a literal.
+    """A table [n, 3] as a kernel's argument, by columns: as a whole, its n would be compiled in.
 
     Args: kind: `mi.Vector3f` by default.
     """
@@ -107,7 +107,7 @@ def vectors(table: ArrayLike, kind: type | None = None) -> Any:
 
 
 def tables(*found: Any) -> list[NDArray[Any]]:
-    """What a kernel gives, all from one launch: vectors as tables [n, 3], the others as [n]."""
+    """Results of a kernel from one launch: vectors as tables [n, 3], the others as [n]."""
     dr.eval(*found)
     return [
         np.stack(np.broadcast_arrays(*(axis.numpy() for axis in one)), axis=1)
@@ -118,21 +118,21 @@ def tables(*found: Any) -> list[NDArray[Any]]:
 
 
 def empty_sums(count: int) -> mi.Float64:
-    """Zeros to add up to in a kernel, at least so many, for `sums_of`.
+    """At least `count` zeros for a kernel to add to; `sums_of` reads them.
 
-    Dr.Jit gives each thread a copy of what is not large and writes its size into the kernel: it is
-    a power of two, so that few kernels differ in it.
+    Dr.Jit gives each thread a copy of small targets and compiles their size into the kernel: a
+    power of two, so that few kernels differ in it.
     """
     return dr.zeros(mi.Float64, count if count > PADDED else 1 << (count - 1).bit_length())
 
 
 def sums_of(sums: mi.Float64, shape: Sequence[int]) -> NDArray[np.float64]:
-    """What a kernel has added up, as an array of a shape."""
+    """Sums of a kernel as an array of a shape."""
     return sums.numpy()[: math.prod(shape)].reshape(shape)
 
 
 class DiscreteDistribution:
-    """Numbers drawn by weights, as `mi.DiscreteDistribution`, whose kernels hang on their count."""
+    """Discrete sampling by weights; unlike `mi.DiscreteDistribution`, its kernels know no count."""
 
     STEPS = 4  # of the search: kernels differ by so many halvings of the table
 
@@ -148,7 +148,7 @@ class DiscreteDistribution:
         self._steps = -(-int(some[-1] - some[0] + 1).bit_length() // self.STEPS) * self.STEPS
 
     def sample_reuse(self, u: mi.Float, active: mi.Bool = True) -> tuple[mi.UInt32, mi.Float]:
-        """The number that u in [0, 1) stands for, and u within its share, in [0, 1) again."""
+        """The sampled number for u in [0, 1), and u rescaled to [0, 1) within its share."""
         mark, low, high = u * self._sum, mi.UInt32(self._first), mi.UInt32(self._last)
         for _ in range(self._steps):
             middle = (low + high) >> 1
@@ -161,13 +161,13 @@ class DiscreteDistribution:
 
 
 def pixel_places(samples: int) -> NDArray[np.float64]:
-    """Places [n, 2] within a pixel, evenly spread (R2 sequence)."""
+    """Positions [n, 2] within a pixel, evenly spread (R2 sequence)."""
     return even_numbers(samples)
 
 
 def spread_rays(
     view: View, pixels: NDArray[np.int64], samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Rays [n * samples, 3] evenly spread over each of some pixels [n], and where there is one."""
+    """Rays [n * samples, 3] evenly spread over some pixels [n], and which of them exist."""
     across, down = np.tile(pixel_places(samples), (len(pixels), 1)).T
     return pixel_rays(view, np.repeat(pixels, samples), across, down)

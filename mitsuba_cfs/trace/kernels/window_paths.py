@@ -1,4 +1,4 @@
-"""Paths that start on the windows: evenly over a group and over each patch of its directions."""
+"""Paths that start on the windows, uniform over a group's area and over each patch."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class WindowPaths:
     generator: mi.PCG32
 
     def inward(self, tracer: TracedScene) -> mi.Vector3f:
-        """World direction in the room: a back's patch lies before it as the front's, mirrored."""
+        """World direction into the room: the patches of the back mirror those of the front."""
         normal = tracer.exterior_normal(self.group)
         return mi.Vector3f(self.outward - normal * (2 * dr.dot(normal, self.outward)))
 
@@ -42,7 +42,7 @@ def window_batches(
 ) -> Callable[[int], NDArray[np.float64]]:
     """Batches [G, K, columns] of means over the paths of each group and patch.
 
-    Args: follow: adds what each path finds to its row of a matrix [K * columns].
+    Args: follow: adds the result of each path to its row of a matrix [K * columns].
     """
     K, G = bins.size, len(tracer.groups)
 

@@ -1,4 +1,7 @@
-"""Daylight matrices: what reaches a window patch, or a sensor outdoors, from each sky patch."""
+"""Daylight matrices: what reaches a window patch, or a sensor outdoors, from each sky patch.
+
+Directions in which a flat receiver takes up light: the cosine times its angular acceptance.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,6 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.trace.kernels.acceptance import AcceptedDirections
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
@@ -31,6 +33,40 @@ from mitsuba_cfs.trace.kernels.sampling import (
 )
 from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
+
+ENTRIES = 4096  # of the inverse distribution
+
+
+class AcceptedDirections:
+    """Directions over the hemisphere with density a(theta) cos(theta) / total."""
+
+    def __init__(self, acceptance: ArrayLike | None = None) -> None:
+        """Prepare the distribution.
+
+        Args:
+            acceptance: a(theta) at even steps from 0 to 90 degrees, linear between; 1 by default.
+        """
+        a = np.ones(2) if acceptance is None else np.asarray(acceptance, dtype=float)
+        if a.ndim != 1 or len(a) < 2 or a.min() < 0 or not a.max() > 0:
+            raise ValueError("acceptance: expected two or more values, none negative, not all 0")
+        # u = sin^2(theta) is even for a cosine: pi times the integral of a over u is the total
+        u = np.linspace(0.0, 1.0, ENTRIES + 1)
+        middle = np.arcsin(np.sqrt(0.5 * (u[1:] + u[:-1])))
+        density = np.interp(middle, np.linspace(0.0, np.pi / 2, len(a)), a)
+        cumulative = np.concatenate([[0.0], np.cumsum(density)]) / ENTRIES
+        self.total = float(np.pi * cumulative[-1])  # projected solid angle [sr]
+        inverse = np.interp(u, cumulative / cumulative[-1], u)
+        self._inverse = mi.Float(inverse.astype(np.float32))
+
+    def sample(self, u: mi.Point2f) -> mi.Vector3f:
+        """A local direction, z along the receiver's normal."""
+        place = u.x * ENTRIES
+        index = dr.minimum(mi.UInt32(place), ENTRIES - 1)
+        low = dr.gather(mi.Float, self._inverse, index)
+        high = dr.gather(mi.Float, self._inverse, index + 1)
+        sine2 = dr.clip(low + (high - low) * (place - mi.Float(index)), 0.0, 1.0)
+        sine, phi = dr.sqrt(sine2), dr.two_pi * u.y
+        return mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), dr.sqrt(1.0 - sine2))
 
 
 @dr.syntax
@@ -103,11 +139,11 @@ def daylight_matrix(
     that sees no obstruction sums to 1.
 
     Args:
-        surfaces: what stands outdoors, in the band of the radiances; the windows' own panes and
-            whatever lies behind them must not be among it.
+        surfaces: outdoors, in the band of the radiances, without the windows' own panes and
+            anything on the room side of them.
         subdivision: Reinhart's MF (1, 2, 4, 6).
         samples: paths for each window patch in each batch.
-        cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
+        cache: of traced matrices, `MatrixCache.of_user()`; none by default.
 
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
@@ -158,11 +194,11 @@ def sky_irradiance_matrix(
     A row sums to pi where nothing around the sensor absorbs.
 
     Args:
-        points, directions: [S, 3] sensor positions [m] and normals; or [S, K, 3] places of each
-            sensor, of which its rows are the mean.
-        acceptance: what the sensor takes up of light at even steps from normal to grazing
-            incidence, 0 to 90 degrees; all of it by default.
-        max_depth: 1 leaves the sky that the sensor sees itself.
+        points, directions: [S, 3] sensor positions [m] and normals; or [S, K, 3] points of each
+            sensor, over which its row is averaged.
+        acceptance: angular acceptance at even steps of incidence from 0 to 90 degrees; 1 by
+            default.
+        max_depth: 1 for direct sky light only.
         samples: paths for each sensor in each batch.
     """
     points = np.asarray(points, dtype=float)

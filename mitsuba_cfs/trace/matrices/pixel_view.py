@@ -19,7 +19,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.kernels.pixel_sharing import numbered
+from mitsuba_cfs.trace.kernels.pixel_rows import numbered
 from mitsuba_cfs.trace.kernels.sampling import (
     batch_key,
     column,

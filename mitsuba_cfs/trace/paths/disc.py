@@ -13,15 +13,9 @@ from mitsuba_cfs.glare.sun_disc import SunDisc, seen_disc
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_solid_angles
 from mitsuba_cfs.trace.kernels.sampling import vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
 from mitsuba_cfs.trace.paths.sun import by_plane, straight_to_sky
-from mitsuba_cfs.trace.sun.picture_disc import (
-    before_eye,
-    disc_in_view,
-    disc_parts,
-    disc_rays,
-    disc_reach,
-)
+from mitsuba_cfs.trace.sun.pixels import before_eye, disc_in_view, disc_parts, disc_rays, disc_reach
 
 DISC_STEP = np.radians(0.005)  # between rays to the sun's disc
 

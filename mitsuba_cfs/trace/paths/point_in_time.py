@@ -16,7 +16,7 @@ from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import batch_key, path_generator, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.paths.scene import LitRoom, PatchSky, Sky
 from mitsuba_cfs.trace.paths.sun import (
     Vertex,
     leave_by_gloss,

@@ -20,7 +20,7 @@ import numpy as np
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, facet_density, facets
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.paths.scene import LitRoom, PatchSky, Sky
 
 MOST_IMAGES = 8  # mirror planes asked at a vertex; of more, so many are drawn
 

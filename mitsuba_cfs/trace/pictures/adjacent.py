@@ -21,13 +21,7 @@ from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.pixel_sharing import (
-    Tiles,
-    face_numbers,
-    numbered,
-    smoothing,
-    tile_size,
-)
+from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, numbered, smoothing, tile_size
 from mitsuba_cfs.trace.kernels.sampling import (
     column,
     empty_sums,
@@ -39,7 +33,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
 from mitsuba_cfs.trace.kernels.view_paths import add_view_paths
-from mitsuba_cfs.trace.matrices.adjacent_view import LendingRoom, RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind
 from mitsuba_cfs.trace.pictures.outdoors import (
     RAYS,
     SeenOutdoors,
@@ -47,7 +41,7 @@ from mitsuba_cfs.trace.pictures.outdoors import (
     view_lanes,
 )
 from mitsuba_cfs.trace.sun.lit_points import Places, face_places
-from mitsuba_cfs.trace.sun.outdoor_gloss import MOST_MIRRORS, Lanes, mirrored
+from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, Lanes, mirrored
 
 BLOCK_BYTES = 128 * 2**20
 LEAST_PATHS = 64  # of a face in a tile: slivers have few rays

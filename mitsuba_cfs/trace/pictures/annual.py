@@ -24,8 +24,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows
-from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scene import kept_scene
 from mitsuba_cfs.trace.matrices.pixel_view import PictureBlock, picture_part_blocks
 from mitsuba_cfs.trace.pictures.outdoors import OutdoorCoefficients
@@ -126,9 +125,9 @@ def view_matrices(
     share = share.astype(np.float32)
     found, close = None, None if elements is None else elements.close
     if elements is None and options.get("max_depth", 2) > 1:
-        area, seed = float(surfaces.areas.sum()), options.get("seed", 0)
+        seed = options.get("seed", 0)
         paths = {"samples": options.get("samples", 32), "seed": seed}
-        found, close = sun_elements(tracer, area, view, shared, times, **paths)
+        found, close = sun_elements(tracer, surfaces, view, shared, times, **paths)
     mean, noise, smooth = _smooth(sums, shared, share, 0.5 / options.get("samples", 32), close)
     if found is not None:
         elements = SunlitRows(*(found.of_rows(a, smooth) for a in (mean, noise)), close)

@@ -20,7 +20,7 @@ from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.pixel_sharing import Tiles, face_numbers, smoothing, tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, smoothing, tile_size
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import (
     column,
@@ -36,8 +36,15 @@ from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
 from mitsuba_cfs.trace.sun.lit_points import Places, face_places
-from mitsuba_cfs.trace.sun.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, RoughSun, mirrored
-from mitsuba_cfs.trace.sun.outdoor_sun import OutdoorSun, ShownFaces
+from mitsuba_cfs.trace.sun.outdoors import (
+    MOST_MIRRORS,
+    Lanes,
+    OutdoorSun,
+    RoughFaces,
+    RoughSun,
+    ShownFaces,
+    mirrored,
+)
 
 BLOCK_BYTES = 128 * 2**20
 PATCH_POINTS = 16  # directions in each window patch, for its mean transmittance

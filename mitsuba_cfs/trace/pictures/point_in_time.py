@@ -7,6 +7,8 @@ scatters towards the eye, sky and outdoors through the straight beam, what the g
 Shared (`picture_sharing`), as it varies slowly over a face and its noise would make false glare
 sources: light that reaches a surface after one reflection or more or from the windows, and
 the sky that a window scatters.
+
+What changes from pixel to pixel on a surface in a picture: the sun on it, and its gloss.
 """
 
 from __future__ import annotations
@@ -23,13 +25,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.kernels.pixel_sharing import (
-    STEPS,
-    SharedLight,
-    Tiles,
-    face_numbers,
-    tile_size,
-)
+from mitsuba_cfs.trace.kernels.pixel_rows import STEPS, SharedLight, Tiles, face_numbers, tile_size
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import (
     lattice,
@@ -41,13 +37,52 @@ from mitsuba_cfs.trace.kernels.sampling import (
 )
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.paths.disc import add_disc, add_mirrored_discs, eye_of
-from mitsuba_cfs.trace.paths.path_scene import LitRoom, Sky
 from mitsuba_cfs.trace.paths.point_in_time import add_paths, leave, window_parts, window_sun
-from mitsuba_cfs.trace.paths.sun import Vertex, on_disc
-from mitsuba_cfs.trace.pictures.gloss import shown_sharp
+from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.sun import Vertex, on_disc, surface_sun
 
 BLOCK = 2**19  # paths traced at a time
 WINDOW_STEPS = (1,)  # [tiles] of the smoothing where windows scatter
+
+
+def _sharp_light(
+    room: LitRoom,
+    sky: Sky,
+    vertex: Vertex,
+    triangle: mi.UInt32,
+    direction: mi.Vector3f,
+    *,
+    rho: mi.Float,  # diffuse reflectance
+    u_sun: mi.Point2f,
+    generator: mi.PCG32,
+    depth: mi.UInt32,
+    active: mi.Bool,
+) -> mi.Float64:
+    """Radiance of surfaces by the sun itself, and by what their gloss shows, for each ray."""
+    sun = surface_sun(
+        room, sky, vertex, triangle, direction,
+        rho=rho, came=mi.Float(0), u=u_sun, generator=generator, active=active,
+    )  # fmt: skip
+    sharp = dr.select(active, mi.Float64(sun), 0.0)
+    for tracer, here in ((room.inside, ~vertex.outdoors), (room.outside, vertex.outdoors)):
+        if tracer.gloss is None:
+            continue
+        glossy, towards, weight = tracer.gloss.leave(
+            triangle, vertex.normal, direction, mi.Float(0), generator, active & here
+        )
+        lane = dr.arange(mi.UInt32, dr.width(direction))
+        seen = dr.zeros(mi.Float64, dr.width(direction))
+        starts = PathStarts(
+            lane, mi.Point3f(vertex.position), mi.Vector3f(towards), mi.PCG32(generator), depth,
+            glossy & (weight > 0),
+        )  # fmt: skip
+        add_paths(
+            room, sky, seen, starts,
+            cosine=mi.Float(0), came=mi.Float(0), aimed=mi.Bool(False),
+            beta=dr.select(glossy, weight, 0.0), outdoors=mi.Bool(vertex.outdoors),
+        )  # fmt: skip
+        sharp += seen
+    return sharp
 
 
 def point_in_time_picture(
@@ -265,7 +300,7 @@ class _Kernel:
         normal = dr.select(behind, -normal, normal)
         rho = inside.diffuse(hit.prim_index, -dr.dot(normal, direction), opaque)
         vertex = Vertex(mi.Point3f(point + normal * inside.epsilon), normal, indoors)
-        sharp = shown_sharp(
+        sharp = _sharp_light(
             room, sky, vertex, hit.prim_index, direction,
             rho=rho, u_sun=u_sun, generator=generator, depth=self._depth, active=opaque,
         )  # fmt: skip
@@ -362,7 +397,7 @@ class _Kernel:
         vertex = Vertex(place, normal, outdoors)
         rho = outside.diffuse(hit.prim_index, -dr.dot(normal, direction), opaque)
         u_sun = mi.Point2f(generator.next_float32(), generator.next_float32())
-        sharp += straight * shown_sharp(
+        sharp += straight * _sharp_light(
             room, sky, vertex, hit.prim_index, direction,
             rho=rho, u_sun=u_sun, generator=generator, depth=self._depth, active=opaque,
         )  # fmt: skip

@@ -1,13 +1,29 @@
-"""Where light that surfaces reflect comes from: places that paths meet, for shadow rays to the sun.
+"""The sun at points on surfaces, and the points whose reflected light reaches a point.
 
-What reaches a place x by reflection is the mean over cosine-sampled paths from it,
+The light that reaches a point x by reflection is the mean over cosine-sampled paths from it,
 
-    E(x) = mean of sum over the surfaces y that a path meets, product of rho up to y, E_sun(y)
+    E(x) = mean of sum over the points y that a path meets, product of rho up to y, E_sun(y)
 
-A gloss counts here as if it were diffuse: no light is lost, its direction is.  Where E_sun has the
-sun out of smooth mirrors as well (`sunlight`), what such a mirror itself has of it does not count.
+and a shadow ray to the sun's disc gives E_sun(y) (`sunlight`).  Gloss counts as diffuse here, so
+that no light is lost.  Where E_sun includes the sun in smooth mirrors, the mirrors' own reflection
+of the sun does not count.
 
 Source: Kajiya 1986, "The rendering equation", with next-event estimation of the sun.
+
+`sunlight_of_many` is for the thousands of suns of a year, whose neighbours mostly reach the same
+points.  Each point has rays to the nodes of a grid fixed on the sphere.  Where the three nodes
+about a sun agree, the sun has their visibility; where they do not, it gets a ray of its own.  One
+in `CHECKED` of the pairs whose nodes agree gets a ray too, which corrects for all of them:
+
+    share = s                       nodes agree; s = sum over them of a_i v(n_i)
+            s + CHECKED (v - s)     nodes agree, and the pair of point and sun is checked
+            v                       nodes do not agree
+
+Obstacles thinner than the grid so have the right mean, with noise in place of a bias.  Grid and
+checks depend on the sun's direction alone: the light of an hour does not depend on other hours.
+
+Source: control variates, Hammersley and Handscomb 1964, "Monte Carlo Methods", section 5.5; the
+grid is even in Lambert's azimuthal equal-area projection (Snyder 1987, "Map projections", 24).
 """
 
 from __future__ import annotations
@@ -23,26 +39,30 @@ from numpy.typing import NDArray
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, path_generator, tables, vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.specular_paths import SunWay, sun_ways
+from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SunWay, sun_ways
 
 BOUNCES = 5  # surfaces that a path meets at most
 ROULETTE = 0.5  # share of light below which paths are thinned out
+STEP = float(np.radians(4.0))  # between nodes, about the zenith
+CHECKED = 8  # of places whose nodes agree, one in so many has a ray to the sun itself
+MIRRORED = 32  # the same of the sun in a mirror, which few places have
+KEY = 2**32  # of a node's number along one axis, to hold both
 
 
 @dataclass(frozen=True)
 class Places:
-    """Points on surfaces and the sides of them that are meant."""
+    """Points on surfaces, each with the normal of the side that is meant."""
 
     point: NDArray[np.float32]  # [m, 3] in the tracer's coordinates, clear of the surface
     normal: NDArray[np.float32]  # [m, 3] unit
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """Number of points."""
         return len(self.point)
 
     def some(self, chosen: NDArray) -> Places:
-        """Some of them, by number or where a mask holds."""
+        """Some of the points, by number or mask."""
         number = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         return Places(self.point.take(number, axis=0), self.normal.take(number, axis=0))
 
@@ -56,7 +76,7 @@ class Places:
 
     @staticmethod
     def joined(parts: list[Places]) -> Places:
-        """All of several."""
+        """The points of all parts."""
         nowhere = np.empty((0, 3), dtype=np.float32)
         return Places(
             np.concatenate([nowhere, *(p.point for p in parts)]),
@@ -66,12 +86,12 @@ class Places:
 
 @dataclass(frozen=True)
 class ReflectingPlaces:
-    """What paths meet; axis q."""
+    """Points that paths meet; axis q."""
 
     path: NDArray[np.int64]  # [q] number of the path
-    weight: NDArray[np.float64]  # [q] product of reflectances, that of the place itself the last
+    weight: NDArray[np.float64]  # [q] product of reflectances, the point's own included
     places: Places  # [q]
-    first: int  # of these, how many the paths meet first; the others come after them
+    first: int  # number of points that the paths meet first; the others follow these
 
 
 def reflecting_places(
@@ -82,9 +102,9 @@ def reflecting_places(
     *,
     mirrored: bool = False,
 ) -> ReflectingPlaces:
-    """The surfaces that one path from each place meets, one after the other.
+    """The points that one path from each start meets, one after the other.
 
-    Args: mirrored: whether smooth mirrors send the sun on to the places otherwise.
+    Args: mirrored: whether E_sun includes the sun in smooth mirrors.
     """
     path, weight, places = np.arange(start.size), np.ones(start.size), start
     paths, weights, met = [np.empty(0, dtype=np.int64)], [np.empty(0)], []
@@ -110,9 +130,9 @@ def reflecting_places(
 def _next(
     tracer: TracedScene, places: Places, generator: mi.PCG32
 ) -> tuple[NDArray[np.bool_], Places, NDArray[np.float32], NDArray[np.float32]]:
-    """Which paths meet a surface that reflects; where, its reflectances, a number for roulette.
+    """Which paths meet a reflecting surface, the points, reflectances, random numbers for roulette.
 
-    The reflectances [2, m] are the whole one, and that without smooth mirrors.
+    The reflectances [2, m] are the total one, and that without smooth mirrors.
     """
     point, normal = places.points(), places.normals()
     u = mi.Point2f(generator.next_float32(), generator.next_float32())
@@ -135,7 +155,9 @@ def face_places(
     found: mi.Bool,
     *others: Any,
 ) -> tuple[Any, ...]:
-    """Where rays meet surfaces, on the side that they come from, and other things from one launch.
+    """Points where rays meet surfaces, on the side that they come from.
+
+    Args: others: values of the same kernel, which one launch computes together with the points.
 
     Returns: the `Places`, then the others as arrays.
     """
@@ -150,14 +172,14 @@ def met_faces(
     hit: mi.PreliminaryIntersection3f,
     found: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Vector3f]:
-    """Where rays meet surfaces, clear of them on the side that they come from, and its normal."""
+    """Points and normals where rays meet surfaces, offset to the side that they come from."""
     face = dr.gather(mi.Vector3f, tracer.normal, hit.prim_index, found)
     face = dr.mulsign(face, -dr.dot(face, way))
     return mi.Point3f(origin + way * hit.t + face * tracer.epsilon), face
 
 
 def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
-    """A direction on the sun's disc, another one for each number: the edges of shadows are soft."""
+    """A direction on the sun's disc for each number, so that the edges of shadows are soft."""
     u = lattice_2d(number, mi.UInt32(0x5BD1E995), 2)
     local = mi.warp.square_to_uniform_cone(u, float(np.cos(SUN_RADIUS)))
     return mi.Frame3f(centre).to_world(local)
@@ -166,7 +188,7 @@ def on_disc_of(centre: mi.Vector3f, number: mi.UInt32) -> mi.Vector3f:
 def place_and_hour(
     places: Places, suns: NDArray[np.float64], pair: mi.UInt32 | None = None
 ) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
-    """Point, normal and a direction to the sun of pairs of places and hours, of all [m * h]."""
+    """Point, normal and direction to the sun of pairs of points and hours, of all [m * h]."""
     lane = dr.arange(mi.UInt32, places.size * len(suns)) if pair is None else pair
     count = dr.opaque(mi.UInt32, len(suns))
     place = lane // count
@@ -178,7 +200,7 @@ def place_and_hour(
 def sunlight(
     outside: TracedScene, places: Places, suns: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Cosine of the sun at places outdoors where it shines, also out of mirrors, else 0 [m, h]."""
+    """Irradiance of points outdoors per unit normal to the sun, mirrored sun included [m, h]."""
     light = mi.Float(0)
     for way in sun_ways(outside):
         turned = way.turned(suns)
@@ -191,7 +213,7 @@ def sunlight(
 def sunlight_of_pairs(
     way: SunWay, places: Places, suns: NDArray[np.float64], pair: mi.UInt32
 ) -> mi.Float:
-    """The same of some pairs by one way, from whose end the suns are seen."""
+    """The same of some pairs by one specular path; suns: [h, 3] apparent directions."""
     point, normal, to_sun = place_and_hour(places, suns, pair)
     middle = dr.gather(mi.Vector3f, vectors(suns), pair % dr.opaque(mi.UInt32, len(suns)))
     return _shone(way, point, normal, to_sun, dr.dot(normal, middle))
@@ -200,7 +222,7 @@ def sunlight_of_pairs(
 def sunlight_of_each(
     outside: TracedScene, places: Places, suns: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """The same of each place by a sun of its own [m, 3]: [m]."""
+    """The same of each point by a sun of its own [m, 3]: [m]."""
     light, number = mi.Float(0), dr.arange(mi.UInt32, places.size)
     for way in sun_ways(outside):
         turned = way.turned(suns)
@@ -213,12 +235,86 @@ def sunlight_of_each(
 def _shone(
     way: SunWay, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f, middle: mi.Float
 ) -> mi.Float:
-    """Cosine of the sun at places where a direction on its disc reaches them; 0 elsewhere.
+    """Cosine times transmittance of a direction on the sun's disc; 0 where it is hidden.
 
-    Args: middle: the cosine of the disc's middle, its own mean where all of it is above the
-        place's horizon: one direction has noise.
+    Args: middle: cosine of the disc's centre, which is the disc's mean where all of it is above the
+        point's horizon, without the noise of one direction.
     """
     slant = dr.dot(normal, to_sun)
     cosine = dr.select(middle > SUN_RADIUS, middle, slant)
     share = way.reaching(mi.Ray3f(point, to_sun), slant > 0)
     return dr.select(cosine > 0, cosine * share, 0.0)
+
+
+@dataclass(frozen=True)
+class SunGrid:
+    """Nodes of the grid about some suns; axis h of the suns."""
+
+    suns: NDArray[np.float64]  # [h, 3]
+    nodes: NDArray[np.float64]  # [n, 3] unit
+    corner: NDArray[np.int64]  # [h, 3] number of the nodes about each sun
+    weight: NDArray[np.float64]  # [h, 3] of each, 1 in sum
+    first: NDArray[np.int64]  # [h] of `MIRRORED` places in a row, one that is checked
+
+    @classmethod
+    def about(cls, suns: NDArray[np.float64]) -> SunGrid:
+        """The triangles of the grid that directions [h, 3] are in."""
+        place = suns[:, :2] * np.sqrt(2 / np.maximum(1 + suns[:, 2:], 1e-9)) / STEP
+        low = np.floor(place).astype(np.int64)
+        x, y = (place - low).T
+        second = low + np.where((y > x)[:, None], [0, 1], [1, 0])
+        key = np.stack([low, second, low + 1], axis=1) @ np.array([KEY, 1])
+        found, corner = np.unique(key, return_inverse=True)
+        along = (found + KEY // 2) // KEY
+        flat = np.stack([along, found - along * KEY], axis=1) * STEP
+        square = np.minimum((flat**2).sum(axis=1), 4.0)
+        nodes = np.column_stack([flat * np.sqrt(1 - square / 4)[:, None], 1 - square / 2])
+        nodes /= np.linalg.norm(nodes, axis=1)[:, None]
+        more, less = np.maximum(x, y), np.minimum(x, y)
+        weight = np.column_stack([1 - more, more - less, less])
+        bits = suns.astype(np.float32).view(np.uint32).astype(np.uint64)
+        mixed = (bits @ np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], dtype=np.uint64)) >> 12
+        return cls(suns, nodes, corner.reshape(-1, 3), weight, mixed.astype(np.int64) % MIRRORED)
+
+    def light(self, way: SunWay, places: Places) -> mi.Float:
+        """Irradiance of points by a specular path per unit normal to the suns [m * h]."""
+        nodes, suns = way.turned(self.nodes), way.turned(self.suns)
+        point, normal, to_node = place_and_hour(places, nodes)
+        at = way.reaching(mi.Ray3f(point, to_node), dr.dot(normal, to_node) > 0)
+        dr.eval(at)
+        count = dr.opaque(mi.UInt32, len(suns))
+        place = dr.arange(mi.UInt32, places.size * len(suns))
+        place, hour = place // count, place % count
+        each = MIRRORED if way.mirrors else CHECKED
+        start, share, lit = place * dr.opaque(mi.UInt32, len(nodes)), mi.Float(0), mi.UInt32(0)
+        for corner, weight in zip(self.corner.T, self.weight.T, strict=True):
+            number = dr.gather(mi.UInt32, column(corner, mi.UInt32), hour)
+            value = dr.gather(mi.Float, at, start + number)
+            share += dr.gather(mi.Float, column(weight), hour) * value
+            lit += dr.select(value > 0, mi.UInt32(1), mi.UInt32(0))
+        cosine = dr.dot(
+            dr.gather(mi.Vector3f, places.normals(), place),
+            dr.gather(mi.Vector3f, vectors(suns), hour),
+        )
+        differ, level = (lit > 0) & (lit < 3), dr.abs(cosine) <= SPREAD
+        first = dr.gather(mi.UInt32, column(self.first, mi.UInt32), hour)
+        checked = (place + first) % each == 0
+        own = level | ((cosine > 0) & (differ | checked))
+        found = dr.select((cosine > 0) & ~level, cosine * share, 0.0)
+        times = dr.select(differ | level, mi.Float(1), mi.Float(each))
+        dr.eval(found, own, times)
+        pair = dr.compress(own)
+        if dr.width(pair):
+            before, more = (dr.gather(mi.Float, of, pair) for of in (found, times))
+            exact = sunlight_of_pairs(way, places, suns, pair)
+            dr.scatter(found, before + more * (exact - before), pair)
+        return found
+
+
+def sunlight_of_many(
+    outside: TracedScene, places: Places, suns: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """`sunlight` of many points [m, h] by the grid, unbiased in the sum over the points."""
+    grid = SunGrid.about(suns)
+    light = sum(grid.light(way, places) for way in sun_ways(outside))
+    return light.numpy().reshape(places.size, len(suns))

@@ -26,8 +26,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, shown_hits
-from mitsuba_cfs.trace.kernels.pixel_sharing import tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, shown_hits, tile_size
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene

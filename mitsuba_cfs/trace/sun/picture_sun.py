@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
@@ -20,17 +21,22 @@ from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaqu
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, kept_scene
 from mitsuba_cfs.trace.sun.lit_points import on_disc_of, place_and_hour
-from mitsuba_cfs.trace.sun.picture_disc import (
+from mitsuba_cfs.trace.sun.pixels import (
+    EDGE_PLACES,
     before_eye,
     disc_parts,
     disc_rays,
     disc_reach,
+    edge_pixels,
+    places_in_pixels,
 )
-from mitsuba_cfs.trace.sun.picture_edges import EDGE_PLACES, edge_pixels, places_in_pixels
+from mitsuba_cfs.trace.sun.room_cells import Beam, RoomCells
 from mitsuba_cfs.trace.sun.room_sun import EDGE_POINTS, SunElements
 from mitsuba_cfs.trace.sun.specular_paths import SunWay, sun_ways
 
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
+CELL_POINTS = 4096  # on all windows, that the sun is followed from to the cells of the room
+LEAST_POINTS = 256  # on each window group
 WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
 PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered sun
 
@@ -134,25 +140,43 @@ class PictureSun:
         self, elements: SunElements, suns: NDArray, illuminance: NDArray
     ) -> NDArray[np.float32]:
         """Luminance [m, h] of a picture's rows by the sun that parts of the room reflect."""
+        shining = np.flatnonzero((suns[:, 2] > 0) & (illuminance > 0))
         found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
+        irradiance = self._on_cells(elements.cells, suns[shining], illuminance[shining])
+        found[:, shining] = elements.far_rows(irradiance)
+        self._add_near(found, elements, suns, illuminance)
+        return found
+
+    def _on_cells(self, cells: RoomCells, suns: NDArray, illuminance: NDArray) -> sparse.csr_array:
+        """Irradiance of the room's cells by the windows' straight beams [c, h] [lx]."""
+        groups, scenes = self._inside.groups, (self._inside, self._outside)
+        whole, flux = sum(group.area for group in groups), sparse.csr_array((cells.size, len(suns)))
+        for g, (group, scattering) in enumerate(zip(groups, self._scattering, strict=True)):
+            points = max(round(CELL_POINTS * group.area / whole), LEAST_POINTS)
+            flux = flux + Beam(scenes, g, scattering, points).flux(cells, suns)
+        by_area = sparse.diags_array(1 / cells.area) @ flux @ sparse.diags_array(illuminance)
+        return sparse.csr_array(by_area).astype(np.float32)
+
+    def _add_near(
+        self, found: NDArray, elements: SunElements, suns: NDArray, illuminance: NDArray
+    ) -> None:
+        """Add the luminance [m, h] of rows by the sunlit pieces near them, point by point."""
         for mirror in self._mirrors:
-            found += mirror.on_elements(elements, suns, illuminance)
+            mirror._add_near(found, elements, suns, illuminance)
         suns, illuminance = self._turned(suns, illuminance)
         lit, places = self._shining(suns, illuminance), elements.places
         if not places.size or not len(lit):
-            return found
+            return
         step = max(1, LANES // places.size)
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
             light = self._beam_at(*place_and_hour(places, suns[hours]))
             light = light.reshape(places.size, len(hours))
             self._look_at_edges(elements, light, suns[hours])
-            found[:, hours] += elements.rows(light * illuminance[hours].astype(np.float32))
-        return found
+            found[:, hours] += elements.near @ (light * illuminance[hours].astype(np.float32))
 
-    def _look_at_edges(self, elements: SunElements, light: NDArray, suns: NDArray) -> None:
-        """Put the mean over its places on each element near rows that the edge of sun crosses."""
-        near = light[len(light) - elements.near.shape[1] :]
+    def _look_at_edges(self, elements: SunElements, near: NDArray, suns: NDArray) -> None:
+        """Put the mean over its points on each piece near rows that the edge of sun crosses."""
         element, hour = elements.edges.crossed(near)
         step = LANES // EDGE_POINTS
         for start in range(0, len(hour), step):

@@ -35,9 +35,13 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.straight_view import straight_rays
-from mitsuba_cfs.trace.sun.grid import sunlight_of_many
-from mitsuba_cfs.trace.sun.lit_points import Places, face_places, reflecting_places
-from mitsuba_cfs.trace.sun.outdoor_gloss import MOST_MIRRORS, Lanes, RoughFaces, mirrored
+from mitsuba_cfs.trace.sun.lit_points import (
+    Places,
+    face_places,
+    reflecting_places,
+    sunlight_of_many,
+)
+from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, Lanes, RoughFaces, mirrored
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
 PLACES = 1024  # that stand for all that paths meet, at most and where nothing is said

@@ -1,23 +1,27 @@
-"""The sun's beam on the surfaces of a room, and what these reflect to a view's pixels.
+"""The sun's beam on the surfaces of a room, as the pixels of a picture and the windows see it.
 
-    L[row] = sum over elements e of share[row, e] E_sun[e]
+    L[row] = sum over cells c of share[row, c] E_sun[c]
+             + sum over small pieces f near the row of near[row, f] E_sun[f]
 
-Elements are small parts of the surfaces; the sun on them is found by shadow rays, hour by hour.  A
-few paths from a tile of pixels would meet the window's patch with the sun once or never, and make
-the tile white or dark.
+A few paths from a tile of pixels would meet the window's patch with the sun once or never, and make
+the tile white or dark.  So paths and rays only find the share that a row has of each surface, and
+the sun's irradiance of the surfaces is found hour by hour.
 
-What lies far from a place lights it much as the places beside it, and many tiles share it.  What
-is near (the wall that meets the floor in a corner) does not: it is taken by rays of each tile's
-own, to elements as small as they are near.  The weight of a place at distance d from a surface
+What is far from a place lights it much as it lights the places beside it, and many tiles share it:
+it is the irradiance of the room's cells, by the flux of the beam on them (`room_cells`), the same
+that the sensors take.  What is near (the wall that meets the floor in a corner) does not: it is
+taken by rays of each tile's own, to pieces as small as they are near, far smaller than a flux could
+be counted in; the sun is asked for at one point of a piece, by a shadow ray, and at many where the
+edge of a spot of sun crosses it (`EdgePlaces`).  The weight of a place at distance d from a surface
 that is D from the eye goes over from one to the other between d = N D / 2 and N D, N the angle
-of `NEAR_TILES`.  The sun is asked for at one place of an element so near; where the edge of a
-spot of sun crosses it, at many (`EdgePlaces`).
+of `NEAR_TILES`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -27,36 +31,37 @@ from scipy import sparse
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import View, pixel_solid_angles
+from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, shown_hits
-from mitsuba_cfs.trace.kernels.pixel_sharing import FACE_STEPS, numbered
+from mitsuba_cfs.trace.kernels.pixel_rows import FACE_STEPS, PictureRows, numbered, shown_hits
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.sun.lit_points import Places, face_places, reflecting_places
+from mitsuba_cfs.trace.sun.room_cells import RoomCells, surface_cells
 
-ELEMENTS = 1024  # into which the surfaces' area is divided, about
-POINTS = 4  # on each, that the sun is taken at; one on those near a tile
-EDGE_POINTS = 16  # on one near a tile that the edge of a spot of sun crosses
+PIECES = 1024  # that the surfaces' area would be divided into by pieces of the widest edge
+EDGE_POINTS = 16  # on a piece near a tile that the edge of a spot of sun crosses
 PATHS = 2**19  # of a view at most, but one of each pixel
 MOST_PATHS = 32  # of a pixel
 RAYS = 2**18  # at once
 NEAR_TILES = 12  # [tiles' widths] that a surface is near within, twice what smoothing spans
 NEAR_RAYS = 1024  # of each tile to what is near: narrow strips of sun beside a corner are small
 SAMPLES = 8  # paths of a pixel for all else, with fewer of which these too are fewer, in proportion
-FINENESS = 0.5  # edge of an element near a tile over how near it is
-HALVINGS = 4  # of the elements' edge at most
+FINENESS = 0.5  # edge of a piece near a tile over how near it is
+HALVINGS = 4  # of the pieces' edge at most
+SPARSE = ("data", "indices", "indptr", "shape")  # the parts of a sparse matrix
 
 
 @dataclass(frozen=True, slots=True)
 class EdgePlaces:
-    """More places on the elements near rows, for those that the edge of a spot of sun crosses."""
+    """More points on the pieces near rows, for those that the edge of a spot of sun crosses."""
 
     places: Places  # [f * EDGE_POINTS]
-    beside: sparse.csr_array  # [f, f] 1 for elements that share an edge, or one holds the other
+    beside: sparse.csr_array  # [f, f] 1 for pieces that share an edge, or one holds the other
 
     def crossed(self, light: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Elements and hours [p] whose light [f, h] is there and not all beside, or the reverse."""
+        """Pieces and hours [p] whose light [f, h] is there and not all beside, or the reverse."""
         lit = (light > 0).astype(np.uint8)
         bright, count = self.beside @ lit, np.diff(self.beside.indptr)[:, None]
         return np.nonzero(np.where(lit, bright < count, bright > 0))
@@ -64,43 +69,95 @@ class EdgePlaces:
 
 @dataclass(frozen=True, slots=True)
 class SunElements:
-    """Parts of the surfaces that reflect the sun, and what each row of a picture has of them."""
+    """The share that rows have of the room's sunlit surfaces: of its cells, and of pieces nearby.
 
-    places: Places  # [e * POINTS + f]
-    share: sparse.csr_array  # [m, e] luminance of a row per unit irradiance of an element
-    near: sparse.csr_array  # [m, f] the same of the smaller elements near rows, not to be smoothed
+    Luminance of a row per unit irradiance.
+    """
+
+    cells: RoomCells
+    share: sparse.csr_array  # [m, c] of the cells
     smooth: sparse.csr_array  # [m, m] of rows, after `share`: the product of both would be full
-    edges: EdgePlaces  # of the elements near rows
+    near: sparse.csr_array  # [m, f] of the pieces near rows, not to be smoothed
+    places: Places  # [f] one point of each piece
+    edges: EdgePlaces  # of the pieces
 
-    def rows(self, irradiance: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Luminance [m, h] of rows under the irradiance [.., h] of the elements' places."""
-        far, near = np.split(irradiance, [POINTS * self.share.shape[1]])
-        mean = far.reshape(-1, POINTS, irradiance.shape[1]).mean(axis=1)
-        return self.smooth @ (self.share @ mean) + self.near @ near
+    def rows(
+        self, cells: NDArray[np.float32] | sparse.csr_array, near: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Luminance [m, h] of rows under irradiances of the cells [c, h] and pieces [f, h]."""
+        return self.far_rows(cells) + self.near @ near
+
+    def far_rows(self, irradiance: NDArray[np.float32] | sparse.csr_array) -> NDArray[np.float32]:
+        """Luminance [m, h] of rows by what is far, under the irradiance of the cells [c, h]."""
+        found = self.share @ irradiance
+        return self.smooth @ (found.toarray() if sparse.issparse(found) else found)
 
     def of_rows(self, rows: sparse.csr_array, smooth: sparse.csr_array) -> SunElements:
         """Of other rows [k] that these make up [k, m], with their smoothing."""
         share, near = (sparse.csr_array(rows @ part) for part in (self.share, self.near))
-        return SunElements(self.places, share, near, smooth, self.edges)
+        return SunElements(self.cells, share, smooth, near, self.places, self.edges)
 
 
 @dataclass(frozen=True, slots=True)
 class SunlitRows:
-    """What the rows of a picture have of the elements, whatever light comes in by the windows."""
+    """The share that the rows of a picture have of the sunlit surfaces, under any sky."""
 
     mean: SunElements  # of the rows [m]
-    noise: SunElements  # half the difference of the rows' halves; the same places
+    noise: SunElements  # half the difference of the rows' halves; the same cells and pieces
     close: NDArray[np.bool_]  # [m] rows that show what another surface is near to
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All of it as the arrays of a file."""
+        first, cells = self.mean, self.mean.cells
+        arrays = {
+            "close": self.close, "cell_edge": np.array(cells.edge), "cell_low": cells.low,
+            "cell_halvings": np.array(cells.halvings), "cell_keys": cells.keys,
+            "cell_area": cells.area,
+        }  # fmt: skip
+        matrices = {"smooth": first.smooth, "beside": first.edges.beside}
+        for i, rows in enumerate((first, self.noise)):
+            matrices |= {f"far{i}": rows.share, f"near{i}": rows.near}
+        for name, matrix in matrices.items():
+            arrays |= {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in SPARSE}
+        for name, places in (("places", first.places), ("more", first.edges.places)):
+            arrays |= {f"{name}_point": places.point, f"{name}_normal": places.normal}
+        return arrays
+
+    @classmethod
+    def of_arrays(cls, data: Mapping[str, NDArray[Any]]) -> SunlitRows:
+        """From the arrays of a file.
+
+        Raises: `KeyError` where one is missing.
+        """
+        cells = RoomCells(
+            float(data["cell_edge"]), data["cell_low"], int(data["cell_halvings"]),
+            data["cell_keys"], data["cell_area"],
+        )  # fmt: skip
+        places = Places(data["places_point"], data["places_normal"])
+        more = Places(data["more_point"], data["more_normal"])
+        smooth, edges = _sparse(data, "smooth"), EdgePlaces(more, _sparse(data, "beside"))
+        mean, noise = (
+            SunElements(
+                cells, _sparse(data, f"far{i}"), smooth, _sparse(data, f"near{i}"), places, edges
+            )
+            for i in range(2)
+        )
+        return cls(mean, noise, data["close"])
+
+
+def _sparse(data: Mapping[str, NDArray[Any]], name: str) -> sparse.csr_array:
+    *parts, shape = (data[f"{name}_{part}"] for part in SPARSE)
+    return sparse.csr_array(tuple(parts), shape=tuple(shape))
 
 
 @dataclass(frozen=True, slots=True)
 class _Hits:
-    """Places that reflect to the rows of a picture."""
+    """Places near rows of a picture, that reflect to them."""
 
     row: NDArray[np.int64]  # [q]
     weight: NDArray[np.floating]  # [q] luminance of the row per unit irradiance of the place
     places: Places  # [q]
-    halvings: NDArray[np.int8]  # [q] of the edge of the place's element
+    halvings: NDArray[np.int8]  # [q] of the edge of the place's piece
 
     @staticmethod
     def joined(parts: Sequence[_Hits]) -> _Hits:
@@ -126,11 +183,8 @@ class _Shown:
 
     def far_share(self, path: NDArray[np.int64], met: Places) -> NDArray[np.float64]:
         """What of the light of places met first counts as far, 0 to 1."""
-        return np.clip(2 * self.distance(path, met) / self.reach[path] - 1, 0.0, 1.0)
-
-    def distance(self, path: NDArray[np.int64], met: Places) -> NDArray[np.float64]:
-        """Of places from those that the paths start at [m]."""
-        return np.linalg.norm(met.point - self.places.point[path], axis=1)
+        distance = np.linalg.norm(met.point - self.places.point[path], axis=1)
+        return np.clip(2 * distance / self.reach[path] - 1, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,13 +214,18 @@ class _Pixels:
 class _Look:
     """Traces a view's pixels to what reflects sun to what they show."""
 
-    def __init__(self, tracer: TracedScene, view: View, tile: int, edge: float, seed: int) -> None:
-        self._tracer, self._view, self._edge, self._seed = tracer, view, edge, seed
+    def __init__(
+        self, tracer: TracedScene, cells: RoomCells, view: View, tile: int, edge: float, seed: int
+    ) -> None:
+        self._tracer, self._cells, self._view = tracer, cells, view
+        self._edge, self._seed = edge, seed
         width = float(np.sqrt(pixel_solid_angles(view).max()))
         self._near = NEAR_TILES * tile * width if tile > 1 else 0.0  # over the distance to the eye
 
-    def far(self, part: _Pixels, samples: int, key: int) -> tuple[_Hits, NDArray[np.int64]]:
-        """What paths meet but for what is near, and the rows [..] that something is near to."""
+    def far(
+        self, part: _Pixels, samples: int, key: int, shape: tuple[int, int]
+    ) -> tuple[sparse.csr_array, NDArray[np.int64]]:
+        """The rows' share of the cells but for what is near; the rows that something is near to."""
         shown, row = self._shown(part, samples), part.row
         found = reflecting_places(self._tracer, shown.places, self._seed * 1_000_003 + key)
         weight = found.weight * shown.value[found.path]
@@ -174,10 +233,8 @@ class _Look:
         far = shown.far_share(path, met)
         weight[: found.first] *= far
         rows = row[shown.ray[found.path]]
-        some = np.flatnonzero(weight > 0)
-        none = np.zeros(len(some), dtype=np.int8)
-        hits = _Hits(rows[some], weight[some], found.places.some(some), none)
-        return hits, np.unique(rows[: found.first][far < 1])
+        share = _cell_shares(self._cells, rows, weight, found.places, shape)
+        return share, np.unique(rows[: found.first][far < 1])
 
     def near(self, part: _Pixels, samples: int) -> _Hits:
         """What rays of pixels find near, stratified over the pixels of a row by their number."""
@@ -225,7 +282,7 @@ class _Look:
 
 def sun_elements(
     tracer: TracedScene,
-    area: float,
+    interior: Surfaces,
     view: View,
     rows: PictureRows,
     times: NDArray[np.int64],
@@ -233,43 +290,45 @@ def sun_elements(
     samples: int = SAMPLES,
     seed: int = 0,
 ) -> tuple[SunElements, NDArray[np.bool_]]:
-    """Elements by the places that paths of a view's pixels meet after what the pixel shows.
+    """The share of the sunlit surfaces that the halves of a picture's rows have [2 m].
 
-    Their rows are the halves [2 m], the luminance of one the sum of its pixels'.  And the rows [m]
-    that show what another surface is near to.
+    By the places that paths of the pixels meet after what the pixel shows; the luminance of a half
+    is the sum of its pixels'.  And the rows [m] that show what another surface is near to.
 
     Args:
-        area: of the room's surfaces [m2].
+        interior: the room's surfaces.
         rows: of the picture's pixels; times: [n] how often a pixel has paths to what is far.
         samples: paths of a pixel for the rest of the picture.
     """
     every, tile, share = np.arange(len(rows.pixels)), rows.tiles.size, min(samples / SAMPLES, 1.0)
     samples = int(np.clip(PATHS * share // max(int(times.sum()), 1), 1, MOST_PATHS))
-    edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
-    look = _Look(tracer, view, tile, edge, seed)
-    far, close = [], np.zeros(len(rows.keys), dtype=bool)
+    cells, edge = _far_cells(tracer, interior), _widest(interior)
+    look = _Look(tracer, cells, view, tile, edge, seed)
+    shape = 2 * len(rows.keys), cells.size
+    far, close = sparse.csr_array(shape, dtype=np.float32), np.zeros(len(rows.keys), dtype=bool)
     for number, part in enumerate(_Pixels.of(rows, every, times).blocks(samples)):
-        hits, beside = look.far(part, samples, number * RAYS // samples)
-        far.append(hits)
+        met, beside = look.far(part, samples, number * RAYS // samples, shape)
+        far = far + met
         close[beside // 2] = True
     rays_each = int(np.ceil(NEAR_RAYS * share / tile**2))
     chosen, again = np.flatnonzero(close[rows.row]), rows.times(smoothed=False)
     blocks = _Pixels.of(rows, chosen, again[chosen]).blocks(rays_each)
-    near = [look.near(part, rays_each) for part in blocks]
-    hits = _Hits.joined(far), _Hits.joined(near)
-    return _summed(hits, 2 * len(rows.keys), edge, seed), close
+    near = _Hits.joined([look.near(part, rays_each) for part in blocks])
+    return _with_pieces(cells, far, near, edge, seed), close
 
 
 def window_elements(
-    tracer: TracedScene, area: float, *, samples: int, seed: int = 0
+    tracer: TracedScene, interior: Surfaces, *, samples: int, seed: int = 0
 ) -> SunElements:
-    """Elements by the places that windows see in the room; rows [G * K]: radiance that meets them.
+    """The share of the sunlit surfaces that windows see; rows [G * K]: radiance that meets them.
 
     The mean over a group and over its back's incident patch; arguments as of `sun_elements`.
 
     Args: samples: paths of each patch.
     """
-    bins, found = DirectionBins(KLEMS_FULL), []
+    bins, cells = DirectionBins(KLEMS_FULL), _far_cells(tracer, interior)
+    shape = len(tracer.groups) * bins.size, cells.size
+    found = [sparse.csr_array(shape, dtype=np.float32)]
 
     def follow(_: mi.Float64, paths: WindowPaths) -> None:
         inward = paths.inward(tracer)
@@ -281,43 +340,59 @@ def window_elements(
         kept = np.flatnonzero(met & (rho > 0))
         value, row, first = rho[kept] / (np.pi * samples), of[kept].astype(int), places.some(kept)
         later = reflecting_places(tracer, first, seed * 1_000_003 + paths.group)
-        none = np.zeros(len(kept) + len(later.path), dtype=np.int8)
-        found.append(
-            _Hits(
-                np.concatenate([row, row[later.path]]),
-                np.concatenate([value, value[later.path] * later.weight]),
-                Places.joined([first, later.places]),
-                none,
-            )
-        )
+        rows = np.concatenate([row, row[later.path]])
+        weight = np.concatenate([value, value[later.path] * later.weight])
+        both = Places.joined([first, later.places])
+        found.append(_cell_shares(cells, rows, weight, both, shape))
 
     window_batches(tracer, bins, 1, samples, seed, follow)(0)
-    edge = float(np.sqrt(max(area, 1e-6) / ELEMENTS))
-    rows = len(tracer.groups) * bins.size
-    return _summed((_Hits.joined(found), _Hits.joined([])), rows, edge, seed)
+    return _with_pieces(cells, sum(found[1:], found[0]), _Hits.joined([]), 1.0, seed)
 
 
-def _summed(hits: Sequence[_Hits], rows: int, edge: float, seed: int) -> SunElements:
-    """Elements of an edge [m] by hits far and near."""
-    shares, places = [], []
-    for some, points in zip(hits, (POINTS, EDGE_POINTS), strict=True):
-        element, order, cubes = _elements(some, edge)
-        entries = some.weight.astype(np.float32), (some.row, element)
-        shares.append(sparse.csr_array(sparse.coo_array(entries, shape=(rows, len(cubes)))))
-        chosen = _chosen(element[order], len(cubes), points, seed)
-        places.append(some.places.some(order[chosen]))
-    far, near = places
-    first = Places.joined([far, near.some(np.arange(0, near.size, EDGE_POINTS))])
-    alone = sparse.csr_array(sparse.eye_array(rows, dtype=np.float32))
-    return SunElements(first, *shares, alone, EdgePlaces(near, _beside(cubes)))
+def _far_cells(tracer: TracedScene, interior: Surfaces) -> RoomCells:
+    """The room's cells, joined: from afar the wider ones are as sharp, and have less noise."""
+    return surface_cells(tracer, interior).cells.joined()[0]
+
+
+def _cell_shares(
+    cells: RoomCells,
+    row: NDArray[np.int64],
+    weight: NDArray[np.floating],
+    places: Places,
+    shape: tuple[int, int],
+) -> sparse.csr_array:
+    """Weights of places [q] summed over the cells that these are in, by rows."""
+    cell = cells.numbers(places)
+    some = np.flatnonzero((cell >= 0) & (weight > 0))
+    entries = weight[some].astype(np.float32), (row[some], cell[some])
+    return sparse.csr_array(sparse.coo_array(entries, shape=shape))
+
+
+def _widest(interior: Surfaces) -> float:
+    """Edge of the widest pieces near rows [m]."""
+    return float(np.sqrt(max(float(interior.areas.sum()), 1e-6) / PIECES))
+
+
+def _with_pieces(
+    cells: RoomCells, far: sparse.csr_array, near: _Hits, edge: float, seed: int
+) -> SunElements:
+    """The shares of the cells with those of pieces near rows, whose widest have an edge [m]."""
+    piece, order, cubes = _elements(near, edge)
+    entries = near.weight.astype(np.float32), (near.row, piece)
+    share = sparse.csr_array(sparse.coo_array(entries, shape=(far.shape[0], len(cubes))))
+    chosen = _chosen(piece[order], len(cubes), EDGE_POINTS, seed)
+    more = near.places.some(order[chosen])
+    first = more.some(np.arange(0, more.size, EDGE_POINTS))
+    alone = sparse.csr_array(sparse.eye_array(far.shape[0], dtype=np.float32))
+    return SunElements(cells, far, alone, share, first, EdgePlaces(more, _beside(cubes)))
 
 
 def _elements(
     hits: _Hits, edge: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """The element of each place, cubes of an edge [m] by the side of the surface.
+    """The piece of each place, cubes of an edge [m] by the side of the surface.
 
-    Returns: [q]; the places in the elements' order [q]; and of each element the cube's numbers, the
+    Returns: [q]; the places in the pieces' order [q]; and of each piece the cube's numbers, the
     side and the halvings [e, 7], sorted.
     """
     places, table = hits.places, np.empty((7, len(hits.row)), dtype=np.int32)
@@ -348,7 +423,7 @@ def _order(keys: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _keys(some: NDArray[np.int64], table: NDArray[np.int64]) -> NDArray[np.int64]:
     """Numbers of columns [d, n] in their order, of one outside the table none of the table's."""
-    if not table.shape[1]:  # no element
+    if not table.shape[1]:  # no piece
         return np.empty(0, dtype=np.int64)
     keys = np.zeros(some.shape[1], dtype=np.int64)
     for row, low, high in zip(some, table.min(axis=1) - 1, table.max(axis=1) + 1, strict=True):
@@ -358,7 +433,7 @@ def _keys(some: NDArray[np.int64], table: NDArray[np.int64]) -> NDArray[np.int64
 
 
 def _beside(cubes: NDArray[np.int64]) -> sparse.csr_array:
-    """1 for elements [f, f] of one size that share an edge, and for those that hold another."""
+    """1 for pieces [f, f] of one size that share an edge, and for those that hold another."""
     count, cubes = len(cubes), np.ascontiguousarray(cubes.T)
     keys = _keys(cubes, cubes)
     pairs = [np.empty((2, 0), dtype=np.int64)]
@@ -375,9 +450,9 @@ def _beside(cubes: NDArray[np.int64]) -> sparse.csr_array:
 
 
 def _chosen(element: NDArray[np.int64], count: int, points: int, seed: int) -> NDArray[np.int64]:
-    """Some places of each element, evenly among its own and again where it has fewer.
+    """Some places of each piece, evenly among its own and again where it has fewer.
 
-    Args: element: of the places, in order; returns their numbers [count * points].
+    Args: element: piece of the places, in order; returns their numbers [count * points].
     """
     if not count:
         return np.empty(0, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""How much of the sun's disc receivers outdoors see: shade without the blur of sky patches."""
+"""Sunlit share of receivers outdoors: the visible part of the sun's disc, hour by hour."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.sampling import lattice, vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.discs import on_disc
+from mitsuba_cfs.trace.sun.specular_paths import on_disc
 
 RAYS = 2**24  # at once
 
@@ -28,13 +28,13 @@ def sunlit_shares(
     seed: int = 0,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
-    """Share of the direct sun that reaches each receiver [S, H]; 0 with the sun behind it.
+    """Sunlit share of each receiver [S, H]; 0 with the sun behind it.
 
-    The mean over the 0.533 degree disc and the receiver's area of what nothing stands before.
+    The mean visibility over the 0.533 degree disc and the receiver's area.
     Standard error: at most 0.5 / sqrt(samples), far less as the samples are stratified.
 
     Args:
-        points, directions: [S, 3] middles of the receivers [m] and their normals.
+        points, directions: [S, 3] centres of the receivers [m] and their normals.
         suns: [H, 3] unit vectors to the sun.
         edges: [S, 2, 3] sides of each receiver, a parallelogram [m]; points by default.
     """

@@ -1,4 +1,4 @@
-"""The ways from outdoors to the sun: straight, and by each plane that mirrors it."""
+"""Specular sun paths, direct and after one mirror, and directions on the sun's disc."""
 
 from __future__ import annotations
 
@@ -7,36 +7,38 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.trace.kernels.sampling import opaque_vector
+from mitsuba_cfs.sky.sun import SUN_RADIUS
+from mitsuba_cfs.trace.kernels.sampling import lattice_2d, opaque_vector
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 
-BEFORE = 1e-3  # [m] of a window's plane, that a mirror must reach to send it light
+SPREAD = float(1.01 * SUN_RADIUS)  # of directions on the disc about its middle, at most
+BEFORE = 1e-3  # [m] in front of a window's plane, where a mirror must be to send it light
 LEAST = 1e-9  # of a direction along an axis, to divide by
 CLEAR = 10  # steps off a surface that a box is wider by than what it holds
 
 
 class SunWay:
-    """One way: where the sun's light comes from, and what of it reaches a place."""
+    """One specular path to the sun: its apparent direction, and its transmittance."""
 
     def __init__(self, outside: TracedScene, plane: int | None = None) -> None:
-        """Straight, or by a smooth mirror plane of the scene."""
+        """The direct path, or that by a smooth mirror plane of the scene."""
         self._outside, self._plane = outside, plane
         self.free = plane is None and not outside.surface_count  # nothing stands before the windows
 
     @property
     def mirrors(self) -> bool:
-        """Whether the light comes by a mirror."""
+        """Whether the path goes by a mirror."""
         return self._plane is not None
 
     def turned(self, suns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Directions [Q, 3] that the light of the suns [Q, 3] comes from."""
+        """Apparent directions [Q, 3] of suns [Q, 3]: mirrored in the plane."""
         if self._plane is None:
             return suns
         normal = self._outside.gloss.normals[self._plane]
         return suns - 2 * (suns @ normal)[:, None] * normal
 
     def reaching(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Float:
-        """Share of the sun along rays towards it, from places outdoors: 0 where it is hidden."""
+        """Transmittance of rays from points outdoors to the apparent sun; 0 where it is hidden."""
         if self._plane is None:
             hidden = self._outside.hides(ray, active, coherent=coherent)
             return dr.select(active & ~hidden, mi.Float(1), mi.Float(0))
@@ -54,7 +56,7 @@ class SunWay:
         return dr.select(met, gloss.specular(hit.prim_index, cosine, met), 0.0)
 
     def _may_meet(self, ray: mi.Ray3f) -> mi.Bool:
-        """Whether rays pass the box that holds the mirrors of the plane."""
+        """Whether rays meet the bounding box of the plane's mirrors."""
         corners = self._outside.gloss.corners[self._plane] - self._outside.centre
         box = corners.min(axis=0), corners.max(axis=0)
         start, margin = mi.Vector3f(ray.o), CLEAR * self._outside.epsilon
@@ -82,13 +84,13 @@ def meets_box(
 
 
 def sun_ways(outside: TracedScene) -> list[SunWay]:
-    """All ways, the straight one first, without mirrors that no window of the scene can see."""
+    """All specular paths, the direct one first, without mirrors that no window can see."""
     mirrors = [] if outside.gloss is None else outside.gloss.mirrors
     return [SunWay(outside), *(SunWay(outside, int(p)) for p in mirrors if _seen(outside, p))]
 
 
 def _seen(outside: TracedScene, plane: int) -> bool:
-    """Whether a plane has a corner before one of the windows; true without any window."""
+    """Whether a mirror plane has a corner in front of a window; true without any window."""
     corners = outside.gloss.corners[plane]
     windows = [window for group in outside.groups for window in group.windows]
     before = ((corners - w.triangles.mean(axis=(0, 1))) @ w.normal > BEFORE for w in windows)
@@ -98,8 +100,22 @@ def _seen(outside: TracedScene, plane: int) -> bool:
 def shining(
     outside: TracedScene, facing: NDArray[np.float64], suns: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Suns [Q, 3] that stand before one of the planes with normals [G, 3], or in a mirror do."""
+    """Whether suns [Q, 3] are in front of a plane with normals [G, 3], directly or mirrored."""
     if not len(suns):
         return np.zeros(0, dtype=bool)
     ways = [way.turned(suns) @ facing.T > 0 for way in sun_ways(outside)]
     return np.any(ways, axis=(0, 2))
+
+
+def on_disc(centre: mi.Vector3f, sample: mi.UInt32, stream: mi.UInt32) -> mi.Vector3f:
+    """A direction uniform on the sun's disc."""
+    return disc_direction(centre, lattice_2d(sample, stream, 2))
+
+
+def disc_direction(centre: mi.Vector3f, u: mi.Point2f) -> mi.Vector3f:
+    """The direction on the sun's disc at shares of its area (from the centre) and of the turn."""
+    height = u.x * float(1 - np.cos(SUN_RADIUS))  # 1 - cos, which single precision has no more
+    cosine, sine = 1 - height, dr.sqrt(height * (2 - height))
+    phi = dr.two_pi * u.y
+    frame = mi.Frame3f(centre)
+    return frame.to_world(mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), cosine))

@@ -1,4 +1,8 @@
-"""What sensors see straight through glass between rooms of the windows of the room beyond."""
+"""Light through glass between rooms, from the windows of the adjacent room.
+
+`borrowed_daylight` is the daylight matrix D of the glass; `borrowed_view` the irradiance of sensors
+by the beam that passes it straight.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
 from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
@@ -27,25 +31,87 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.matrices.pixel_view import add_seen_and_reflected
+
+
+def borrowed_daylight(
+    surfaces: Surfaces,
+    groups: Sequence[WindowGroup],
+    luminance: NDArray[np.float64],
+    inner: Sequence[WindowGroup],
+    *,
+    basis: KlemsBasis = KLEMS_FULL,
+    samples: int = 512,
+    max_depth: int = 32,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    cache: MatrixCache | None = None,
+) -> Estimate:
+    """Daylight matrices [I, K, P] of glass to an adjacent room: radiance per unit sky radiance.
+
+        D[i, k, p] = sum over g, k' of V[i, k, g k'] (T D)[g k', p]
+
+    V is the radiance incident on the glass from patch k, averaged over its area, per unit radiance
+    of a patch of the adjacent room's windows, interreflection included.
+
+    Args:
+        surfaces: of the adjacent room.
+        groups: its windows, black to light from the room.
+        luminance: T D of these windows [G, K, P], towards the adjacent room.
+        inner: the glass, with normals into the adjacent room.
+        samples: paths of a patch of each piece of glass in each batch.
+    """
+    tracer, bins, n = kept_scene(surfaces, groups), DirectionBins(basis), int(samples)
+    starts = kept_scene(Surfaces.none(), inner, windows_block=False, centre=tracer.centre)
+    flat = luminance.reshape(-1, luminance.shape[-1])
+
+    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+        path = dr.arange(mi.UInt32, dr.width(paths.patch))
+        add_seen_and_reflected(
+            tracer,
+            bins,
+            matrix,
+            mi.Point3f(paths.position + starts.exterior_normal(paths.group) * tracer.epsilon),
+            paths.outward,
+            mi.Bool(True),
+            row=paths.patch,
+            beta=mi.Float(1),
+            stream=paths.patch,
+            sample=path - paths.patch * dr.opaque(mi.UInt32, n),
+            generator=paths.generator,
+            max_depth=dr.opaque(mi.UInt32, max_depth),
+        )
+
+    view = window_batches(starts, bins, len(flat), n, seed, follow)
+    return accumulate(
+        lambda number: view(number) @ flat,
+        stopping=stopping,
+        label="borrowed daylight",
+        entry=cache_entry(
+            cache, "borrowed daylight", surfaces, groups, flat, inner, basis, n, max_depth, seed,
+            by=__name__, stopping=stopping,
+        ),
+    )  # fmt: skip
+
 
 Room = tuple[Surfaces, Sequence[WindowGroup]]
 
 
 @dataclass(frozen=True, slots=True)
 class LendingRoom:
-    """A room that its glass lights, as rays from a room beside it meet it."""
+    """An adjacent room with the light of its windows."""
 
     surfaces: Surfaces
     groups: tuple[WindowGroup, ...]  # axis G
     luminance: NDArray[np.float64]  # T D of these [G, K, P], towards the room
-    exterior: Surfaces  # what those of them see that look outdoors, the first ones
-    beam: NDArray[np.float64]  # [G, K] what goes straight on through them; 0 of those to rooms
+    exterior: Surfaces  # in front of the first groups, which look outdoors
+    beam: NDArray[np.float64]  # [G, K] transmittance of the straight beam; 0 of glass to rooms
     daylight: NDArray[np.float64]  # D of these [G, K, P]
-    onward: tuple[RoomBehind, ...] = ()  # where some of the groups look into other rooms
+    onward: tuple[RoomBehind, ...] = ()  # rooms behind the last groups
 
     def rooms(self) -> Iterator[LendingRoom]:
-        """The room itself and all behind it."""
+        """The room itself and all rooms behind it."""
         yield self
         for behind in self.onward:
             yield from behind.room.rooms()
@@ -53,11 +119,11 @@ class LendingRoom:
 
 @dataclass(frozen=True, slots=True)
 class RoomBehind:
-    """The room behind some of a room's groups, parts of one pane."""
+    """The room behind some window groups, which are parts of one pane."""
 
-    first: int  # of these groups
+    first: int  # number of the first group
     count: int
-    beam: NDArray[np.float64]  # [K] what goes straight on through them
+    beam: NDArray[np.float64]  # [K] transmittance of their straight beam
     room: LendingRoom
 
 
@@ -76,14 +142,14 @@ def borrowed_view(
 ) -> Estimate:
     """Irradiance at sensors straight through a window group [S, P], per unit sky radiance.
 
-    Rays of the sensors that meet the group go on into the room beyond, a share of them by `beam`,
-    and so through panes behind it.
+    Rays of the sensors that meet the group go on into the adjacent room with the probability
+    `beam`, and in the same way through glass to rooms behind it.
 
     Args:
         room: surfaces and window groups of the sensors' room.
-        group: which of its window groups the room beyond lies behind.
-        beam: [K] what goes straight on in each patch of the group.
-        beyond: the room beyond.
+        group: number of the window group to the adjacent room.
+        beam: [K] transmittance of the straight beam of the group.
+        beyond: the adjacent room.
         sensors: positions [S, 3] [m] and normals [S, 3].
         samples: paths of a sensor in each batch.
     """
@@ -140,7 +206,7 @@ def _add_paths(
     generator: mi.PCG32,
     **paths: Any,
 ) -> None:
-    """What rays find in a room, and straight through its panes in those behind it."""
+    """Add the light that rays meet in a room, and through its glass in the rooms behind it."""
     tracer, matrix = kept_scene(room.surfaces, room.groups, centre=centre), next(sums)
     if room.onward:
         ray = mi.Ray3f(start, direction)

@@ -1,0 +1,1 @@
+"""Issues of a building model as data, their texts in one catalogue, and their order by weight."""

@@ -1,0 +1,192 @@
+"""Issues of a building model as data: a code, a place, values, an effect.
+
+No text is written where an issue is made: `catalogue.toml` has the English templates of each code,
+and `issue_text` fills them where they are shown.
+
+Severity: "loss", part of the model is not simulated; "warning", results may be wrong; "unused", the
+file states something that no result depends on; "assumption", a missing or faulty value was
+replaced or repaired; "info", nothing changes.
+"""
+
+from __future__ import annotations
+
+import string
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Literal, NamedTuple, get_args
+
+Severity = Literal["loss", "warning", "unused", "assumption", "info"]
+Audience = Literal["python", "command"]  # whom a fix is for: an argument, or a flag
+Translate = Callable[[str], str]
+Value = "str | int | float | tuple[str | Phrase, ...] | Phrase"
+SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+CATALOGUE = Path(__file__).parent / "catalogue.toml"
+LISTED = 6  # names that a text lists before it counts the rest
+COLUMNS = ("where", "what", "consequence", "code", "severity")  # of `issue_rows`
+
+
+class Template(NamedTuple):
+    """Severity and English templates of a code, as `catalogue.toml` has them."""
+
+    severity: Severity
+    what: str
+    effect: str
+    fix: str = ""  # for Python callers
+    fix_command: str = ""  # for the command line; "" where it is as for Python callers
+    group: tuple[str, ...] = ()  # values that tell issues of the code apart where they are counted
+
+    @property
+    def fields(self) -> frozenset[str]:
+        """Names of the values that the templates need."""
+        return frozenset().union(*map(_fields, self[1:5]))
+
+
+@dataclass(frozen=True, slots=True)
+class Phrase:
+    """A phrase of the catalogue, as a value of an issue."""
+
+    key: str
+    values: Mapping[str, str | int | float | Phrase] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        missing = _fields(phrases()[self.key]) - self.values.keys()
+        if missing:
+            raise ValueError(f"phrase {self.key}: lacks {', '.join(sorted(missing))}")
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """The part of the building that an issue takes from the simulation."""
+
+    lost: Literal["", "room", "window"] = ""  # which is left out because of the issue
+    glass: float = 0.0  # area of the glass that the issue concerns [m2]
+
+
+@dataclass(frozen=True, slots=True)
+class Issue:
+    """One fault or assumption of the input."""
+
+    code: str  # a key of the catalogue, such as "window-without-room"
+    where: str  # GUID or name of the element, or the file
+    values: Mapping[str, str | int | float | tuple[str | Phrase, ...] | Phrase] = field(
+        default_factory=dict, hash=False
+    )  # named values of the templates
+    effect: Effect = Effect()
+
+    def __post_init__(self) -> None:
+        if self.code not in catalogue():
+            raise ValueError(f"no issue has the code {self.code!r}")
+        missing = catalogue()[self.code].fields - self.values.keys() - {"where"}
+        if missing:
+            raise ValueError(f"issue {self.code}: lacks {', '.join(sorted(missing))}")
+
+    @property
+    def severity(self) -> Severity:
+        """Severity of the code."""
+        return catalogue()[self.code].severity
+
+
+class IssueText(NamedTuple):
+    """An issue in words."""
+
+    what: str
+    effect: str
+    fix: str  # "" where there is none
+
+    @property
+    def consequence(self) -> str:
+        """The effect, with the fix where there is one."""
+        return f"{self.effect}; {self.fix}" if self.fix else self.effect
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """What the issue is, and its consequence."""
+        return self.what, self.consequence
+
+    @property
+    def line(self) -> str:
+        """All of it in one line, without a period at the end."""
+        return f"{self.what}: {self.consequence}"
+
+
+@cache
+def catalogue() -> Mapping[str, Template]:
+    """The templates of each code."""
+    return {code: _template(code, table) for code, table in _tables()["issue"].items()}
+
+
+@cache
+def phrases() -> Mapping[str, str]:
+    """The English templates of the phrases."""
+    return _tables()["phrase"]
+
+
+def issue_text(
+    issue: Issue, audience: Audience = "python", translate: Translate = lambda text: text
+) -> IssueText:
+    """The text of an issue.
+
+    Args:
+        audience: whom the fix is for.
+        translate: the translation of an English template, which keeps its fields in braces.
+    """
+    template = catalogue()[issue.code]
+    words = {key: _words(value, translate) for key, value in issue.values.items()}
+    fix = template.fix if audience == "python" else template.fix_command or template.fix
+    filled = (
+        translate(text).format(**{"where": issue.where, **words}) if text else ""
+        for text in (template.what, template.effect, fix)
+    )
+    return IssueText(*filled)
+
+
+def issue_rows(
+    issues: Iterable[Issue],
+    audience: Audience = "python",
+    translate: Translate = lambda text: text,
+) -> list[tuple[str, str, str, str, str]]:
+    """Rows of `COLUMNS`; the consequence is the effect with the fix."""
+    rows = []
+    for issue in issues:
+        what, consequence = issue_text(issue, audience, translate).pair
+        rows.append((issue.where, what, consequence, issue.code, issue.severity))
+    return rows
+
+
+def templates() -> tuple[str, ...]:
+    """Every English template of the catalogue, each once: what a language translates."""
+    texts = [text for template in catalogue().values() for text in template[1:5] if text]
+    return tuple(dict.fromkeys([*texts, *phrases().values()]))
+
+
+def _words(value: object, translate: Translate) -> object:
+    """A value as the templates take it: phrases and lists as text, numbers as they are."""
+    if isinstance(value, Phrase):
+        words = {key: _words(one, translate) for key, one in value.values.items()}
+        return translate(phrases()[value.key]).format(**words)
+    if isinstance(value, tuple):
+        listed = ", ".join(str(_words(one, translate)) for one in value[:LISTED])
+        if len(value) <= LISTED:
+            return listed
+        return translate(phrases()["more"]).format(names=listed, count=len(value) - LISTED)
+    return value
+
+
+@cache
+def _fields(template: str) -> frozenset[str]:
+    return frozenset(name for _, name, _, _ in string.Formatter().parse(template) if name)
+
+
+@cache
+def _tables() -> Mapping[str, dict]:
+    return tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))
+
+
+def _template(code: str, table: Mapping) -> Template:
+    if table["severity"] not in SEVERITIES:
+        raise ValueError(f"issue {code}: severity {table['severity']!r} is none of {SEVERITIES}")
+    texts = {key.replace("-", "_"): value for key, value in table.items() if key != "group"}
+    return Template(**texts, group=tuple(table.get("group", ())))

@@ -1,0 +1,57 @@
+"""Issues in the order of their weight in the result, those of one kind counted once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bim.report.issue import (
+    Audience,
+    Issue,
+    IssueText,
+    Phrase,
+    Translate,
+    catalogue,
+    issue_text,
+    phrases,
+)
+
+LOST = {"room": 2, "window": 1}
+
+
+@dataclass(frozen=True, slots=True)
+class Ranked:
+    """Issues of one kind: how many, how much glass they concern, and the weightiest of them."""
+
+    count: int
+    glass: float  # [m2]
+    first: Issue
+
+    def text(
+        self, audience: Audience = "python", translate: Translate = lambda text: text
+    ) -> IssueText:
+        """The text of the first issue as an example, after the number of issues."""
+        text = issue_text(self.first, audience, translate)
+        if self.count == 1:
+            return text
+        what = translate(phrases()["times"]).format(count=self.count, what=text.what)
+        return text._replace(what=what)
+
+
+def ranked(issues: Sequence[Issue]) -> list[Ranked]:
+    """Issues by area of glass, then lost rooms and windows, then by number."""
+    groups: dict[tuple, list[Issue]] = {}
+    for issue in issues:
+        groups.setdefault(_kind(issue), []).append(issue)
+    result = [
+        Ranked(len(g), sum(i.effect.glass for i in g), max(g, key=lambda issue: issue.effect.glass))
+        for g in groups.values()
+    ]
+    return sorted(result, key=lambda r: (-r.glass, -LOST.get(r.first.effect.lost, 0), -r.count))
+
+
+def _kind(issue: Issue) -> tuple:
+    """The code, the loss, and the values that tell issues of the code apart."""
+    values = (issue.values[name] for name in catalogue()[issue.code].group)
+    keys = (value.key if isinstance(value, Phrase) else value for value in values)
+    return (issue.code, issue.effect.lost, *keys)

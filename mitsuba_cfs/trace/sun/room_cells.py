@@ -1,0 +1,238 @@
+"""Cells of a room's surfaces, and the flux of the sun's beam on them.
+
+    E[c, h] = flux[c, h] / area[c]
+
+One discretisation of the sunlit surfaces for all that sees them: `room_beam` has the share that
+sensors have of each cell by all reflections, `room_sun` that of a picture's pixels and of the
+windows.  Rays follow the sun from points of the windows to the cells, hour by hour.  Each carries
+the same flux: a narrow strip of sun has as many rays for its light as a wide one, and no light is
+lost or doubled.
+
+Only what lies close to the surface that a pixel shows is not seen by cells: there the light changes
+from pixel to pixel and needs pieces smaller than any flux could be counted in (`room_sun`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from mitsuba_cfs.surfaces import Surfaces
+from mitsuba_cfs.trace.kernels.sampling import (
+    column,
+    lattice_2d,
+    opaque,
+    opaque_vector,
+    pixel_places,
+    vectors,
+)  # fmt: skip
+from mitsuba_cfs.trace.kernels.scattering import Scattering
+from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.sun.lit_points import Places, met_faces, on_disc_of
+from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SunWay, sun_ways
+
+CELLS = 4096  # that the surfaces' area is divided into, about, on either side
+AREA_POINTS = 2**18  # that the cells' areas are counted by
+POINTS = 1024  # on each window group that the sun is followed from
+EDGE_SHARE = 4  # one in so many of them for hours whose sun reaches all
+SEARCHED = 4  # of the search for a cell: kernels differ by so many halvings of the table
+FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
+RAYS = 2**21  # at once
+
+
+@dataclass(frozen=True)
+class RoomCells:
+    """Cells of a room's surfaces: the part of a surface in a cube, one side of it; axis c."""
+
+    edge: float  # of the cubes [m], before they are joined
+    low: NDArray[np.float64]  # [3] of all
+    halvings: int  # of the cubes' numbers, which join them
+    keys: NDArray[np.int64]  # [c] of each cube and the side, sorted
+    area: NDArray[np.float64]  # [c] [m2]
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return len(self.keys)
+
+    def joined(self) -> tuple[RoomCells, NDArray[np.int64]]:
+        """Cells twice as wide, and which of them each of these lies in [c]."""
+        cubes = sum((((self.keys >> s) & 0xFFFF) >> 1) << s for s in (37, 21, 5))
+        keys, holder = np.unique(cubes + (self.keys & 0x1F), return_inverse=True)
+        area = np.bincount(holder, self.area, len(keys))
+        return RoomCells(self.edge, self.low, self.halvings + 1, keys, area), holder
+
+    @cached_property
+    def _table(self) -> mi.UInt64:
+        return column(self.keys, mi.UInt64)
+
+    def of(self, point: mi.Point3f, normal: mi.Vector3f, active: mi.Bool) -> mi.Int32:
+        """The cell of points on surfaces, inside a kernel; -1 where there is none."""
+        place = (mi.Vector3f(point) - opaque_vector(self.low)) / opaque(self.edge)
+        cube = (mi.Vector3i(dr.floor(place)) & 0xFFFF) >> self.halvings
+        side = mi.Vector3i(dr.round(FACING * normal)) + 1
+        key = mi.UInt64(cube.x) << 37 | mi.UInt64(cube.y) << 21 | mi.UInt64(cube.z) << 5
+        key += mi.UInt64(side.x + 3 * side.y + 9 * side.z)
+        low, high = mi.UInt32(0), opaque(self.size - 1, mi.UInt32)
+        for _ in range(-(-self.size.bit_length() // SEARCHED) * SEARCHED):
+            middle = (low + high) >> 1
+            below = dr.gather(mi.UInt64, self._table, middle, active) < key
+            low = dr.select(below, dr.minimum(middle + 1, high), low)
+            high = dr.select(below, high, middle)
+        found = active & (dr.gather(mi.UInt64, self._table, low, active) == key)
+        return dr.select(found, mi.Int32(low), -1)
+
+    def numbers(self, places: Places) -> NDArray[np.int32]:
+        """The cell of each place [m], -1 where there is none."""
+        if not places.size or not self.size:
+            return np.full(places.size, -1, dtype=np.int32)
+        return self.of(places.points(), places.normals(), mi.Bool(True)).numpy()
+
+
+@dataclass(frozen=True, slots=True)
+class SurfacePoints:
+    """Points even over a room's surfaces, on both sides, in the order of their cells."""
+
+    cells: RoomCells
+    places: Places
+    first: NDArray[np.int64]  # [c] number of each cell's first point
+    count: NDArray[np.int64]  # [c]
+
+
+def surface_cells(inside: TracedScene, interior: Surfaces) -> SurfacePoints:
+    """The cells of a room's surfaces, with points on each."""
+    none, area = np.empty(0, dtype=np.int64), float(interior.areas.sum())
+    if not area > 0:
+        cells = RoomCells(1.0, np.zeros(3), 0, none, np.empty(0))
+        return SurfacePoints(cells, Places.joined([]), none, none)
+    edge = float(np.sqrt(max(area, 1e-6) / CELLS))
+    low = (interior.triangles.min(axis=(0, 1)) - inside.centre) - 0.37 * edge
+    points, side = _points_on(interior, inside)
+    cube = np.floor((points.point - low) / edge).astype(np.int64) & 0xFFFF
+    keys = ((cube[:, 0] << 37) | (cube[:, 1] << 21) | (cube[:, 2] << 5)) + side
+    order = np.argsort(keys, kind="stable")
+    found, first = np.unique(keys[order], return_index=True)
+    count = np.diff(np.append(first, len(order)))
+    cells = RoomCells(edge, low, 0, found, count * (area / AREA_POINTS))
+    return SurfacePoints(cells, points.some(order), first, count)
+
+
+@dataclass(frozen=True, slots=True)
+class Beam:
+    """The straight beam of the sun through a window group, followed to where it falls."""
+
+    scenes: tuple[TracedScene, TracedScene]  # the room with its window groups, and the outdoors
+    group: int
+    scattering: Scattering
+    points: int = POINTS  # on the group, for hours whose sun does not reach all of them
+    seed: int = 0
+
+    @property
+    def fewer(self) -> int:
+        """Points for hours whose sun reaches all of them."""
+        return max(self.points // EDGE_SHARE, 1)
+
+    def flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
+        """Luminous flux on the cells [c, h], per unit illuminance normal to the sun [m2].
+
+        Args: suns: [h, 3] directions.
+        """
+        step = max(RAYS // self.fewer, 1)
+        blocks = [self._flux(cells, suns[i : i + step]) for i in range(0, len(suns), step)]
+        return sparse.csr_array(sparse.hstack([sparse.csr_array((cells.size, 0)), *blocks]))
+
+    def _flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
+        found = sparse.csr_array((cells.size, len(suns)))
+        if not cells.size:
+            return found
+        for by in sun_ways(self.scenes[1]):
+            before = by.turned(suns) @ self.scenes[0].groups[self.group].frame[2] > -SPREAD
+            hours = np.flatnonzero(before)
+            if not len(hours):
+                continue
+            value, position, to_sun = self._entering(by, suns[hours], self.fewer)
+            lit = value > 0
+            crossed = lit.any(axis=1) & ~lit.all(axis=1)
+            value[crossed] = 0
+            found = found + self._landed(cells, value, position, to_sun, hours, len(suns))
+            hours = hours[crossed]
+            step = max(RAYS // self.points, 1)
+            for start in range(0, len(hours), step):
+                some = hours[start : start + step]
+                rays = self._entering(by, suns[some], self.points)
+                found = found + self._landed(cells, *rays, some, len(suns))
+        return found
+
+    def _entering(
+        self, by: SunWay, suns: NDArray[np.float64], points: int
+    ) -> tuple[NDArray[np.float32], mi.Point3f, mi.Vector3f]:
+        """Flux of rays through points of the windows [h, points], the points and ways out."""
+        inside = self.scenes[0]
+        lane = dr.arange(mi.UInt32, points * len(suns))
+        hour = lane // dr.opaque(mi.UInt32, points)
+        point = lane - hour * dr.opaque(mi.UInt32, points)
+        # the same points in all hours: an hour's light does not hang on those computed with it
+        key = dr.opaque(mi.UInt32, self.seed & 0xFFFFFFFF)
+        stream = mi.sample_tea_32(opaque(self.group, mi.UInt32), key)[0]
+        position = inside.sample_group(self.group, lattice_2d(point, stream, 0))
+        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.turned(suns)), hour), point)
+        local = inside.to_group(self.group, to_sun)
+        start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
+        reaching = by.reaching(mi.Ray3f(start, to_sun), local.z > 0)
+        value = dr.select(local.z > 0, local.z * self.scattering.through(local) * reaching, 0.0)
+        value *= opaque(inside.groups[self.group].area / points)
+        return value.numpy().reshape(len(suns), points), position, to_sun
+
+    def _landed(
+        self,
+        cells: RoomCells,
+        value: NDArray[np.float32],
+        position: mi.Point3f,
+        to_sun: mi.Vector3f,
+        hours: NDArray[np.int64],
+        count: int,
+    ) -> sparse.csr_array:
+        """Flux on the cells [c, count] by rays [n, points] of some of the hours [n]."""
+        inside, flat = self.scenes[0], value.ravel()
+        off = inside.outward(opaque(self.group, mi.Int32), mi.Bool(True))
+        origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
+        ray, lit = mi.Ray3f(origin, onwards), column(flat > 0, mi.Bool)
+        hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=lit)
+        lit &= hit.is_valid()
+        cell = cells.of(*met_faces(inside, origin, onwards, hit, lit), lit).numpy()
+        kept = np.flatnonzero(cell >= 0)
+        cell = cell[kept]
+        entries = flat[kept].astype(float), (cell, hours[kept // value.shape[1]])
+        return sparse.csr_array(sparse.coo_array(entries, shape=(cells.size, count)))
+
+
+@cache
+def _shares_of_corners() -> tuple[NDArray[np.float64], ...]:
+    """What points even over a triangle have of its corners, `AREA_POINTS` in turn."""
+    u, v = pixel_places(AREA_POINTS).T[:, :, None]
+    root = np.sqrt(u)
+    return 1 - root, root * (1 - v), root * v
+
+
+def _points_on(interior: Surfaces, inside: TracedScene) -> tuple[Places, NDArray[np.int64]]:
+    """Points even over the area of the surfaces, on both of their sides; numbers of the sides."""
+    share = np.cumsum(interior.areas)
+    marks = (np.arange(AREA_POINTS) + 0.5) / AREA_POINTS * share[-1]
+    triangle = np.minimum(np.searchsorted(share, marks), len(share) - 1)
+    corners = interior.triangles.swapaxes(0, 1)
+    parts = zip(corners - inside.centre, _shares_of_corners(), strict=True)
+    point = sum(corner.take(triangle, axis=0) * part for corner, part in parts)
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    off = (inside.epsilon[0] * normal).take(triangle, axis=0)
+    both = np.concatenate([normal, -normal]).astype(np.float32)
+    side = (np.round(FACING * both).astype(np.int64) + 1) @ np.array([1, 3, 9])
+    of = np.concatenate([triangle, len(share) + triangle])
+    points = np.concatenate([point + off, point - off]).astype(np.float32)
+    return Places(points, both.take(of, axis=0)), side[of]

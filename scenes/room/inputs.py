@@ -1,0 +1,122 @@
+"""The inputs of one room's simulation: the data that every stage reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.held_sensors import HeldGrid
+from bim.model import Building, Space
+from bim.seasons import Season, season_of, seasons
+from bim.sensors import held_grids, held_views
+from mitsuba_cfs.images.view import View
+from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.metrics.schedules import working_hours
+from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.sky.weather import Weather
+from scenes.fenestration.systems import States
+from scenes.room.operation_hours import OperationHours
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions, SensorGrid
+from scenes.room.skies import skies_for
+from scenes.room.windows import RoomWindows, room_windows
+
+
+@dataclass(frozen=True, slots=True)
+class FileSensors:
+    """Sensor grids and the glare view of a room that the building's file contains."""
+
+    grids: tuple[HeldGrid, ...] = ()
+    view: View | None = None  # the first fisheye of the whole hemisphere
+
+    @classmethod
+    def of(cls, building: Building, space: Space) -> FileSensors:
+        """The sensors of a room."""
+        fisheyes = [one.view for one in held_views(building, space) if one.view.covers_hemisphere]
+        return cls(tuple(held_grids(building, space)), fisheyes[0] if fisheyes else None)
+
+
+NO_SENSORS = FileSensors()
+
+
+@dataclass(frozen=True, slots=True)
+class RoomInputs:
+    """One room and the data from which its year is computed."""
+
+    building: Building
+    space: Space
+    systems: Mapping[str, States]  # by window GUID; also of rooms that lend light
+    windows: RoomWindows
+    weather: Weather
+    skies: AnnualSky
+    options: RoomOptions
+    seasons: tuple[Season, ...]  # the building by months, the most leaves first
+    operation: OperationTables | None  # of this room; None: first shading state, floating freely
+    grids: tuple[SensorGrid, ...]  # of the work plane, one after the other
+    file_sensors: FileSensors
+    inner_glass: bool  # whether light passes through glass between rooms
+    cache: MatrixCache | None
+
+    @property
+    def season(self) -> NDArray[np.int64]:
+        """The season of every lit hour [L], as an index into `seasons`."""
+        months = self.weather.midpoints[self.skies.lit].month.to_numpy()
+        return season_of(self.seasons, months)
+
+    @property
+    def occupied(self) -> NDArray[np.bool_]:
+        """The hours with people [H]."""
+        if self.operation is not None:
+            return OperationHours(self.operation, self.weather).present > 0
+        return working_hours(self.weather, *self.options.occupancy.hours)
+
+    def lit_state(self, state: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The shading state of the lit hours [L], from that of all hours [H]."""
+        return state[self.skies.lit]
+
+
+def room_inputs(
+    building: Building,
+    space: Space,
+    systems: Mapping[str, States],
+    weather: Weather,
+    options: RoomOptions,
+    *,
+    operation: OperationTables | None = None,
+    skies: AnnualSky | None = None,
+    cache: MatrixCache | None = None,
+    grids: Sequence[SensorGrid] = (),
+    file_sensors: FileSensors = NO_SENSORS,
+    inner_glass: bool = False,
+) -> RoomInputs:
+    """The inputs of one room.
+
+    Args:
+        systems: by window GUID the `FenestrationSystem` of each shading state, from open to closed.
+        operation: tables of all rooms; those of this room are chosen here.
+        skies: of `skies_for`, shared by the rooms of a building; computed here without.
+        grids: sensor grids in place of the grid of the options.
+
+    Raises: `ValueError` for a window without a system, `DataError` for a room that the tables name
+        and the building does not contain.
+    """
+    if skies is None:
+        skies = skies_for(weather, options.method, options.sampling, cache, **options.sky)
+    return RoomInputs(
+        building,
+        space,
+        systems,
+        room_windows(space, systems),
+        weather,
+        skies,
+        options,
+        seasons(building),
+        None if operation is None else operation.of_room(building, space),
+        tuple(grids) or (options.grid,),
+        file_sensors,
+        inner_glass,
+        cache,
+    )

@@ -1,0 +1,127 @@
+"""Stage 1 of a room: its scene, the daylight matrices, the light of every lit hour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bim.model import Building, Space
+from bim.sensors import sensor_grid, view_point
+from bim.to_tracer import exterior_surfaces, furnished_surfaces
+from mitsuba_cfs.images.view import fisheye, fitted
+from mitsuba_cfs.methods.path_light import PathLight
+from mitsuba_cfs.methods.phase_light import PhaseLight, PhaseSystems
+from mitsuba_cfs.methods.phase_scene import PhaseScene
+from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.seasonal_light import SeasonalLight, paths_of
+from mitsuba_cfs.progress import Progress, in_shares, part, silent
+from scenes.room.inner_glass import InnerGlass, inner_glass
+from scenes.room.inputs import NO_SENSORS, FileSensors, RoomInputs
+from scenes.room.options import SensorGrid
+from scenes.room.windows import RoomWindows
+
+# Share of the daylight stage that traces the sensors' matrices; those of the view report their own
+TRACED = {"daylight": 0.6}
+
+
+@dataclass(frozen=True, slots=True, weakref_slot=True)
+class RoomLight:
+    """A room's traced scene and the light of its lit hours in every shading state."""
+
+    scene: DaylightScene  # of the first season, visible band
+    traced: PhaseScene  # V and D of that scene
+    light: PhaseLight | SeasonalLight
+    inner: InnerGlass | None  # glass to other rooms that gives light
+
+    def eye(self) -> NDArray[np.float32]:
+        """Illuminance at the eye in every shading state [J, L] [lx]."""
+        hours = np.ones(len(self.light.sky.lit), dtype=np.int64)
+        states = range(self.light.filled.states)
+        return np.stack([self.light.eye(j * hours) for j in states]).astype(np.float32)
+
+
+def room_light(room: RoomInputs, *, progress: Progress = silent) -> RoomLight:
+    """The light of a room's lit hours in every state; matrices are traced at their first use."""
+    first, *others = room.seasons
+    scene, inner = _scene(room, first.building)
+    traced = PhaseScene(
+        scene, room.options.sampling, five_phase=room.options.method != "three-phase",
+        cache=room.cache, progress=in_shares(progress, TRACED),
+    )  # fmt: skip
+    filled = [_filled(room, traced, inner)]
+    for season in others:
+        outdoors, glass = _scene(room, season.building)
+        filled.append(_filled(room, traced.before(outdoors), glass))
+    steps = part(progress, 0.6, 0.9, "daylight")
+    if len(filled) == 1:
+        light = filled[0].light(room.skies, progress=steps)
+    else:
+        light = SeasonalLight.of(filled, room.skies, room.season, progress=steps)
+    return RoomLight(scene, traced, light, inner)
+
+
+def visible_scene(room: RoomInputs) -> DaylightScene:
+    """The room's scene in the visible band, in its first season."""
+    return _scene(room, room.seasons[0].building)[0]
+
+
+def picture_light(room: RoomInputs, light: RoomLight) -> PhaseLight | PathLight | SeasonalLight:
+    """The light that the room's pictures are made of."""
+    return paths_of(light.light) if room.options.method == "point-in-time" else light.light
+
+
+def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGlass | None]:
+    """The scene of one season, with the glass to other rooms where light passes through it."""
+    glass = inner_glass(building, room.space, room.systems) if room.inner_glass else None
+    scene = room_scene(
+        building, room.space, room.windows, room.grids, room.options.outputs.picture_size,
+        inner=glass, file_sensors=room.file_sensors,
+    )  # fmt: skip
+    return scene, glass
+
+
+def _filled(room: RoomInputs, traced: PhaseScene, inner: InnerGlass | None) -> PhaseSystems:
+    return PhaseSystems(traced, [*room.windows.optics(), *(() if inner is None else inner.optics)])
+
+
+def room_scene(
+    building: Building,
+    space: Space,
+    windows: RoomWindows,
+    grids: Sequence[SensorGrid],
+    picture_size: int,
+    *,
+    inner: InnerGlass | None = None,
+    file_sensors: FileSensors = NO_SENSORS,
+) -> DaylightScene:
+    """Triangles, window groups, sensors and view of a room in the visible band.
+
+    Args:
+        grids: sensor grids, one after the other.
+        picture_size: pixels of a side of the view.
+        inner: glass to other rooms that gives light; None: that glass is opaque.
+        file_sensors: of the building's file; its sensors follow those of the grids.
+    """
+    points = np.concatenate([grid_points(space, grid) for grid in grids])
+    upwards = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    position, direction = view_point(space)
+    view = fisheye(position, direction, picture_size)
+    if file_sensors.view is not None:
+        view = fitted(file_sensors.view, picture_size)
+    return DaylightScene(
+        furnished_surfaces(space, "visible") if inner is None else inner.interior,
+        exterior_surfaces(building, space, "visible"),
+        [*windows.groups, *(() if inner is None else inner.groups)],
+        np.concatenate([points, *(grid.points for grid in file_sensors.grids)]),
+        np.concatenate([upwards, *(grid.directions for grid in file_sensors.grids)]),
+        view,
+        () if inner is None else inner.beyond,
+    )
+
+
+def grid_points(space: Space, grid: SensorGrid) -> NDArray[np.float64]:
+    """Sensors [S, 3] of a grid in a room [m]."""
+    return sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)[0]
