@@ -177,8 +177,7 @@ def unused_notes(building: Building) -> tuple[str, ...]:
         return ()
     note = Note(
         "{file} contains {uses} uses of rooms, {grids} sensor grids and {views} views; they are "
-        "not "
-        "used here.",
+        "not used here.",
         file=building.file.name,
         uses=len(building.uses),
         grids=len(building.grids),
@@ -217,8 +216,7 @@ def _peak_note(system: FenestrationSystem) -> tuple[str, ...]:
         return ()
     note = Note(
         "{system}: direct sun and view out use the specular peak of the Klems patches, "
-        "transmittance "
-        "{peak:.2f} at normal incidence.",
+        "transmittance {peak:.2f} at normal incidence.",
         system=system.name,
         peak=peak,
     )

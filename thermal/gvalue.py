@@ -89,8 +89,7 @@ def thermal_data(
         notes.append(
             ThermalNote(
                 "{system}: no g-value given; {percent:g} % of the absorbed solar radiation is "
-                "assumed "
-                "to be released inwards, as for low-e double glazing {shade}.",
+                "assumed to be released inwards, as for low-e double glazing {shade}.",
                 {"system": item, "percent": 100 * share, "shade": _SHADES[shading_position]},
             )
         )

@@ -88,8 +88,7 @@ def _pressure(
         notes = (
             Note(
                 "Weather {site}: {count} impossible pressures, the first in line {line}; "
-                "{pressure:.0f} "
-                "Pa (standard atmosphere) is used.",
+                "{pressure:.0f} Pa (standard atmosphere) is used.",
                 site=site.name,
                 count=np.count_nonzero(wrong),
                 line=column.first_line + row,

@@ -108,9 +108,9 @@ def _notes(
     found = [
         Note(
             "Weather {site}: air of an urban street, on average {mean:.1f} K and at most "
-            "{most:.1f} K "
-            "warmer than in the file (urban heat island by {source}, median of the daily maxima "
-            "{median:.1f} K); sky, wind, ground and absolute humidity are those of the file.",
+            "{most:.1f} K warmer than in the file (urban heat island by {source}, median of the "
+            "daily maxima {median:.1f} K); sky, wind, ground and absolute humidity are those of "
+            "the file.",
             site=weather.site,
             mean=float(excess.mean()),
             most=float(excess.max()),
@@ -126,8 +126,7 @@ def _notes(
             found.append(
                 Note(
                     "Weather {site}: the heat island equation is for cities in north-western "
-                    "Europe; "
-                    "this site is elsewhere.",
+                    "Europe; this site is elsewhere.",
                     site=weather.site,
                 )
             )

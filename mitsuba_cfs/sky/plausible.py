@@ -91,16 +91,14 @@ def _clock(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]
         Note(
             "Weather {site}: on clear days the radiation is centred {hours:.1f} h before the solar "
             "noon of longitude {longitude:g} and time zone {zone:g}; values that fit: {fits}; or "
-            "the "
-            "hours are labelled differently.",
+            "the hours are labelled differently.",
             **values,
         )
         if late < 0
         else Note(
             "Weather {site}: on clear days the radiation is centred {hours:.1f} h after the solar "
             "noon of longitude {longitude:g} and time zone {zone:g}; values that fit: {fits}; or "
-            "the "
-            "hours are labelled differently.",
+            "the hours are labelled differently.",
             **values,
         )
     )

@@ -261,7 +261,6 @@ class Check:
         times = StageTimes()
         with times.stage(TRACING):
             light = room_light(room, progress=progress)
-            light.traced.trace("sDGP")
         with times.stage(SUMS):
             found = lights_of(room, light, operated)
         closed = next((one.closed for one in found if one.closed is not None), None)
@@ -359,8 +358,7 @@ class Check:
             month, day = options.day
             yield Note(
                 "Sunlight is assessed on {day:02d}.{month:02d}. for solar altitudes from "
-                "{altitude:g}° "
-                "({source}).",
+                "{altitude:g}° ({source}).",
                 day=day,
                 month=month,
                 altitude=files.least_altitude_deg,
@@ -369,8 +367,7 @@ class Check:
         if "view" in self.parts:
             yield Note(
                 "View out is assessed at eyes {height:g} m above the floor, spaced 0.5 m and 0.5 m "
-                "from "
-                "the walls (utilised area), without furniture.",
+                "from the walls (utilised area), without furniture.",
                 height=options.eye_height,
             )
             yield from self.glass
@@ -388,8 +385,7 @@ class Check:
             template = (
                 N_(
                     "Temperatures are without heating and cooling, with blinds closed by the rule "
-                    "of "
-                    "LM-83, {air_changes:g} air changes per hour and gains in the hours of use."
+                    "of LM-83, {air_changes:g} air changes per hour and gains in the hours of use."
                 )
                 if self.shaded
                 else N_(
@@ -414,8 +410,7 @@ def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
     start, end = options.room.occupancy.hours
     return Note(
         "Glare is rated with {blinds}, {seats}, daily from {start} to {end} o'clock, with pictures "
-        "of "
-        "{pixels} pixels.",
+        "of {pixels} pixels.",
         blinds=blinds,
         seats=seats,
         start=start,

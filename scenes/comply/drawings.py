@@ -116,8 +116,8 @@ def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
     scale = ColourScale(0.2, 0.6, gettext("Daylight glare probability"), "")
     text = (
         gettext(
-            "DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds operated"
-            "."
+            "DGP exceeded in 5 % of the hours of use, worst direction of each seat, blinds "
+            "operated."
         )
         if glare.operated
         else gettext(

@@ -62,8 +62,7 @@ class ComfortShare(Need):
         if math.isfinite(self.cold_from_c):
             return gettext(
                 "share of the hours of use within the adaptive band {band}; the lower limit "
-                "applies "
-                "from an outdoor running mean of {cold_from} °C",
+                "applies from an outdoor running mean of {cold_from} °C",
                 band=self.band,
                 cold_from=f"{self.cold_from_c:g}",
             )

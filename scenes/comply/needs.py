@@ -165,8 +165,7 @@ class ViewFree(Need):
         """The quantity in words."""
         return gettext(
             "share of the hours from 8 to 18 o'clock with an unobstructed view through at least "
-            "one "
-            "window"
+            "one window"
         )
 
     def value(self, room: Findings) -> float | None:

@@ -156,8 +156,7 @@ def glare_words(glare: SeatGlare) -> str:
             "{count} seat, {directions} directions; DGP exceeded in 5 % of the hours: {dgp} at the "
             "worst",
             "{count} seats, {directions} directions each; DGP exceeded in 5 % of the hours: {dgp} "
-            "at "
-            "the worst",
+            "at the worst",
             seats,
             directions=directions,
             dgp=dgp,

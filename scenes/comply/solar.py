@@ -45,8 +45,7 @@ def solar_sentence(system: FenestrationSystem) -> str:
     source = Note("as in the heat balance") if rating.method == "heat balance" else rating.method
     return Note(
         "{system}: g_tot {g:.2f} at normal incidence ({source}), class {solar_class} for the "
-        "limits "
-        "{limits} of EN 14501 (not verified).",
+        "limits {limits} of EN 14501 (not verified).",
         system=system.name,
         g=rating.g_value,
         source=source,

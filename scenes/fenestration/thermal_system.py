@@ -112,8 +112,7 @@ def _unplaced(system: FenestrationSystem, closure: Closure) -> list[Note]:
     return [
         Note(
             "{system}: scatters light like a shade, but its position is not stated; its U-value "
-            "and "
-            "g-value are those of glazing without a shade. State shading_position (external, "
+            "and g-value are those of glazing without a shade. State shading_position (external, "
             "internal, integrated or none).",
             system=system.name,
         )

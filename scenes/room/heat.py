@@ -299,12 +299,9 @@ def _coupling_note(rooms: Sequence[RoomZone]) -> str:
         )
     return Note(
         "The heat of the {count} rooms is balanced together: it flows through {area:.1f} m2 of "
-        "walls, "
-        "floors and doors between them. Surfaces without a computed neighbour ({among:.1f} m2 "
-        "between "
-        "these rooms, {other:.1f} m2 towards other rooms) are taken as adjacent to a room of the "
-        "same "
-        "temperature.",
+        "walls, floors and doors between them. Surfaces without a computed neighbour ({among:.1f} "
+        "m2 between these rooms, {other:.1f} m2 towards other rooms) are taken as adjacent to a "
+        "room of the same temperature.",
         among=among,
         other=other,
         **values,
