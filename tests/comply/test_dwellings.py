@@ -73,8 +73,9 @@ def test_rooms_of_no_dwelling_are_asked_one_by_one(calendar):
         [2 / 3, 1 / 3, 1 / 3]
     )
     assert [bool(text) for text in misses(rooms).values()] == [False, True, False]
-    (text,) = dwelling_words(rooms)
-    assert "A (3); of no named dwelling, so each by itself: 1, 2." in text and "--uses" in text
+    named, alone = dwelling_words(rooms)
+    assert "dwellings are A (3)" in named and "--uses" in named
+    assert "without a named dwelling are assessed individually: 1, 2" in alone
 
 
 def test_offices_have_hours_and_miss_nothing_wards_are_asked_each(calendar):

@@ -158,7 +158,7 @@ def test_a_sentence_names_what_is_missed_alone():
     criterion = read_rule("en17037").criterion[0]
     verdict = RoomVerdict("en17037", criterion, True, ((310.0, 50.0),) * 3)
     (text,) = missed(SimpleNamespace(verdicts=(verdict,)))
-    assert "95 % of the reference plane" in text and "50 lx, ≥ 100 lx for minimum" in text
+    assert "95 % of the reference plane" in text and "50 lx, required ≥ 100 lx for minimum" in text
     assert "310 lx" not in text
 
 
