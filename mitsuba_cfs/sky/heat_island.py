@@ -105,7 +105,7 @@ def in_city(
 def _notes(
     weather: Weather, maximum: NDArray[np.float64], excess: NDArray[np.float64]
 ) -> list[str]:
-    found = [
+    found: list[str] = [
         Note(
             "Weather {site}: air of an urban street, on average {mean:.1f} K and at most "
             "{most:.1f} K warmer than in the file (urban heat island by {source}, median of the "

@@ -20,8 +20,9 @@ from scenes.language.catalogue import decimal, gettext, in_language, ngettext, t
 from scenes.language.numbers import colon, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
+from scenes.report.names import stage_words
 from scenes.report.page import FILES as SHARED
-from scenes.report.page import environment, stage_words
+from scenes.report.page import environment
 from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Table, issues_table

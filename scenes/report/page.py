@@ -13,14 +13,14 @@ import jinja2
 from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
-from scenes.language.catalogue import N_, gettext, in_language, ngettext, translated
+from scenes.language.catalogue import gettext, in_language, ngettext, translated
 from scenes.language.numbers import cell, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
 from scenes.report.model3d import model3d
-from scenes.report.names import glossary, option_words
+from scenes.report.names import glossary, option_words, stage_words
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
@@ -254,37 +254,6 @@ def timings_table(result: RunResult) -> tables.Table:
     if isinstance(total, int | float):
         rows.append((gettext("entire run"), gettext("all"), cell(total, 1)))
     return tables.Table(gettext("Computing time"), columns, tuple(rows))
-
-
-STAGES = {  # whose seconds are noted
-    "view matrix": N_("view matrix"),
-    "view matrices": N_("view matrices"),
-    "daylight matrix": N_("daylight matrix"),
-    "direct sun": N_("direct sun"),
-    "annual product": N_("annual product"),
-    "daylight": N_("daylight"),
-    "holes": N_("check for leaks"),
-    "annual glare": N_("annual glare"),
-    "glare": N_("glare"),
-    "pictures": N_("pictures"),
-    "colour": N_("colour picture"),
-    "explorer": N_("explorer"),
-    "thermal": N_("heat balance"),
-    "leaks": N_("check for leaks"),
-    "reading": N_("reading of files"),
-    "view and sunlight": N_("view out and sunlight"),
-    "V and D": N_("matrices V and D"),
-    "light and blinds of every hour": N_("light and blinds of every hour"),
-    "glare by pictures": N_("glare by pictures"),
-    "temperatures": N_("temperatures"),
-    "what else light takes": N_("other steps of the light"),
-}
-
-
-def stage_words(stage: str) -> str:
-    """A stage of the computation in words."""
-    name = stage.replace("_", " ")
-    return gettext(STAGES.get(name, name))
 
 
 def remaining(manifest: Mapping) -> dict:

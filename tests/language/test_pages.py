@@ -45,7 +45,7 @@ NAMES = re.compile(
     r"|[„«]\s?Office south\s?[“»]|[„«]\s?office\s?[“»]|Daylight simulation|EQ credit Daylight"
     r"|LEED v4\.1 BD\+C|WELL v2, Light|Light exposure|BREEAM UK New Construction"
     r"|(?:WELL Building Standard|IES) [\w.-]+|--[\w-]+|cfs \w+|inner_glass=True|join=\S+"
-    r"|\[\[\w+\]\]|'A \+ B'|Glazing \w+|glazing, \S+.*|IfcSpace"
+    r"|reflexion GLASS|GLASS|window \d|\[\[\w+\]\]|'A \+ B'|Glazing \w+|glazing, \S+.*|IfcSpace"
 )
 
 
