@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import atexit
+import weakref
 from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
@@ -16,9 +16,8 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, triangle_areas
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss
 from mitsuba_cfs.trace.kernels.mesh import (
-    KeptMesh,
     SharedScene,
-    kept_mesh,
+    SolidMesh,
     scene_of,
     unit_normals,
 )
@@ -31,7 +30,8 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 
-KEPT = 8  # scenes that are found again: what one room is traced by, indoors and outdoors
+SCENES = 8  # kept: what one room is traced by, indoors and outdoors
+MESHES = 4  # kept: surroundings of a room, by season, and of its neighbours
 OPAQUE = -1  # window index of a triangle that is not glazed
 SERIES_GAP = 1.0  # widest between a screen and its panes [m]
 SERIES_PLACES = 256  # on each window group, from which they are looked for
@@ -55,6 +55,7 @@ class TracedScene:
         windows_block: bool = True,
         window_reflectance: ArrayLike | None = None,
         centre: ArrayLike | None = None,
+        mesh: SolidMesh | None = None,
     ) -> None:
         """Build the scene.
 
@@ -62,6 +63,7 @@ class TracedScene:
             windows_block: if false, a ray passes through the windows.
             window_reflectance: [G] diffuse, of the windows from the room; 0 by default.
             centre: [3] origin of the scene's coordinates; the middle of the windows by default.
+            mesh: of the surfaces' triangles, which other scenes share.
         """
         variants.activate()
         windows = [(g, window) for g, group in enumerate(groups) for window in group.windows]
@@ -78,8 +80,9 @@ class TracedScene:
             window_reflectance = np.zeros(len(groups))
         glazed_reflectance = np.asarray(window_reflectance, float)[glazed_group.astype(int)]
         blocking = slice(None) if windows_block else slice(0)
+        mesh = SolidMesh(surfaces.triangles) if mesh is None else mesh
         self._load_mesh(
-            surfaces, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
+            surfaces, mesh, glazed[blocking], glazed_group[blocking], glazed_reflectance[blocking]
         )
         if windows:
             self._load_windows(glazed, glazed_group)
@@ -87,16 +90,16 @@ class TracedScene:
     def _load_mesh(
         self,
         surfaces: Surfaces,
+        mesh: SolidMesh,
         glazed: NDArray[np.float64],
         glazed_group: NDArray[np.int64],
         glazed_reflectance: NDArray[np.float64],
     ) -> None:
         """The mesh, and its tables by triangle: normal, reflectance, surface, window group."""
-        mesh = kept_mesh(surfaces.triangles)
         solid = surfaces if mesh.keep.all() else surfaces.some(mesh.keep)
         if not len(solid.triangles) + len(glazed):
             solid = _speck(self.centre)
-            mesh = KeptMesh(solid.triangles)
+            mesh = SolidMesh(solid.triangles)
         panes = glazed - self.centre
         normals = np.concatenate([mesh.normals, unit_normals(panes)])
         reflectance = np.concatenate([solid.reflectance, glazed_reflectance])
@@ -314,42 +317,67 @@ class TracedScene:
         return x * v.x + y * v.y + z * v.z
 
 
-def kept_scene(
-    surfaces: Surfaces,
-    groups: Sequence[WindowGroup] = (),
-    *,
-    windows_block: bool = True,
-    window_reflectance: ArrayLike | None = None,
-    centre: ArrayLike | None = None,
-) -> TracedScene:
-    """A `TracedScene` of its arguments; that of the same objects is found again among the last.
+class SceneCache:
+    """Traced scenes that several functions share; the last used ones are kept.
 
-    A room's matrices are traced by some twenty functions, and the outdoors of a building has tens
-    of thousands of triangles.
+    Some twenty functions trace the matrices of one room, and the surroundings of a building have
+    tens of thousands of triangles.  Whoever calls several of these functions makes one cache and
+    passes it to all of them (`scenes=`).
     """
-    # said or not, one centre is one scene
-    values = (window_reflectance, _middle(groups) if centre is None and groups else centre)
-    arrays = [None if value is None else np.asarray(value, float) for value in values]
-    inputs = (surfaces, *groups)
-    key = (
-        variants.activate(), windows_block, *(None if a is None else a.tobytes() for a in arrays),
-        *map(id, inputs),
-    )  # fmt: skip
-    if key not in _last_scenes:
-        reflectance, middle = arrays
-        options = {
-            "windows_block": windows_block, "window_reflectance": reflectance, "centre": middle,
-        }  # fmt: skip
-        _last_scenes[key] = inputs, TracedScene(surfaces, groups, **options)
-    _last_scenes.move_to_end(key)
-    while len(_last_scenes) > KEPT:
-        _last_scenes.popitem(last=False)
-    return _last_scenes[key][1]
 
+    def __init__(self, scenes: int = SCENES, meshes: int = MESHES) -> None:
+        """Empty; `scenes` and `meshes`: how many to keep."""
+        self._most_scenes, self._most_meshes = scenes, meshes
+        # with the objects whose ids are in the key, so that no other object gets these ids
+        self._scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
+        self._meshes: list[tuple[str, SolidMesh]] = []
+        for store in (self._scenes, self._meshes):  # at exit: before Dr.Jit ends
+            weakref.finalize(self, store.clear)
 
-# with the objects whose ids are in the key, which so stay theirs; empty before Dr.Jit ends
-_last_scenes: OrderedDict[tuple, tuple[tuple, TracedScene]] = OrderedDict()
-atexit.register(_last_scenes.clear)
+    def scene(
+        self,
+        surfaces: Surfaces,
+        groups: Sequence[WindowGroup] = (),
+        *,
+        windows_block: bool = True,
+        window_reflectance: ArrayLike | None = None,
+        centre: ArrayLike | None = None,
+    ) -> TracedScene:
+        """The `TracedScene` of these arguments, built if it is not in the cache.
+
+        Surfaces and groups are compared by identity.
+        """
+        # given or not, one centre is one scene
+        values = (window_reflectance, _middle(groups) if centre is None and groups else centre)
+        arrays = [None if value is None else np.asarray(value, float) for value in values]
+        inputs = (surfaces, *groups)
+        key = (
+            variants.activate(), windows_block,
+            *(None if a is None else a.tobytes() for a in arrays), *map(id, inputs),
+        )  # fmt: skip
+        if key not in self._scenes:
+            reflectance, middle = arrays
+            self._scenes[key] = inputs, TracedScene(
+                surfaces, groups, windows_block=windows_block, window_reflectance=reflectance,
+                centre=middle, mesh=self._mesh(surfaces.triangles),
+            )  # fmt: skip
+        self._scenes.move_to_end(key)
+        while len(self._scenes) > self._most_scenes:
+            self._scenes.popitem(last=False)
+        return self._scenes[key][1]
+
+    def _mesh(self, triangles: NDArray[np.float64]) -> SolidMesh:
+        """The mesh of triangles [N, 3, 3]; equal triangles share one if it is large."""
+        variant = variants.activate()
+        for place, (of, mesh) in enumerate(self._meshes):
+            if of == variant and np.array_equal(mesh.triangles, triangles):
+                self._meshes.append(self._meshes.pop(place))
+                return mesh
+        mesh = SolidMesh(triangles)
+        if mesh.is_shared:
+            self._meshes.append((variant, mesh))
+            del self._meshes[: -self._most_meshes]
+        return mesh
 
 
 def _middle(groups: Sequence[WindowGroup]) -> NDArray[np.float64]:

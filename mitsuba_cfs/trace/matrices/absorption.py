@@ -17,7 +17,7 @@ from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import opaque
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 
 
@@ -67,6 +67,7 @@ def absorption_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Absorption matrices [G, K, F + G]: where a unit of flux of each window patch is absorbed.
 
@@ -82,9 +83,10 @@ def absorption_matrix(
         samples: paths for each window patch in each batch.
         cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
     """
+    scenes = SceneCache() if scenes is None else scenes
     reflectance = np.zeros(len(groups)) if window_reflectance is None else window_reflectance
     reflectance = np.asarray(reflectance, dtype=float)
-    tracer = kept_scene(surfaces, groups, window_reflectance=reflectance)
+    tracer = scenes.scene(surfaces, groups, window_reflectance=reflectance)
     bins = DirectionBins(basis)
     n = int(samples)
     width = tracer.surface_count + len(groups)

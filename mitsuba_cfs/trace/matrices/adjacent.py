@@ -30,7 +30,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.matrices.pixel_view import add_seen_and_reflected
 
@@ -47,6 +47,7 @@ def borrowed_daylight(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Daylight matrices [I, K, P] of glass to an adjacent room: radiance per unit sky radiance.
 
@@ -62,8 +63,9 @@ def borrowed_daylight(
         inner: the glass, with normals into the adjacent room.
         samples: paths of a patch of each piece of glass in each batch.
     """
-    tracer, bins, n = kept_scene(surfaces, groups), DirectionBins(basis), int(samples)
-    starts = kept_scene(Surfaces.none(), inner, windows_block=False, centre=tracer.centre)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer, bins, n = scenes.scene(surfaces, groups), DirectionBins(basis), int(samples)
+    starts = scenes.scene(Surfaces.none(), inner, windows_block=False, centre=tracer.centre)
     flat = luminance.reshape(-1, luminance.shape[-1])
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
@@ -139,6 +141,7 @@ def borrowed_view(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Irradiance at sensors straight through a window group [S, P], per unit sky radiance.
 
@@ -153,8 +156,9 @@ def borrowed_view(
         sensors: positions [S, 3] [m] and normals [S, 3].
         samples: paths of a sensor in each batch.
     """
+    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(*sensors)
-    here, bins, n, S = kept_scene(*room), DirectionBins(KLEMS_FULL), int(samples), len(points)
+    here, bins, n, S = scenes.scene(*room), DirectionBins(KLEMS_FULL), int(samples), len(points)
     flat = [one.luminance.reshape(-1, one.luminance.shape[-1]) for one in beyond.rooms()]
     place, normal = vectors(points - here.centre, mi.Point3f), vectors(directions)
     passed = mi.Float(np.asarray(beam, dtype=np.float32))
@@ -176,7 +180,8 @@ def borrowed_view(
         start = start + away * hit.t + here.exterior_normal(group) * here.epsilon
         _add_paths(
             beyond, iter(sums), bins, start, mi.Vector3f(away), active,
-            centre=here.centre, row=sensor, stream=stream, sample=sample, generator=generator,
+            scenes=scenes, centre=here.centre, row=sensor, stream=stream, sample=sample,
+            generator=generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),
         )  # fmt: skip
         dr.eval(*sums)
@@ -202,12 +207,13 @@ def _add_paths(
     direction: mi.Vector3f,
     active: mi.Bool,
     *,
+    scenes: SceneCache,
     centre: NDArray[np.float64],
     generator: mi.PCG32,
     **paths: Any,
 ) -> None:
     """Add the light that rays meet in a room, and through its glass in the rooms behind it."""
-    tracer, matrix = kept_scene(room.surfaces, room.groups, centre=centre), next(sums)
+    tracer, matrix = scenes.scene(room.surfaces, room.groups, centre=centre), next(sums)
     if room.onward:
         ray = mi.Ray3f(start, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
@@ -222,7 +228,7 @@ def _add_paths(
         outside = tracer.exterior_normal(behind.first) * tracer.epsilon
         _add_paths(
             behind.room, sums, bins, start + direction * hit.t + outside, direction, through,
-            centre=centre, generator=generator, **paths,
+            scenes=scenes, centre=centre, generator=generator, **paths,
         )  # fmt: skip
         active &= ~met
     add_seen_and_reflected(

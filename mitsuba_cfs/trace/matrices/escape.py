@@ -25,7 +25,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 
 SIDES = ("west", "east", "south", "north", "floor", "ceiling")  # of the box round a room
 FIGURES = 4  # share, and share times x, y, z
@@ -53,6 +53,7 @@ def escaped_view(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Escape:
     """The share of each sensor's view that meets neither a surface nor a window, and where.
 
@@ -65,8 +66,9 @@ def escaped_view(
         surfaces, groups, points, directions: as of `view_matrix`.
         samples: paths of each sensor in each of 4 batches.
     """
+    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(points, directions)
-    tracer = kept_scene(surfaces, groups)
+    tracer = scenes.scene(surfaces, groups)
     corners = np.concatenate(
         [surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]
     ).reshape(-1, 3)

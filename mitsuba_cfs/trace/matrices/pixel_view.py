@@ -31,7 +31,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     tables,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_mirrored, add_view_paths
 
 BLOCK_BYTES = 128 * 2**20  # of the matrix that is held at a time
@@ -111,6 +111,7 @@ def picture_part_blocks(
     weight: NDArray[np.floating] | None = None,
     light: PatchLight | None = None,
     progress: Progress = silent,
+    scenes: SceneCache | None = None,
 ) -> Iterator[PictureBlock]:
     """Blocks of the view matrix of a picture in its parts, of the same paths.
 
@@ -124,7 +125,8 @@ def picture_part_blocks(
         weight: [n] of each pixel's light in its rows; 1 by default.
         light: luminances of hours that the paths add up, not the patches; not of glossy rooms.
     """
-    tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer = scenes.scene(surfaces, groups, window_reflectance=window_reflectance)
     if light is not None and tracer.gloss is not None:
         raise ValueError("what gloss shows of the patches is held patch by patch, not by hours")
     bins = DirectionBins(basis)

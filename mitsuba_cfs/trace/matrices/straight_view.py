@@ -30,7 +30,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
 
 
@@ -48,6 +48,7 @@ def straight_view_matrix(
     stopping: Stopping | None = None,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Illuminance at each sensor per unit luminance of each sky patch [G, S, P] [sr, projected].
 
@@ -61,8 +62,9 @@ def straight_view_matrix(
         samples: points on each group for each sensor in each batch.
         max_depth: 1: what the sky sends itself.
     """
+    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(points, directions)
-    inside, outside = kept_scene(interior, groups), kept_scene(exterior, groups)
+    inside, outside = scenes.scene(interior, groups), scenes.scene(exterior, groups)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:

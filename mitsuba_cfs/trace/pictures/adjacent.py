@@ -31,7 +31,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_view_paths
 from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind
 from mitsuba_cfs.trace.pictures.outdoors import (
@@ -83,6 +83,7 @@ def borrowed_picture(
     tile: int | None = None,
     max_depth: int = 32,
     seed: int = 0,
+    scenes: SceneCache | None = None,
 ) -> list[RoomShown]:
     """The rooms that a view shows straight through panes, and through panes of these.
 
@@ -94,12 +95,15 @@ def borrowed_picture(
         tile: pixels across of the squares that share what surfaces reflect, as of `tile_size`.
         max_depth: segments of a path in a room.
     """
-    inside, nodes = kept_scene(interior, groups), _all_behind(behind)
-    tracers = [kept_scene(b.room.surfaces, b.room.groups, centre=inside.centre) for _, b in nodes]
+    scenes = SceneCache() if scenes is None else scenes
+    inside, nodes = scenes.scene(interior, groups), _all_behind(behind)
+    tracers = [scenes.scene(b.room.surfaces, b.room.groups, centre=inside.centre) for _, b in nodes]
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     tiles = Tiles(tile_size(view) if tile is None else tile, view.width)
     sky = SkyBins(ReinhartSky(subdivision))
-    met = [_MetInRoom(b.room, t, tiles, sky) for (_, b), t in zip(nodes, tracers, strict=True)]
+    met = [
+        _MetInRoom(b.room, t, tiles, sky, scenes) for (_, b), t in zip(nodes, tracers, strict=True)
+    ]
     step = max(256, RAYS // samples)
     for start in range(0, len(pixels), step):
         block = pixels[start : start + step]
@@ -147,12 +151,14 @@ def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
 class _MetInRoom:
     """What rays find in a room, and behind its windows: patches, and places on surfaces."""
 
-    def __init__(self, room: LendingRoom, tracer: TracedScene, tiles: Tiles, sky: SkyBins) -> None:
+    def __init__(
+        self, room: LendingRoom, tracer: TracedScene, tiles: Tiles, sky: SkyBins, scenes: SceneCache
+    ) -> None:
         self.room, self.tracer, self.bins = room, tracer, DirectionBins(KLEMS_FULL)
         self._tiles, self._columns = tiles, len(room.groups) * KLEMS_FULL.size
         self._faces = face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
         self._outdoors = room.onward[0].first if room.onward else len(room.groups)
-        outside = kept_scene(room.exterior, room.groups[: self._outdoors], centre=tracer.centre)
+        outside = scenes.scene(room.exterior, room.groups[: self._outdoors], centre=tracer.centre)
         self._beyond = SeenOutdoors(outside, sky, tiles)
         self._pixel, self._slot, self._share = [], [], []
         self._shown: list[tuple[NDArray, NDArray, NDArray, Places]] = []

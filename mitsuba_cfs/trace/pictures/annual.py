@@ -25,7 +25,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, tile_size
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.pixel_view import PictureBlock, picture_part_blocks
 from mitsuba_cfs.trace.pictures.outdoors import OutdoorCoefficients
 from mitsuba_cfs.trace.sun.picture_beam import BeamLight, faces_luminance
@@ -90,6 +90,7 @@ def view_matrices(
     light: PatchLight | None = None,
     elements: SunlitRows | None = None,
     progress: Progress = silent,
+    scenes: SceneCache | None = None,
     **options: Any,
 ) -> ViewMatrices:
     """The matrices of a picture's pixels, in memory or, where they are too large, on disk.
@@ -105,14 +106,15 @@ def view_matrices(
         elements: of the same view and options under any light, which are not traced again.
         options: basis, samples, max_depth, seed of `picture_part_blocks`.
     """
-    tracer = kept_scene(surfaces, groups, window_reflectance=window_reflectance)
+    scenes = SceneCache() if scenes is None else scenes
+    tracer = scenes.scene(surfaces, groups, window_reflectance=window_reflectance)
     tile = tile_size(view) if tile is None else tile
     shared = PictureRows.of_view(tracer, view, tile)
     pixels, row, half, m = shared.pixels, shared.row, shared.half, len(shared.keys)
     patches = len(groups) * options.get("basis", KLEMS_FULL).size
     shape = (2 * m, patches if light is None else light.hours)
     sums = [_storage(shape, 8 * math.prod(shape) > memory, folder) for _ in range(2)]
-    options.update(window_reflectance=window_reflectance, light=light)
+    options.update(window_reflectance=window_reflectance, light=light, scenes=scenes)
     times = shared.times(smoothed=True)
     number = np.repeat(np.arange(len(pixels)), times)
     options.update(pixels=pixels[number], row=half[number], weight=(1 / times)[number])

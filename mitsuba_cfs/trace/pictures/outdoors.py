@@ -33,7 +33,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
 from mitsuba_cfs.trace.sun.lit_points import Places, face_places
 from mitsuba_cfs.trace.sun.outdoors import (
@@ -79,6 +79,7 @@ def outdoors(
     samples: int = 8,
     tile: int | None = None,
     seed: int = 0,
+    scenes: SceneCache | None = None,
 ) -> OutdoorCoefficients:
     """Trace every pixel through the windows to the sky; arguments as for `direct_sun_matrix`.
 
@@ -88,8 +89,9 @@ def outdoors(
         tile: pixels across of the squares that share what varies slowly over a face, by default
             as of `tile_size`.
     """
-    inside = kept_scene(interior, groups)
-    outside = kept_scene(exterior, groups)
+    scenes = SceneCache() if scenes is None else scenes
+    inside = scenes.scene(interior, groups)
+    outside = scenes.scene(exterior, groups)
     sky, tile = SkyBins(ReinhartSky(subdivision)), tile_size(view) if tile is None else tile
     pixels = np.flatnonzero(pixel_directions(view)[1].reshape(-1))
     rays_at_once = max(256, RAYS // samples)

@@ -29,7 +29,7 @@ from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
 from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, shown_hits, tile_size
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 
 SAMPLES = 128  # of each tile, each with a ray to a point of the windows and one by the cosine
 PATHS = 2**22  # of a view at most, but one of each pixel
@@ -80,6 +80,7 @@ def beam_light(
     basis: KlemsBasis = KLEMS_FULL,
     tile: int | None = None,
     seed: int = 0,
+    scenes: SceneCache | None = None,
 ) -> BeamLight:
     """Trace a view's pixels to the windows and straight on; rows as of `view_matrices`.
 
@@ -89,7 +90,8 @@ def beam_light(
         subdivision: Reinhart's MF of the sky.
         tile: as of `view_matrices`.
     """
-    inside, outside = kept_scene(interior, groups), kept_scene(exterior, groups)
+    scenes = SceneCache() if scenes is None else scenes
+    inside, outside = scenes.scene(interior, groups), scenes.scene(exterior, groups)
     tile = tile_size(view) if tile is None else tile
     rows = PictureRows.of_view(inside, view, tile)
     samples = int(np.clip(PATHS // max(len(rows.pixels), 1), 1, -(-SAMPLES // tile**2)))

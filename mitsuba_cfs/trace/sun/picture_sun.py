@@ -19,7 +19,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, kept_scene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache
 from mitsuba_cfs.trace.sun.lit_points import on_disc_of, place_and_hour
 from mitsuba_cfs.trace.sun.pixels import (
     EDGE_PLACES,
@@ -59,20 +59,24 @@ class PictureSun:
         *,
         basis: KlemsBasis = KLEMS_FULL,
         way: SunWay | None = None,
+        scenes: SceneCache | None = None,
     ) -> None:
         """Find what each pixel shows; arguments as for `direct_sun_matrix`.
 
         Args: way: to the sun; by default the straight one, and then all mirrors outdoors besides.
         """
+        scenes = SceneCache() if scenes is None else scenes
         if len(scattering) != len(groups):
             raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
-        self._inside = kept_scene(interior, groups)
-        self._outside = kept_scene(exterior, groups, windows_block=False)
+        self._inside = scenes.scene(interior, groups)
+        self._outside = scenes.scene(exterior, groups, windows_block=False)
         self._way = SunWay(self._outside) if way is None else way
         self._free = self._way.free
         around = interior, exterior, groups, scattering, view
         mirrors = sun_ways(self._outside)[1:] if way is None else []
-        self._mirrors = [PictureSun(*around, basis=basis, way=mirror) for mirror in mirrors]
+        self._mirrors = [
+            PictureSun(*around, basis=basis, way=mirror, scenes=scenes) for mirror in mirrors
+        ]
         self._scattering, self._bins = tuple(scattering), DirectionBins(basis)
         self.view = view
         directions, counts = pixel_directions(view)
