@@ -25,7 +25,7 @@ from mitsuba_cfs.glare.evaluation import GlareOptions, GlareResult, evaluate
 from mitsuba_cfs.glare.glare_view import GlareView
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.matrices.cache import CacheEntry, kept_or_found
+from mitsuba_cfs.matrices.cache import CacheEntry, cached_or_computed
 from mitsuba_cfs.methods.few_pictures import pictures_by_state
 from mitsuba_cfs.methods.optics import hourly_states
 from mitsuba_cfs.methods.path_light import PathLight, PathSystems
@@ -87,7 +87,7 @@ def hourly_glare(
         columns = np.flatnonzero(kind.ravel() == i)
         entry = None if kept is None else kept(combination)
         if len(columns) == len(chosen):
-            table[:, columns] = kept_or_found(entry, partial(found, i, columns))
+            table[:, columns] = cached_or_computed(entry, partial(found, i, columns))
         else:
             known = None if entry is None else entry.load()
             table[:, columns] = found(i, columns) if known is None else known.mean[:, columns]

@@ -14,7 +14,7 @@ from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
 from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.pixel_view import picture_matrix_blocks
 from mitsuba_cfs.trace.sun.lit_points import Places
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
@@ -54,7 +54,7 @@ def test_a_strip_of_sun_at_a_walls_foot_lights_the_floor_beside_it_evenly() -> N
     """Tile by tile as a strip of infinite length does: (1 - cos of its height as an angle) / 2."""
     view = cfs.fisheye(tuple(EYE), (0.0, 0.05, -1.0), 100)
     interior = box.room()
-    tracer = kept_scene(interior, box.window_groups())
+    tracer = TracedScene(interior, box.window_groups())
     rows = PictureRows.of_view(tracer, view, tile_size(view))
     times = np.ones(len(rows.pixels), dtype=np.int64)
     elements, _ = sun_elements(tracer, interior, view, rows, times)
@@ -83,7 +83,7 @@ def test_a_window_low_above_a_wide_floor_sees_the_sun_on_it_in_half_of_its_view(
     interior = rooms.surfaces([(floor, 0.4)])
     pane = rooms.quad((-0.1, 0, 0.1), (0.1, 0, 0.1), (0.1, 0, 0.3), (-0.1, 0, 0.3))
     groups = [WindowGroup("low", (WindowSurface("low", pane),))]
-    found = window_elements(kept_scene(interior, groups), interior, samples=64)
+    found = window_elements(TracedScene(interior, groups), interior, samples=64)
     luminance = found.far_rows(np.ones((found.cells.size, 1), dtype=np.float32))[:, 0]
     # E = rho / pi * pi * the floor's half of the view
     lux = KLEMS_FULL.projected_solid_angles() @ luminance
@@ -96,7 +96,7 @@ def test_a_window_low_above_a_wide_floor_sees_the_sun_on_it_in_half_of_its_view(
 
 def test_rows_of_few_pixels_have_more_paths() -> None:
     view = cfs.fisheye((1.8, 1.0, 1.5), (0.0, -1.0, 0.0), 120)
-    tracer = kept_scene(box.room(), box.window_groups())
+    tracer = TracedScene(box.room(), box.window_groups())
     rows = PictureRows.of_view(tracer, view, tile_size(view))
     count = np.bincount(rows.row)[rows.row]
     alone, smoothed = rows.times(smoothed=False), rows.times(smoothed=True)
@@ -126,7 +126,7 @@ def test_sun_near_by_is_what_all_places_of_each_element_say(monkeypatch) -> None
     """Though only those elements are asked at all places that the edge of a spot crosses."""
     view = cfs.fisheye((1.8, 1.0, 1.5), (0.0, -1.0, 0.0), 60)
     interior, groups = box.room(), box.window_groups()
-    tracer = kept_scene(interior, groups)
+    tracer = TracedScene(interior, groups)
     rows = PictureRows.of_view(tracer, view, 4)
     times = np.ones(len(rows.pixels), dtype=np.int64)
     elements, _ = sun_elements(tracer, interior, view, rows, times)
