@@ -26,7 +26,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     empty_sums,
     opaque,
     path_generator,
-    pixel_places,
+    pixel_positions,
     sums_of,
     tables,
     vectors,
@@ -173,7 +173,7 @@ def _block(
     number, first = column(pixels, mi.UInt32), column(time * samples, mi.UInt32)
     lit, again = column(own + place, mi.UInt32), dr.opaque(mi.UInt32, b)
     path = column(pixels + time * view.width * view.height & 0xFFFFFFFF, mi.UInt32)
-    places = pixel_places((int(time.max(initial=0)) + 1) * samples)
+    places = pixel_positions((int(time.max(initial=0)) + 1) * samples)
     for j in range(samples):
         dx, dy = places[time * samples + j].T
         directions, exists = pixel_rays(view, pixels, dx, dy)

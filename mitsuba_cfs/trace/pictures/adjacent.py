@@ -40,8 +40,8 @@ from mitsuba_cfs.trace.pictures.outdoors import (
     through_windows,
     view_lanes,
 )
-from mitsuba_cfs.trace.sun.lit_points import Places, face_places
-from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, Lanes, mirrored
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points
+from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, PixelRays, mirrored
 
 BLOCK_BYTES = 128 * 2**20
 LEAST_PATHS = 64  # of a face in a tile: slivers have few rays
@@ -126,14 +126,14 @@ def _all_behind(behind: Sequence[RoomBehind]) -> list[tuple[int, RoomBehind]]:
     return found
 
 
-def _into_room(tracer: TracedScene, behind: RoomBehind, lanes: Lanes) -> Lanes:
+def _into_room(tracer: TracedScene, behind: RoomBehind, lanes: PixelRays) -> PixelRays:
     """Rays in a room that go straight on into one behind it, a step clear of its panes."""
     beams = np.zeros((len(tracer.groups), KLEMS_FULL.size))
     beams[behind.first : behind.first + behind.count] = behind.beam
     found = through_windows(tracer, _panes(beams), lanes)
     outwards = tracer.groups[behind.first].frame[2] * tracer.epsilon.numpy()
     origin = (found.origin + outwards[:, None]).astype(np.float32)
-    return Lanes(found.row, origin, found.way, found.weight)
+    return PixelRays(found.row, origin, found.way, found.weight)
 
 
 def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
@@ -161,9 +161,9 @@ class _MetInRoom:
         outside = scenes.scene(room.exterior, room.groups[: self._outdoors], centre=tracer.centre)
         self._beyond = SeenOutdoors(outside, sky, tiles)
         self._pixel, self._slot, self._share = [], [], []
-        self._shown: list[tuple[NDArray, NDArray, NDArray, Places]] = []
+        self._shown: list[tuple[NDArray, NDArray, NDArray, SurfacePoints]] = []
 
-    def add(self, lanes: Lanes, block: NDArray[np.int64], start: int) -> None:
+    def add(self, lanes: PixelRays, block: NDArray[np.int64], start: int) -> None:
         """Add what some of a block's rays find, those by gloss too; panes onward show nothing."""
         tracer = self.tracer
         self._beyond.add(through_windows(tracer, _panes(self.room.beam), lanes), block, start)
@@ -179,14 +179,19 @@ class _MetInRoom:
             patch = self.bins.index(tracer.to_local(group, way, window))
             cosine = dr.abs(dr.dot(dr.gather(mi.Vector3f, tracer.normal, hit.prim_index), way))
             rho = tracer.diffuse(hit.prim_index, cosine, found)
-            places, *of_hits = face_places(
+            places, *of_hits = hit_points(
                 tracer, origin, way, hit, found, found, window, group, patch, rho, hit.prim_index
             )
             self._sort(lanes, places, of_hits, block, start)
             lanes = mirrored(tracer, lanes, hit, bounce)
 
     def _sort(
-        self, lanes: Lanes, places: Places, of_hits: list[NDArray], block: NDArray, start: int
+        self,
+        lanes: PixelRays,
+        places: SurfacePoints,
+        of_hits: list[NDArray],
+        block: NDArray,
+        start: int,
     ) -> None:
         found, window, group, patch, rho, triangle = of_hits
         lit = np.flatnonzero(window & (group < self._outdoors))
@@ -205,7 +210,7 @@ class _MetInRoom:
         pixel, tile, share = (_joined([s[k] for s in self._shown]) for k in range(3))
         keys, tile = np.unique(tile.astype(np.int64), return_inverse=True)
         size = np.bincount(tile, minlength=len(keys))
-        places = Places.joined([s[3] for s in self._shown])
+        places = SurfacePoints.joined([s[3] for s in self._shown])
         light = self._irradiance(tile, places, size, max_depth, seed)
         luminance, beam, daylight = (
             np.asarray(part, dtype=np.float32)
@@ -225,7 +230,12 @@ class _MetInRoom:
         )
 
     def _irradiance(
-        self, tile: NDArray[np.int64], places: Places, size: NDArray, max_depth: int, seed: int
+        self,
+        tile: NDArray[np.int64],
+        places: SurfacePoints,
+        size: NDArray,
+        max_depth: int,
+        seed: int,
     ) -> NDArray[np.float32]:
         """Mean irradiance at the places of each tile per unit luminance of the windows [C, N]."""
         again = np.ceil(LEAST_PATHS / np.maximum(size, 1)).astype(np.int64)
@@ -246,7 +256,7 @@ class _MetInRoom:
 
     def _add_paths(
         self, matrix: mi.Float64, path: NDArray[np.int64], row: NDArray[np.int64],
-        places: Places, max_depth: int, seed: int,
+        places: SurfacePoints, max_depth: int, seed: int,
     ) -> None:  # fmt: skip
         key, rows = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF), column(row, mi.UInt32)
         first = path[np.unique(row, return_index=True)[1]]  # of each row, for its stream

@@ -35,11 +35,11 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
-from mitsuba_cfs.trace.sun.lit_points import Places, face_places
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points
 from mitsuba_cfs.trace.sun.outdoors import (
     MOST_MIRRORS,
-    Lanes,
     OutdoorSun,
+    PixelRays,
     RoughFaces,
     RoughSun,
     ShownFaces,
@@ -50,7 +50,9 @@ BLOCK_BYTES = 128 * 2**20
 PATCH_POINTS = 16  # directions in each window patch, for its mean transmittance
 MAX_DEPTH = 16
 RAYS = 2**20  # at once
-_Met = tuple[Lanes, NDArray[np.int64], NDArray[np.float32], Places]  # and triangle, reflectance
+_Met = tuple[
+    PixelRays, NDArray[np.int64], NDArray[np.float32], SurfacePoints
+]  # and triangle, reflectance
 
 
 @dataclass(frozen=True)
@@ -118,13 +120,13 @@ class SeenOutdoors:
         self._shown: list[ShownFaces] = []
         self._rough: list[RoughFaces] = []
 
-    def add(self, lanes: Lanes, block: NDArray[np.int64], start: int) -> None:
+    def add(self, lanes: PixelRays, block: NDArray[np.int64], start: int) -> None:
         """Add what rays of a block of pixels, the first of them number `start`, find."""
         rows = sparse.csr_array((len(block), self._sky.size), dtype=np.float32)
         for bounce in range(MOST_MIRRORS + 1):
             if not len(lanes.row):
                 break
-            seen, met, lanes = _looked_at(self._outside, self._sky, lanes, len(block), bounce)
+            seen, met, lanes = _sky_and_hits(self._outside, self._sky, lanes, len(block), bounce)
             rows = rows + seen
             self._shown.append(_with_faces(met, block, start, self._face, self._tiles))
             self._rough += _rough_faces(self._outside, met, start)
@@ -147,17 +149,23 @@ class SeenOutdoors:
         return RoughSun(self._outside, RoughFaces.joined(self._rough)) if self._rough else None
 
 
-def view_lanes(inside: TracedScene, view: View, pixels: NDArray[np.int64], samples: int) -> Lanes:
+def view_lanes(
+    inside: TracedScene, view: View, pixels: NDArray[np.int64], samples: int
+) -> PixelRays:
     """Rays of a block's pixels from the eye."""
     eye = np.asarray(view.position) - inside.centre
     row = np.repeat(np.arange(len(pixels)), samples)
     directions, exists = spread_rays(view, pixels, samples)
     start = np.tile(eye[:, None], len(row)).astype(np.float32)
     share = np.full(len(row), 1.0 / samples)
-    return Lanes(row, start, directions.T.astype(np.float32), share).some(np.flatnonzero(exists))
+    return PixelRays(row, start, directions.T.astype(np.float32), share).some(
+        np.flatnonzero(exists)
+    )
 
 
-def through_windows(inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes) -> Lanes:
+def through_windows(
+    inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays
+) -> PixelRays:
     """Those of a block's rays in a room that meet a window, and go straight on, at the window."""
     found = []
     for bounce in range(MOST_MIRRORS + 1):
@@ -165,12 +173,12 @@ def through_windows(inside: TracedScene, scattering: Sequence[Scattering], lanes
             break
         passed, lanes = _passed(inside, scattering, lanes, bounce)
         found.append(passed)
-    return Lanes.joined(found)
+    return PixelRays.joined(found)
 
 
 def _passed(
-    inside: TracedScene, scattering: Sequence[Scattering], lanes: Lanes, bounce: int
-) -> tuple[Lanes, Lanes]:
+    inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays, bounce: int
+) -> tuple[PixelRays, PixelRays]:
     """Rays that go straight on through windows, and those that go on by glossy surfaces."""
     origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=not bounce)
@@ -186,20 +194,20 @@ def _passed(
     tau = np.broadcast_to(tau, len(lanes.row)).astype(float)
     lit = np.flatnonzero(tau > 0)
     place = np.broadcast_to(place, (len(lanes.row), 3)).T[:, lit]
-    passed = Lanes(lanes.row[lit], place, lanes.way[:, lit], (lanes.weight * tau)[lit])
+    passed = PixelRays(lanes.row[lit], place, lanes.way[:, lit], (lanes.weight * tau)[lit])
     return passed, mirrored(inside, lanes, hit, bounce)
 
 
-def _looked_at(
-    outside: TracedScene, sky: SkyBins, lanes: Lanes, count: int, bounce: int
-) -> tuple[sparse.csr_array, _Met, Lanes]:
+def _sky_and_hits(
+    outside: TracedScene, sky: SkyBins, lanes: PixelRays, count: int, bounce: int
+) -> tuple[sparse.csr_array, _Met, PixelRays]:
     """Rows [count, P] of what is sky; what the other lanes met; lanes that go on by its gloss."""
     origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
     found = hit.is_valid()
     face = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, found)
     rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(face, way)), found)
-    places, met, rho, patch, prim = face_places(
+    places, met, rho, patch, prim = hit_points(
         outside, origin, way, hit, found, found, rho, sky.index(way), hit.prim_index
     )
     patch = patch.astype(np.int64)
@@ -236,7 +244,7 @@ def _joined(shown: Sequence[ShownFaces]) -> tuple[ShownFaces, NDArray[np.int64]]
     )
     value = np.concatenate([nothing, *(s.value for s in shown)])
     numbers, tile = np.unique(tile, return_inverse=True)
-    return ShownFaces(pixel, tile, value, Places.joined([s.places for s in shown])), numbers
+    return ShownFaces(pixel, tile, value, SurfacePoints.joined([s.places for s in shown])), numbers
 
 
 def _reflected(

@@ -31,7 +31,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     lattice,
     lattice_2d,
     path_generator,
-    pixel_places,
+    pixel_positions,
     tables,
     vectors,
 )
@@ -236,7 +236,7 @@ class _Kernel:
     ) -> None:
         self._room, self._sky, self._view, self._faces = room, sky, view, faces
         self._tiles = tiles
-        self._samples, self._places = samples, pixel_places(samples)
+        self._samples, self._places = samples, pixel_positions(samples)
         self._eye = eye_of(room, view)
         self._depth = dr.opaque(mi.UInt32, max_depth)
         self._key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)

@@ -26,7 +26,7 @@ from mitsuba_cfs.images.view import View
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, shown_hits, tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, pixel_hits, tile_size
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
@@ -202,7 +202,7 @@ class _Look:
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
         """What rays of pixels meet: place, normal, luminance by irradiance; if it is a window."""
         inside, samples = self._inside, self._samples
-        eye, way, hit, shown = shown_hits(inside, self._view, pixels, samples)
+        eye, way, hit, shown = pixel_hits(inside, self._view, pixels, samples)
         window = shown & (dr.gather(mi.Int32, inside.group, hit.prim_index, shown) != OPAQUE)
         position, normal, rho = inside.surface_at(hit, eye, way, shown)
         beta = dr.select(shown & ~window, rho * dr.inv_pi / samples, 0.0)

@@ -20,19 +20,19 @@ from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache
-from mitsuba_cfs.trace.sun.lit_points import on_disc_of, place_and_hour
+from mitsuba_cfs.trace.sun.lit_points import on_disc_of, points_and_suns
 from mitsuba_cfs.trace.sun.pixels import (
-    EDGE_PLACES,
+    EDGE_SAMPLES,
     before_eye,
     disc_parts,
     disc_rays,
     disc_reach,
     edge_pixels,
-    places_in_pixels,
+    pixel_samples,
 )
 from mitsuba_cfs.trace.sun.room_cells import Beam, RoomCells
 from mitsuba_cfs.trace.sun.room_sun import EDGE_POINTS, SunElements
-from mitsuba_cfs.trace.sun.specular_paths import SunWay, sun_ways
+from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, specular_sun_paths
 
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
 CELL_POINTS = 4096  # on all windows, that the sun is followed from to the cells of the room
@@ -58,7 +58,7 @@ class PictureSun:
         view: View,
         *,
         basis: KlemsBasis = KLEMS_FULL,
-        way: SunWay | None = None,
+        way: SpecularPath | None = None,
         scenes: SceneCache | None = None,
     ) -> None:
         """Find what each pixel shows; arguments as for `direct_sun_matrix`.
@@ -70,10 +70,10 @@ class PictureSun:
             raise ValueError(f"{len(scattering)} systems for {len(groups)} window groups")
         self._inside = scenes.scene(interior, groups)
         self._outside = scenes.scene(exterior, groups, windows_block=False)
-        self._way = SunWay(self._outside) if way is None else way
+        self._way = SpecularPath(self._outside) if way is None else way
         self._free = self._way.free
         around = interior, exterior, groups, scattering, view
-        mirrors = sun_ways(self._outside)[1:] if way is None else []
+        mirrors = specular_sun_paths(self._outside)[1:] if way is None else []
         self._mirrors = [
             PictureSun(*around, basis=basis, way=mirror, scenes=scenes) for mirror in mirrors
         ]
@@ -174,12 +174,12 @@ class PictureSun:
         step = max(1, LANES // places.size)
         for start in range(0, len(lit), step):
             hours = lit[start : start + step]
-            light = self._beam_at(*place_and_hour(places, suns[hours]))
+            light = self._beam_at(*points_and_suns(places, suns[hours]))
             light = light.reshape(places.size, len(hours))
-            self._look_at_edges(elements, light, suns[hours])
+            self._resample_pieces(elements, light, suns[hours])
             found[:, hours] += elements.near @ (light * illuminance[hours].astype(np.float32))
 
-    def _look_at_edges(self, elements: SunElements, near: NDArray, suns: NDArray) -> None:
+    def _resample_pieces(self, elements: SunElements, near: NDArray, suns: NDArray) -> None:
         """Put the mean over its points on each piece near rows that the edge of sun crosses."""
         element, hour = elements.edges.crossed(near)
         step = LANES // EDGE_POINTS
@@ -202,7 +202,7 @@ class PictureSun:
 
     def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:
         """Where the light of suns comes from, and its illuminance: 0 with the sun down."""
-        return self._way.turned(suns), np.where(suns[:, 2] > 0, illuminance, 0.0)
+        return self._way.apparent(suns), np.where(suns[:, 2] > 0, illuminance, 0.0)
 
     def _shining(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.int64]:
         """The hours in which the sun stands before a window."""
@@ -243,7 +243,7 @@ class PictureSun:
             found = kernel(lane - hour * width, hour, towards, light, *options)
             found = found.numpy().reshape(-1, len(columns))
             if edges:
-                self._look_again(found, suns[part], strength[part])
+                self._resample_edges(found, suns[part], strength[part])
             for row, hour_values in zip(lit[part], found, strict=True):
                 some = np.flatnonzero(hour_values)  # the sun falls on few pixels
                 values[row, columns[some]] += hour_values[some]
@@ -258,7 +258,7 @@ class PictureSun:
         value = rho * dr.inv_pi * cosine * tau * dr.gather(mi.Float, light, hour)
         return dr.select(tau > 0, value, 0.0)
 
-    def _look_again(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
+    def _resample_edges(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
         """Put the mean over its places into each pixel [h, m] that the edge of a shadow crosses.
 
         That is where the sun falls on its middle and not on a neighbour's, or the reverse.
@@ -266,7 +266,7 @@ class PictureSun:
         hour, pixel = edge_pixels(found > 0, self.pixels[self._surface], self.view)
         order = np.argsort(pixel, kind="stable")  # each is looked at once for all of its hours
         hour, pixel = hour[order], pixel[order]
-        step = LANES // EDGE_PLACES
+        step = LANES // EDGE_SAMPLES
         for start in range(0, len(hour), step):
             some, part = pixel[start : start + step], hour[start : start + step]
             found[part, some] = self._beam_in_pixels(some, suns[part]) * light[part]
@@ -278,24 +278,24 @@ class PictureSun:
         """
         shown, row = np.unique(pixel, return_inverse=True)
         place, normal, rho = self._places_in(self.pixels[self._surface[shown]])
-        lane = dr.arange(mi.UInt32, len(pixel) * EDGE_PLACES)
-        pair = lane // EDGE_PLACES
-        number = lane - pair * EDGE_PLACES
-        at = dr.gather(mi.UInt32, column(row, mi.UInt32), pair) * EDGE_PLACES + number
-        on_disc = dr.gather(mi.UInt32, column(pixel, mi.UInt32), pair) * EDGE_PLACES + number
+        lane = dr.arange(mi.UInt32, len(pixel) * EDGE_SAMPLES)
+        pair = lane // EDGE_SAMPLES
+        number = lane - pair * EDGE_SAMPLES
+        at = dr.gather(mi.UInt32, column(row, mi.UInt32), pair) * EDGE_SAMPLES + number
+        on_disc = dr.gather(mi.UInt32, column(pixel, mi.UInt32), pair) * EDGE_SAMPLES + number
         to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(suns), pair), on_disc)
         cosine = dr.dot(dr.gather(mi.Vector3f, normal, at), to_sun)
         rho = dr.gather(mi.Float, rho, at)
         tau = self._straight(dr.gather(mi.Point3f, place, at), to_sun, (rho > 0) & (cosine > 0))
         value = dr.select(tau > 0, rho * dr.inv_pi * cosine * tau, 0.0)
-        return (dr.block_sum(value, EDGE_PLACES) / EDGE_PLACES).numpy()
+        return (dr.block_sum(value, EDGE_SAMPLES) / EDGE_SAMPLES).numpy()
 
     def _places_in(self, pixels: NDArray[np.int64]) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
         """Surfaces that places spread over pixels [k] show, their normals and reflectances.
 
         The reflectance is 0 where they show none.
         """
-        tracer, direction = self._inside, vectors(places_in_pixels(self.view, pixels))
+        tracer, direction = self._inside, vectors(pixel_samples(self.view, pixels))
         ray = mi.Ray3f(self._eye, direction)
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=True)
         shown = hit.is_valid()
@@ -329,7 +329,7 @@ class PictureSun:
             tau = dr.select(active & (group == g), system.through(local), tau)
         if not self._free:
             active &= tau > 0
-            tau *= self._way.reaching(mi.Ray3f(window, to_sun), active, coherent=True)
+            tau *= self._way.transmittance(mi.Ray3f(window, to_sun), active, coherent=True)
         return tau
 
     def _scattered_in_panes(self, pixel, hour, suns, light, g: int) -> mi.Float:
@@ -340,7 +340,7 @@ class PictureSun:
         lit, share = local.z > 0, mi.Float(1)
         if not self._free:
             ray = mi.Ray3f(dr.gather(mi.Point3f, place, pixel), to_sun)
-            share = self._way.reaching(ray, lit, coherent=True)
+            share = self._way.transmittance(ray, lit, coherent=True)
         f = share * self._scattering[g].scattered(local, dr.gather(mi.Vector3f, towards, pixel))
         return dr.select(lit, f * local.z * dr.gather(mi.Float, light, hour), 0.0)
 
@@ -383,7 +383,7 @@ class PictureSun:
         )
         step = self._inside.exterior_normal(g) * self._inside.epsilon
         ray = mi.Ray3f(place + step, dr.gather(mi.Vector3f, suns, hour))
-        seen = self._way.reaching(ray, dr.full(mi.Bool, True, dr.width(lane)))
+        seen = self._way.transmittance(ray, dr.full(mi.Bool, True, dr.width(lane)))
         return seen.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
 
     def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:

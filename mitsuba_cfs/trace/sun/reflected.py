@@ -36,12 +36,12 @@ from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.straight_view import straight_rays
 from mitsuba_cfs.trace.sun.lit_points import (
-    Places,
-    face_places,
-    reflecting_places,
+    SurfacePoints,
+    hit_points,
+    reflecting_points,
     sunlight_of_many,
 )
-from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, Lanes, RoughFaces, mirrored
+from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, PixelRays, RoughFaces, mirrored
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
 PLACES = 1024  # that stand for all that paths meet, at most and where nothing is said
@@ -57,9 +57,9 @@ LANES = 2**22  # shadow rays at once
 
 @dataclass(frozen=True, slots=True)
 class SunShares:
-    """Places that reflect the sun, and what rows have of their irradiance."""
+    """Points that reflect the sun, and what rows have of their irradiance."""
 
-    places: Places  # [m]
+    places: SurfacePoints  # [m]
     share: sparse.csr_array  # [rows, m]
     rough: RoughFaces | None = None  # whose lobes the rows see
 
@@ -72,7 +72,7 @@ class SunShares:
 
         Args: most: places, at the most.
         """
-        places = Places.joined([m.places for m in met])
+        places = SurfacePoints.joined([m.places for m in met])
         row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
         weight = np.concatenate([np.empty(0), *(m.weight for m in met)])
         rough = None
@@ -89,11 +89,11 @@ class SunShares:
 
 @dataclass(frozen=True, slots=True)
 class _Met:
-    """Places that paths met, the row that each gives light to, and how much of its irradiance."""
+    """Points that paths met, the row that each gives light to, and how much of its irradiance."""
 
     row: NDArray[np.int64]
     weight: NDArray[np.float64]
-    places: Places
+    places: SurfacePoints
     rough: list[RoughFaces]
 
 
@@ -185,7 +185,7 @@ def _met(
     """
     start, along, share, of = tables(origin, way, weight, row)
     some = np.flatnonzero(share > 0)
-    lanes = Lanes(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
+    lanes = PixelRays(of.astype(np.int64), start.T, along.T, share.astype(float)).some(some)
     rows, values, places, rough = [], [], [], []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):
@@ -197,7 +197,7 @@ def _met(
         normal = dr.gather(mi.Vector3f, outside.normal, hit.prim_index, met)
         rho = outside.diffuse(hit.prim_index, dr.abs(dr.dot(normal, direction)), met)
         others = met, rho, hit.prim_index, last
-        there, met, rho, prim, begun = face_places(outside, last, direction, hit, met, *others)
+        there, met, rho, prim, begun = hit_points(outside, last, direction, hit, met, *others)
         lanes = replace(lanes, origin=begun.T)
         value = lanes.weight * rho / np.pi
         kept = np.flatnonzero(met & (value > 0))
@@ -208,21 +208,25 @@ def _met(
             rough.append(_rough(outside, lanes, there, np.where(met, prim, 0), met))
         lanes = mirrored(outside, lanes, hit, bounce)
     if not rows:
-        return _Met(np.empty(0, dtype=np.int64), np.empty(0), Places.joined([]), [])
-    row_of, value, first = np.concatenate(rows), np.concatenate(values), Places.joined(places)
-    later = reflecting_places(outside, first, seed, BOUNCES, mirrored=True)
+        return _Met(np.empty(0, dtype=np.int64), np.empty(0), SurfacePoints.joined([]), [])
+    row_of, value, first = (
+        np.concatenate(rows),
+        np.concatenate(values),
+        SurfacePoints.joined(places),
+    )
+    later = reflecting_points(outside, first, seed, BOUNCES, mirrored=True)
     return _Met(
         np.concatenate([row_of, row_of[later.path]]),
         np.concatenate([value, value[later.path] * later.weight]),
-        Places.joined([first, later.places]),
+        SurfacePoints.joined([first, later.places]),
         rough,
     )
 
 
 def _rough(
     outside: TracedScene,
-    lanes: Lanes,
-    places: Places,
+    lanes: PixelRays,
+    places: SurfacePoints,
     triangle: NDArray[np.uint32],
     met: NDArray[np.bool_],
 ) -> RoughFaces:
@@ -246,7 +250,7 @@ def _few(rough: RoughFaces) -> RoughFaces:
 
 
 def _runs(
-    places: Places, weight: NDArray[np.float64], most: int, random: np.random.Generator
+    places: SurfacePoints, weight: NDArray[np.float64], most: int, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The run of near places, even in weight, that each is of; the one that stands for each run.
 
