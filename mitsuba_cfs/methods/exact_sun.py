@@ -12,7 +12,6 @@ from mitsuba_cfs.methods.phase_scene import PhaseScene
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.kernels.scene import kept_scene
 from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 from mitsuba_cfs.trace.sun.specular_paths import shining
 
@@ -47,7 +46,7 @@ def exact_sun(
                 window_points=max(chosen.sun_points // SUN_BATCHES, 1),
                 stopping=Stopping(batches=SUN_BATCHES), seed=chosen.seed, by_group=True,
                 progress=part(progress, j / count, (j + 1) / count, "daylight"),
-                cache=traced.cache,
+                cache=traced.cache, scenes=traced.scenes,
             )
         )  # fmt: skip
     return found
@@ -58,6 +57,6 @@ def shining_hours(traced: PhaseScene, sky: AnnualSky) -> NDArray[np.int64]:
     scene, lit = traced.scene, sky.illuminance > 0
     facing = np.stack([g.frame[2] for g in scene.groups])
     if scene.exterior.glossy:
-        outside = kept_scene(scene.exterior, scene.groups)
+        outside = traced.scenes.scene(scene.exterior, scene.groups)
         return np.flatnonzero(shining(outside, facing, sky.direction) & lit)
     return np.flatnonzero(np.any(sky.direction @ facing.T > 0, axis=1) & lit)

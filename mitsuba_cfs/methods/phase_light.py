@@ -80,9 +80,9 @@ class PhaseSystems:
             scattering = [o.scattering for o in self.optics(state)]
             parts = self.traced.parts.groups
             around = scene.interior, scene.exterior, parts, scattering, scene.view
-            self._seen[state] = PictureSun(*around), outdoors(
+            self._seen[state] = PictureSun(*around, scenes=self.traced.scenes), outdoors(
                 *around, subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
-                seed=chosen.seed,
+                seed=chosen.seed, scenes=self.traced.scenes,
             )  # fmt: skip
         return self._seen[state]
 
@@ -104,6 +104,7 @@ class PhaseSystems:
                 self._beams[state] = beam_light(
                     scene.interior, scene.exterior, parts.groups, ways, np.stack(beams),
                     scene.view, subdivision=chosen.subdivision, seed=chosen.seed,
+                    scenes=self.traced.scenes,
                 )  # fmt: skip
         return self._beams[state]
 

@@ -25,7 +25,7 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.kernels.scene import kept_scene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.adjacent import (
     LendingRoom,
     RoomBehind,
@@ -66,6 +66,7 @@ class PhaseScene:
         *,
         five_phase: bool = True,
         cache: MatrixCache | None = None,
+        scenes: SceneCache | None = None,
         progress: Progress = silent,
     ) -> None:
         """Of a scene; nothing is traced yet.
@@ -74,6 +75,7 @@ class PhaseScene:
         """
         self.scene, self.sampling = scene, sampling or Sampling()
         self.five_phase, self.cache, self.progress = five_phase, cache, progress
+        self.scenes = SceneCache() if scenes is None else scenes
 
     def seen_from(self, view: View, progress: Progress | None = None) -> PhaseScene:
         """The same room seen from another eye: what is outdoors is not traced again."""
@@ -82,6 +84,7 @@ class PhaseScene:
             self.sampling,
             five_phase=self.five_phase,
             cache=self.cache,
+            scenes=self.scenes,
             progress=self.progress if progress is None else progress,
         )
         outdoors = (
@@ -98,7 +101,7 @@ class PhaseScene:
         So that what is indoors is found in the cache.
         """
         other = PhaseScene(
-            scene, self.sampling, five_phase=self.five_phase, cache=self.cache,
+            scene, self.sampling, five_phase=self.five_phase, cache=self.cache, scenes=self.scenes,
             progress=self.progress,
         )  # fmt: skip
         other.__dict__["parts"] = self.parts
@@ -139,6 +142,7 @@ class PhaseScene:
             max_depth=OUTDOOR_DEPTH,
             seed=chosen.seed,
             cache=self.cache,
+            scenes=self.scenes,
         )
         lights = map(CellLight, groups, cells, found)
         most, limit = chosen.window_parts or None, allowed(chosen.patch_samples)
@@ -187,6 +191,7 @@ class PhaseScene:
             stopping=Stopping(batches=2),
             seed=self.sampling.seed,
             cache=self.cache,
+            scenes=self.scenes,
         )
 
     @cached_property
@@ -194,7 +199,7 @@ class PhaseScene:
         """What the windows [Q * K] see of the sun's beam on surfaces of the room."""
         interior, parts = self.scene.interior, self.parts.groups
         return window_elements(
-            kept_scene(interior, parts),
+            self.scenes.scene(interior, parts),
             interior,
             samples=self._exchange_samples(parts, EXCHANGE_SHARE),
             seed=self.sampling.seed,
@@ -212,6 +217,7 @@ class PhaseScene:
             stopping=Stopping(batches=2),
             seed=self.sampling.seed,
             cache=self.cache,
+            scenes=self.scenes,
         )
 
     def _exchange_samples(self, parts: Sequence[WindowGroup], share: int) -> int:
@@ -254,7 +260,13 @@ class PhaseScene:
         rooms: dict[int, LendingRoom] = {}
         for beyond in self.scene.beyond:
             if id(beyond.scene) not in rooms:
-                room = PhaseScene(beyond.scene, self.sampling, five_phase=False, cache=self.cache)
+                room = PhaseScene(
+                    beyond.scene,
+                    self.sampling,
+                    five_phase=False,
+                    cache=self.cache,
+                    scenes=self.scenes,
+                )
                 rooms[id(beyond.scene)] = room.lit(beyond.transmission)
         return [rooms[id(beyond.scene)] for beyond in self.scene.beyond]
 
@@ -290,7 +302,7 @@ class PhaseScene:
         return borrowed_picture(
             scene.interior, self.parts.groups, self._behind(), scene.view,
             subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
-            max_depth=INDOOR_DEPTH, seed=chosen.seed,
+            max_depth=INDOOR_DEPTH, seed=chosen.seed, scenes=self.scenes,
         )  # fmt: skip
 
     def looked_through(self, pictures: Pictures, sky: NDArray[np.floating]) -> Pictures:
@@ -309,7 +321,7 @@ class PhaseScene:
             (self.scene.interior, self.scene.groups), g, self.scene.beyond[i].beam,
             self.beyond[i], self.scene.sensors(),
             samples=samples, max_depth=INDOOR_DEPTH, stopping=stopping,
-            seed=self.sampling.seed, cache=self.cache,
+            seed=self.sampling.seed, cache=self.cache, scenes=self.scenes,
         )  # fmt: skip
 
     def _with_no_inner(self, exterior: Surfaces) -> NDArray[np.float64]:
@@ -335,7 +347,7 @@ class PhaseScene:
                     room.surfaces, room.groups, room.luminance, inner,
                     samples=max(chosen.patch_samples // INNER_SHARE // BATCHES, 1),
                     max_depth=INDOOR_DEPTH, stopping=Stopping(batches=BATCHES), seed=chosen.seed,
-                    cache=self.cache,
+                    cache=self.cache, scenes=self.scenes,
                 )
             )  # fmt: skip
         return found
@@ -359,6 +371,7 @@ class PhaseScene:
             seed=chosen.seed,
             progress=part(self.progress, start, end, "daylight"),
             cache=self.cache,
+            scenes=self.scenes,
         )
 
     def _sensors(self, depth: int, start: float, end: float) -> Estimate:
@@ -373,6 +386,7 @@ class PhaseScene:
             seed=chosen.seed,
             progress=part(self.progress, start, end, "daylight"),
             cache=self.cache,
+            scenes=self.scenes,
         )
 
     def _view_inputs(self, depth: int) -> tuple:
@@ -393,6 +407,7 @@ class PhaseScene:
             samples=chosen.view_samples,
             seed=chosen.seed,
             memory=chosen.memory,
+            scenes=self.scenes,
             max_depth=depth,
             progress=part(self.progress, 0.0, 1.0, "view matrices"),
         )

@@ -28,7 +28,7 @@ from mitsuba_cfs.methods.straight_views import StraightViews
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.kernels.scene import TracedScene, kept_scene
+from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import (
     SunShares,
     outdoor_light,
@@ -75,13 +75,13 @@ class ReflectedSun:
     @cached_property
     def inside(self) -> TracedScene:
         """The room."""
-        return kept_scene(self.traced.scene.interior, self.traced.scene.groups)
+        return self.traced.scenes.scene(self.traced.scene.interior, self.traced.scene.groups)
 
     @cached_property
     def outside(self) -> TracedScene:
         """What stands before the parts of the window groups, in the room's coordinates."""
         parts, centre = self.traced.parts.groups, self.inside.centre
-        return kept_scene(self.traced.scene.exterior, parts, centre=centre)
+        return self.traced.scenes.scene(self.traced.scene.exterior, parts, centre=centre)
 
     @cached_property
     def cells(self) -> tuple[RoomCells, ReflectingCells]:

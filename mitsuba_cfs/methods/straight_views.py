@@ -84,6 +84,7 @@ class StraightViews:
                 samples=max(chosen.sensor_samples // SHARE // BATCHES, 1),
                 max_depth=1 if direct else OUTDOOR_DEPTH,
                 stopping=Stopping(batches=BATCHES), seed=chosen.seed, cache=traced.cache,
+                scenes=traced.scenes,
             )  # fmt: skip
             self._found[g, j, direct] = found.part(np.s_[g])
         return self._found[g, j, direct]
