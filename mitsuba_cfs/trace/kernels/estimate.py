@@ -72,7 +72,7 @@ class Stopping:
 
 
 def joined(estimates: Sequence[Estimate]) -> Estimate:
-    """Estimates of rows one after the other as one."""
+    """One estimate from several, stacked along the first axis."""
     first = estimates[0]
     if len(estimates) == 1:
         return first
@@ -135,7 +135,7 @@ def accumulate(
 def cache_entry(
     cache: MatrixCache | None, label: str, *inputs: object, by: str, stopping: Stopping | None
 ) -> CacheEntry | None:
-    """The place of a traced matrix in the cache, if there is one.
+    """The cache entry of a traced matrix; None without a cache.
 
     The variant is an input too: CUDA and LLVM round differently.
 
@@ -147,7 +147,7 @@ def cache_entry(
 
 
 class _Keeper:
-    """Saves states, not so often that saving costs more than a small share of the time."""
+    """Saves states, seldom enough that saving takes a small share of the time."""
 
     def __init__(self, entry: CacheEntry | None, count: int) -> None:
         self._entry = entry
@@ -194,7 +194,7 @@ def _estimate(state: BatchMean) -> Estimate:
 
 
 def _fraction_done(state: BatchMean, stopping: Stopping) -> float:
-    """How near the batches are to the first of the stopping conditions, 1 when it holds."""
+    """Progress towards the first stopping condition, 1 when it holds."""
     if stopping.time_limit is None and stopping.target_error is None:
         return state.count / stopping.batches
     if state.count < LEAST_BATCHES:

@@ -1,4 +1,4 @@
-"""Triangles, reflectances and windows as one Mitsuba mesh with tables that kernels gather from."""
+"""Surfaces and windows as one Mitsuba mesh, with tables that kernels gather from."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ SCENES = 8  # kept: what one room is traced by, indoors and outdoors
 MESHES = 4  # kept: surroundings of a room, by season, and of its neighbours
 OPAQUE = -1  # window index of a triangle that is not glazed
 SERIES_GAP = 1.0  # widest between a screen and its panes [m]
-SERIES_PLACES = 256  # on each window group, from which they are looked for
+SERIES_PLACES = 256  # test points on each window group
 
 
 class TracedScene:
     """A Mitsuba scene of opaque triangles and window apertures, in coordinates about its centre.
 
-    To a view path windows are black: what arrives there is counted and the path ends.  One mesh
-    holds all: the triangle number of a hit gathers the normal, the reflectance and the window.
+    View paths end at windows, which are black to them.  One mesh holds all triangles: the triangle
+    number of a hit selects the normal, the reflectance and the window group.
 
-    No number of a scene may stand in a kernel as a literal (`opaque`): each room would compile
-    all kernels for itself.
+    No number of a scene is a literal in a kernel (`opaque`), or each room would compile all kernels
+    again.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class TracedScene:
         ]
 
     def sample_window(self, u: mi.Point2f, active: mi.Bool) -> tuple[mi.Point3f, mi.Int32]:
-        """A point uniform over the area of all windows, and the group it lies in."""
+        """A point uniform over the area of all windows, and its group."""
         triangle, reused = self._glazed.sample_reuse(u.x, active)
         return self._point(triangle, mi.Point2f(reused, u.y), active), dr.gather(
             mi.Int32, self._glazed_group, triangle, active
@@ -175,7 +175,7 @@ class TracedScene:
         direction: mi.Vector3f,
         active: mi.Bool,
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-        """Where a ray meets a surface, a step clear of it; the normal it sees; the reflectance.
+        """Point of a hit, offset off the surface; normal towards the ray; diffuse reflectance.
 
         The reflectance is the diffuse one, where there is a gloss that for the ray's angle.
         """
@@ -192,7 +192,7 @@ class TracedScene:
         return rho * self.gloss.diffuse_share(triangle, cosine, active)
 
     def whole(self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool) -> mi.Float:
-        """Reflectance of a triangle for a ray along a direction, diffuse and by its gloss."""
+        """Total reflectance of a triangle for a ray along a direction, diffuse and specular."""
         if self.gloss is None:
             return dr.gather(mi.Float, self.reflectance, triangle, active)
         normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
@@ -203,7 +203,7 @@ class TracedScene:
     def without_mirrors(
         self, triangle: mi.UInt32, direction: mi.Vector3f, active: mi.Bool
     ) -> mi.Float:
-        """The same without what a smooth mirror reflects."""
+        """The same without the specular part of smooth mirrors."""
         if self.gloss is None:
             return self.whole(triangle, direction, active)
         normal = dr.gather(mi.Vector3f, self.normal, triangle, active)
@@ -220,7 +220,7 @@ class TracedScene:
         generator: mi.PCG32,
         active: mi.Bool,
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.Bool]:
-        """Where a ray meets a surface, where it goes on to, its weight, if by a mirror."""
+        """Point of a hit, direction after it, weight, and whether the reflection is specular."""
         position, face, weight = self.surface_at(hit, origin, direction, active)
         away, mirrored = diffuse_direction(face, generator), mi.Bool(False)
         if self.gloss is not None:
@@ -234,7 +234,7 @@ class TracedScene:
     def leaves(
         self, hit: mi.PreliminaryIntersection3f, direction: mi.Vector3f, active: mi.Bool
     ) -> mi.Bool:
-        """Which active rays meet a window from the room's side."""
+        """Which active rays meet a window from its room side."""
         active = active & hit.is_valid()
         outwards = dr.gather(mi.Vector3f, self.normal, hit.prim_index, active)
         window = dr.gather(mi.Int32, self.group, hit.prim_index, active) != OPAQUE
@@ -242,7 +242,7 @@ class TracedScene:
 
     @cached_property
     def panes_in_series(self) -> bool:
-        """Whether panes stand close before windows (a screen behind them): both are one way out."""
+        """Whether other panes, such as a screen, are close in front of windows."""
         if not self._panes:
             return False
         number = dr.arange(mi.UInt32, SERIES_PLACES)
@@ -258,9 +258,9 @@ class TracedScene:
     def met_outdoors(
         self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool
     ) -> tuple[mi.PreliminaryIntersection3f, mi.Point3f]:
-        """What rays on their way out meet beyond the panes that they pass; whence they last went.
+        """First hits of outgoing rays beyond the panes that they pass, and the last origins.
 
-        The panes are those met from the room's side: that the ray starts on, others before it.
+        They pass panes met from the room side: the one that they start on, and others outside it.
         """
         origin = mi.Point3f(origin)
         hit = self._met(origin, direction, active)
@@ -273,7 +273,7 @@ class TracedScene:
         return hit, origin
 
     def hides(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Bool:
-        """Whether anything stands in the way out of rays; panes as of `met_outdoors`."""
+        """Whether anything outdoors hides rays; they pass panes as in `met_outdoors`."""
         if self._panes:
             return self.met_outdoors(ray.o, ray.d, active)[0].is_valid()
         return self.scene.ray_test(ray, coherent=coherent, active=active)
@@ -303,7 +303,7 @@ class TracedScene:
         return mi.Point3f(opaque_vector(np.asarray(point, dtype=float) - self.centre))
 
     def outward(self, group: mi.Int32, active: mi.Bool) -> mi.Vector3f:
-        """A step off a window towards outdoors that keeps a ray clear of its pane."""
+        """Offset off a window towards outdoors that keeps a ray clear of its pane."""
         return dr.gather(mi.Vector3f, self._frame_rows[2], group, active) * self.epsilon
 
     def to_world_any(self, group: mi.Int32, v: mi.Vector3f) -> mi.Vector3f:
@@ -391,6 +391,6 @@ def _greatest(coordinates: NDArray[np.float64]) -> float:
 
 
 def _speck(centre: NDArray[np.float64]) -> Surfaces:
-    """A black triangle of a square millimetre far below: tables and scenes must not be empty."""
+    """A black triangle of a square millimetre far below, for scenes without any surface."""
     corners = 1e-3 * np.eye(3) + centre - [0, 0, 1e3]
     return Surfaces(corners[None], np.zeros(1), np.zeros(1, dtype=np.int64))

@@ -1,4 +1,4 @@
-"""Where the light that enters through a window patch is absorbed in the room."""
+"""Absorption matrices: where light that enters through a window patch is absorbed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _absorption_kernel(
     matrix: mi.Float64,  # [K * (F + G)], accumulated in place
     starts: PathStarts,  # on the window, into the room; rows are its patches
 ) -> None:
-    """Random walk of a unit of flux: each surface and window takes what it does not reflect."""
+    """Random walk of a unit of flux; each surface and window absorbs what it does not reflect."""
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     F = opaque(tracer.surface_count, mi.UInt32)
@@ -81,7 +81,7 @@ def absorption_matrix(
         surfaces: the room in the solar band; `surfaces.surface` names the F surfaces.
         window_reflectance: [G] diffuse solar reflectance of the windows from the room, 0 if none.
         samples: paths for each window patch in each batch.
-        cache: where the matrix is kept and found again, `MatrixCache.of_user()`; none by default.
+        cache: of traced matrices, `MatrixCache.of_user()`; none by default.
     """
     scenes = SceneCache() if scenes is None else scenes
     reflectance = np.zeros(len(groups)) if window_reflectance is None else window_reflectance

@@ -1,4 +1,4 @@
-"""Daylight matrices of cells of a window, with few paths that all cells have in common."""
+"""Daylight matrices of the cells of a window, from few paths that all cells share."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def cell_daylight(
 def _places(
     groups: Sequence[WindowGroup], cells: Sequence[Cells], centre: NDArray[np.float64]
 ) -> Iterator[NDArray[np.float64]]:
-    """Of all cells: frames [C, 3, 3], corners from the centre, and both sides [C, 3]."""
+    """Frames [C, 3, 3], corners from the centre and both sides [C, 3] of all cells."""
     pairs = list(zip(groups, cells, strict=True))
     for values in (
         [np.tile(g.frame, (len(c.area), 1, 1)) for g, c in pairs],

@@ -1,4 +1,4 @@
-"""What of a sensor's view leaves a room through no window: holes of the model."""
+"""Leaks of a room's model: the share of a sensor's view that leaves it through no window."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ BATCHES = 4
 
 @dataclass(frozen=True, slots=True)
 class Escape:
-    """Shares of the sensors' view, direct and reflected, that end nowhere."""
+    """Shares of the sensors' view, direct and reflected, that leave the room through leaks."""
 
     share: NDArray[np.float64]  # [S] of what a sensor sees
     error: NDArray[np.float64]  # [S] standard error
@@ -55,7 +55,7 @@ def escaped_view(
     cache: MatrixCache | None = None,
     scenes: SceneCache | None = None,
 ) -> Escape:
-    """The share of each sensor's view that meets neither a surface nor a window, and where.
+    """Share of each sensor's view that meets neither a surface nor a window, and its points.
 
         share[s] = 1/pi integral over the directions that leave, + rho times that of the hits
 
@@ -111,7 +111,7 @@ def escaped_view(
 
 
 def _escape(found: Estimate, centre: NDArray[np.float64]) -> Escape:
-    """Shares and places from the sums [S, 6, 4]."""
+    """Shares and points from the sums [S, 6, 4]."""
     by_side = found.values[..., 0]
     total = found.values.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -128,7 +128,7 @@ def _add_escapes(
     sums: mi.Float64,  # [rows * 6 * 4], accumulated in place
     starts: PathStarts,
 ) -> None:
-    """Follow each path until it meets a window or nothing, is absorbed or too long."""
+    """Follow each path until it meets a window or nothing, is absorbed or too deep."""
     row, position, direction = starts.row, starts.position, starts.direction
     generator, max_depth, active = starts.generator, starts.max_depth, starts.active
     beta = mi.Float(1.0)  # product of reflectances

@@ -1,4 +1,4 @@
-"""What windows see of what they light themselves, either side: for the light that they reflect."""
+"""Exchange matrices between windows, by the room or the outdoors, for windows that reflect."""
 
 from __future__ import annotations
 
@@ -108,6 +108,6 @@ def outdoor_exchange(
 
 
 def _turned(group: WindowGroup) -> WindowGroup:
-    """The same windows looked at from the room: their exterior is on that side."""
+    """The same windows facing the other way: their exterior side is the room."""
     turned = (replace(w, triangles=w.triangles[:, ::-1]) for w in group.windows)
     return replace(group, windows=tuple(turned))

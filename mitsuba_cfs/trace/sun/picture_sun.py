@@ -1,4 +1,4 @@
-"""The sun in the pixels of a view: its disc, its beam on surfaces, its light in the windows."""
+"""The sun in the pixels of a view: disc, beam on surfaces, scattered light in windows."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, specular_sun_path
 LANES = 1 << 23  # pairs of pixel and sun traced at a time
 CELL_POINTS = 4096  # on all windows, that the sun is followed from to the cells of the room
 LEAST_POINTS = 256  # on each window group
-WINDOW_POINTS = 64  # on each group, for the share of it that the sun reaches
+WINDOW_POINTS = 64  # on each group, for its sunlit share
 PATCH_POINTS = 16  # directions in each window patch, for its mean of scattered sun
 
 
 class PictureSun:
-    """What a view shows of the sun, without any reflection but the pixel's own.
+    """The sun in the pixels of a view, without reflections before the one that the pixel shows.
 
-    Every pixel is looked at through its middle, and the sun's beam falls on it or not; only pixels
-    at the edge of a shadow are looked at in several places.  The sun's disc itself is cut into
-    small pieces, so that it has its solid angle whatever the pixels' size.
+    One ray through the centre of each pixel decides whether the beam falls on it; pixels at the
+    edge of a shadow get several rays.  Small pieces of the sun's disc give it its solid angle
+    whatever the size of the pixels.
     """
 
     def __init__(
@@ -61,9 +61,9 @@ class PictureSun:
         way: SpecularPath | None = None,
         scenes: SceneCache | None = None,
     ) -> None:
-        """Find what each pixel shows; arguments as for `direct_sun_matrix`.
+        """Trace the first hit of each pixel; arguments as for `direct_sun_matrix`.
 
-        Args: way: to the sun; by default the straight one, and then all mirrors outdoors besides.
+        Args: way: specular path to the sun; by default the direct one and all mirrors outdoors.
         """
         scenes = SceneCache() if scenes is None else scenes
         if len(scattering) != len(groups):
@@ -89,7 +89,7 @@ class PictureSun:
         self._look()
 
     def _look(self) -> None:
-        """Trace every pixel's middle: its window group, place, normal and reflectance."""
+        """Trace the centre of every pixel: its window group, point, normal and reflectance."""
         tracer = self._inside
         direction = vectors(self._directions)
         hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(self._eye, direction), coherent=True)
@@ -120,7 +120,7 @@ class PictureSun:
     def add_to(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
         """Add the sun's light on surfaces and windows [cd/m2] to the pixels' values [h, n].
 
-        Its disc is apart: `add_disc`, `discs`.
+        Without its disc: see `add_disc` and `discs`.
 
         Args: suns: [h, 3] directions to the disc; illuminance: [h] normal to it [lx].
         """
@@ -143,7 +143,7 @@ class PictureSun:
     def on_elements(
         self, elements: SunElements, suns: NDArray, illuminance: NDArray
     ) -> NDArray[np.float32]:
-        """Luminance [m, h] of a picture's rows by the sun that parts of the room reflect."""
+        """Luminance [m, h] of a picture's rows by the sun that the surfaces of the room reflect."""
         shining = np.flatnonzero((suns[:, 2] > 0) & (illuminance > 0))
         found = np.zeros((elements.share.shape[0], len(suns)), dtype=np.float32)
         irradiance = self._on_cells(elements.cells, suns[shining], illuminance[shining])
@@ -180,7 +180,7 @@ class PictureSun:
             found[:, hours] += elements.near @ (light * illuminance[hours].astype(np.float32))
 
     def _resample_pieces(self, elements: SunElements, near: NDArray, suns: NDArray) -> None:
-        """Put the mean over its points on each piece near rows that the edge of sun crosses."""
+        """Set the mean over several points of each piece that the edge of a spot of sun crosses."""
         element, hour = elements.edges.crossed(near)
         step = LANES // EDGE_POINTS
         for start in range(0, len(hour), step):
@@ -195,17 +195,17 @@ class PictureSun:
     def _beam_at(
         self, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f
     ) -> NDArray[np.float32]:
-        """Irradiance of places through the windows, per unit normal to the sun [n]."""
+        """Irradiance of points through the windows, per unit normal to the sun [n]."""
         cosine = dr.dot(normal, to_sun)
         tau = self._straight(point, to_sun, cosine > 0)
         return dr.select(tau > 0, tau * cosine, 0.0).numpy()
 
     def _turned(self, suns: NDArray, illuminance: NDArray) -> tuple[NDArray, NDArray]:
-        """Where the light of suns comes from, and its illuminance: 0 with the sun down."""
+        """Apparent directions of suns, and their illuminance: 0 with the sun down."""
         return self._way.apparent(suns), np.where(suns[:, 2] > 0, illuminance, 0.0)
 
     def _shining(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.int64]:
-        """The hours in which the sun stands before a window."""
+        """Hours with the sun in front of a window."""
         facing = np.any([suns @ g.frame[2] > 0 for g in self._inside.groups], axis=0)
         return np.flatnonzero(facing & (illuminance > 0))
 
@@ -226,9 +226,9 @@ class PictureSun:
         return found
 
     def _add(self, values, lit, columns, suns, strength, kernel, *options, edges=False) -> None:
-        """Add what a kernel gives for pairs of hours and pixels, some hours at a time.
+        """Add the values of a kernel for pairs of hours and pixels, some hours at a time.
 
-        Args: edges: whether what it gives ends within pixels, which are then looked at again.
+        Args: edges: whether to sample pixels again that a shadow's edge crosses.
         """
         if not len(columns):
             return
@@ -259,9 +259,9 @@ class PictureSun:
         return dr.select(tau > 0, value, 0.0)
 
     def _resample_edges(self, found: NDArray, suns: NDArray, light: NDArray) -> None:
-        """Put the mean over its places into each pixel [h, m] that the edge of a shadow crosses.
+        """Set the mean over several rays in each pixel [h, m] that the edge of a shadow crosses.
 
-        That is where the sun falls on its middle and not on a neighbour's, or the reverse.
+        There the sun falls on the pixel's centre and not on a neighbour's, or the reverse.
         """
         hour, pixel = edge_pixels(found > 0, self.pixels[self._surface], self.view)
         order = np.argsort(pixel, kind="stable")  # each is looked at once for all of its hours
@@ -291,9 +291,9 @@ class PictureSun:
         return (dr.block_sum(value, EDGE_SAMPLES) / EDGE_SAMPLES).numpy()
 
     def _places_in(self, pixels: NDArray[np.int64]) -> tuple[mi.Point3f, mi.Vector3f, mi.Float]:
-        """Surfaces that places spread over pixels [k] show, their normals and reflectances.
+        """Points, normals and reflectances of surfaces in rays spread over pixels [k].
 
-        The reflectance is 0 where they show none.
+        The reflectance is 0 where a ray shows no surface.
         """
         tracer, direction = self._inside, vectors(pixel_samples(self.view, pixels))
         ray = mi.Ray3f(self._eye, direction)
@@ -307,21 +307,21 @@ class PictureSun:
 
     @dr.syntax
     def _straight(self, place: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool) -> mi.Float:
-        """Transmittance of the straight way from places in the room to the sun; 0 if hidden."""
+        """Transmittance from points in the room straight to the sun; 0 if hidden."""
         ray = mi.Ray3f(place, to_sun)
         hit = self._inside.scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         active = active & hit.is_valid()
         group = dr.gather(mi.Int32, self._inside.group, hit.prim_index, active)
         active &= group != OPAQUE
         tau = dr.zeros(mi.Float, dr.width(active))
-        if active:  # few rays meet a window: the others skip its BSDF and the way outdoors
+        if active:  # few rays meet a window: the others skip its BSDF and the ray outdoors
             tau = self._passed(group, mi.Point3f(place + to_sun * hit.t), to_sun, active)
         return tau
 
     def _passed(
         self, group: mi.Int32, window: mi.Point3f, to_sun: mi.Vector3f, active: mi.Bool
     ) -> mi.Float:
-        """Transmittance from places on windows to the sun."""
+        """Transmittance from points on windows to the sun."""
         local = self._inside.to_local(group, to_sun, active)
         active = active & (local.z > 0)
         tau = mi.Float(0)
@@ -345,9 +345,9 @@ class PictureSun:
         return dr.select(lit, f * local.z * dr.gather(mi.Float, light, hour), 0.0)
 
     def scattered_luminance(self, suns: NDArray, illuminance: NDArray) -> NDArray[np.float32]:
-        """Luminance [G, K, h] of the windows by the sun that they scatter, mean over each group.
+        """Luminance [G, K, h] of the sunlight that windows scatter, mean over each group.
 
-        f is the mean over each patch; where part of the group lies in shadow, its share counts.
+        f is the mean over each patch, times the sunlit share of the group.
         """
         K, h, G = self._bins.size, len(suns), len(self._panes)
         result = np.zeros((G, K, h), dtype=np.float32)
@@ -387,13 +387,13 @@ class PictureSun:
         return seen.numpy().reshape(-1, WINDOW_POINTS).mean(axis=1)
 
     def add_disc(self, values: NDArray, suns: NDArray, illuminance: NDArray) -> None:
-        """Add the disc as the eye sees it, by its share of each pixel; arguments of `add_to`."""
+        """Add the visible disc to the pixels by its share of each; arguments as of `add_to`."""
         self._add_disc(values, *self._turned(suns, illuminance), None)
 
     def _add_disc(
         self, values: NDArray, suns: NDArray, illuminance: NDArray, mirror: int | None
     ) -> None:
-        """Add the disc that stands at `suns`, or that a mirror plane of the room shows there."""
+        """Add the disc at directions `suns`, or its image in a mirror plane of the room."""
         lit = self._shining(suns, illuminance) if mirror is None else np.flatnonzero(illuminance)
         suns, strength = suns[lit], illuminance[lit]
         reach = 2 * np.sin(disc_reach(self._size) / 2)
@@ -414,7 +414,7 @@ class PictureSun:
         np.add.at(values, (lit[hour], pixel), seen * strength[hour] / SUN_SOLID_ANGLE)
 
     def _by_mirror(self, towards: mi.Vector3f, plane: int) -> mi.Float:
-        """Share of the sun that comes to the eye by a mirror plane of the room."""
+        """Transmittance from the eye by a mirror plane of the room to the sun."""
         gloss = self._inside.gloss
         normal = opaque_vector(gloss.normals[plane])
         ray = mi.Ray3f(mi.Point3f(self._eye), towards)
