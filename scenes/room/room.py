@@ -163,7 +163,9 @@ def lit_room(
     times = StageTimes()
 
     with times.stage("daylight"):
-        light = room_light(room, progress=progress)
+        every_hour = options.outputs.annual_glare or control_signal(room) == "dgp"
+        needs = ("illuminance", "DGP") if every_hour else ("illuminance",)
+        light = room_light(room, needs=needs, progress=progress)
         if control_signal(room) == "irradiance":
             outdoors = seasonal_outdoors(room, light, progress=progress)
         state = shading_state(room, light, outdoors, progress=progress)

@@ -25,6 +25,7 @@ import mitsuba_cfs as cfs
 from mitsuba_cfs.bsdf.glazing import Pane, pane_values
 from mitsuba_cfs.bsdf.klems_peak import specular_exponent, through_peak
 from mitsuba_cfs.glare.annual import full_picture
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from tests.validation.before_after_rooms import (
     DARK,
@@ -94,7 +95,11 @@ def disc(figure) -> str:
 def sun_rated(size: int) -> tuple[NDArray[np.float32], dict[str, float]]:
     """A picture with the sun in a dark window, and its DGP by the rule of the sun's disc."""
     drawn = Drawn(office(size=size), [glass(DARK)], sky((0.13, -1.0, 0.22), 800.0, 100.0))
-    shown, hour, view = lit(drawn).pictures(np.array([0]), [0]), np.array([0]), drawn.scene.view
+    shown, hour, view = (
+        pictures_in_state(lit(drawn), np.array([0]), [0]),
+        np.array([0]),
+        drawn.scene.view,
+    )
     values, discs = shown.without_disc(hour)
     bare, whole = (full_picture(v[0], shown.pixels, view) for v in (values, shown.values(hour)))
     own = cfs.evaluate(bare, view, disc=discs[0]).dgp
@@ -106,14 +111,14 @@ def overhang(figure) -> str:
     figure.set_size_inches(5.6, 2.4)
     drawn, said = overhang_room(), []
     traced = (
-        cfs.PhaseScene(drawn.scene, cfs.Sampling(window_parts=parts), five_phase=False)
+        cfs.phase_matrices(drawn.scene, cfs.Sampling(window_parts=parts), five_phase=False)
         for parts in (1, 0)
     )
     before, now = (
-        cfs.PhaseSystems(one, drawn.systems).light(drawn.sky).illuminance()[:, 0] for one in traced
+        cfs.illuminance(cfs.phase_light(one, drawn.systems, drawn.sky))[:, 0] for one in traced
     )
     many = cfs.Sampling(hour_samples=HOUR_SAMPLES)
-    paths = cfs.PathSystems(drawn.scene, drawn.systems, many).light(drawn.sky).illuminance()[:, 0]
+    paths = cfs.illuminance(cfs.PathLight(drawn.scene, drawn.systems, drawn.sky, many))[:, 0]
     left, right = figure.subplots(1, 2)
     left.plot(SENSOR_DEPTHS, paths, "k", linewidth=2.5, alpha=0.4, label="paths")
     for word, lux in (("before: one D", before), ("now: parts", now)):

@@ -20,8 +20,8 @@ from mitsuba_cfs.bsdf.bsdf_file import Bsdf
 from mitsuba_cfs.bsdf.generate import generate_tensor_tree
 from mitsuba_cfs.bsdf.tensor_plugin import tensor_tree_plugin
 from mitsuba_cfs.glare.annual import full_picture
-from mitsuba_cfs.methods.optics import GivenOptics, States
-from mitsuba_cfs.methods.phase_light import PhaseLight
+from mitsuba_cfs.methods.optics import MatrixOptics, States
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.trace.kernels.scattering import WINDOW_UP, PluginScattering
 from tests.validation.tree_peak import fabric
 
@@ -142,7 +142,7 @@ def windows() -> tuple[Drawn, Drawn]:
     """The window black to the light of the room, and with its glass."""
     now = Drawn(office(), [glass()], sky((0.2, -1.0, 1.0), 800.0, 100.0))
     (optics,) = glass()
-    black = GivenOptics(optics.transmission, optics.scattering, optics.paths)
+    black = MatrixOptics(optics.transmission, optics.scattering, optics.paths)
     return replace(now, systems=[[black]]), now
 
 
@@ -166,7 +166,7 @@ def tree() -> tuple[Drawn, Drawn]:
     trees, _ = generate_tensor_tree(fabric(), LEVELS, samples=TREE_SAMPLES, seed=1)
     scene, noon = office(), sky((0.15, -1.0, 0.3), 800.0, 100.0)
     known = cfs.BsdfOptics(cfs.klems_of(trees[0]), trees[0])
-    wide = GivenOptics(known.transmission, spread(trees[0]), reflection=known.reflection)
+    wide = MatrixOptics(known.transmission, spread(trees[0]), reflection=known.reflection)
     return Drawn(scene, [[wide]], noon), Drawn(scene, [[known]], noon)
 
 
@@ -183,20 +183,20 @@ PAIRS: dict[str, Callable[[], tuple[Drawn, Drawn]]] = {
 }  # fmt: skip
 
 
-def lit(drawn: Drawn) -> PhaseLight:
+def lit(drawn: Drawn) -> cfs.PhaseLight:
     """The light of the hour by five phases."""
     sampling = cfs.Sampling(view_samples=SAMPLES, window_parts=drawn.window_parts)
-    traced = cfs.PhaseScene(drawn.scene, sampling)
+    matrices = cfs.phase_matrices(drawn.scene, sampling, needs=["DGP"])
     if drawn.beam_of_patches:  # no elements of the room's surfaces take it at the sun's own angle
-        traced.__dict__["view"] = replace(traced.view, elements=None)
-    return cfs.PhaseSystems(traced, drawn.systems).light(drawn.sky)
+        matrices = replace(matrices, view=replace(matrices.view, elements=None))
+    return cfs.phase_light(matrices, drawn.systems, drawn.sky, needs=["DGP"])
 
 
 def picture(drawn: Drawn) -> tuple[NDArray[np.float32], cfs.GlareResult]:
     """The picture of the hour and its glare."""
     light, view = lit(drawn), drawn.scene.view
     hour, state = np.array([0]), [0] * len(drawn.systems)
-    shown = light.pictures(hour, state)
+    shown = pictures_in_state(light, hour, state)
     values, discs = shown.without_disc(hour)
     bare, whole = (full_picture(v[0], shown.pixels, view) for v in (values, shown.values(hour)))
     return whole, cfs.evaluate(bare, view, disc=discs[0])

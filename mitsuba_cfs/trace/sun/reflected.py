@@ -252,7 +252,7 @@ def _few(rough: RoughFaces) -> RoughFaces:
 def _runs(
     places: SurfacePoints, weight: NDArray[np.float64], most: int, random: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Runs of nearby points, equal in weight: the run of each point, and the point that represents it.
+    """Runs of nearby points, equal in weight: each point's run, and the point that represents it.
 
     Runs follow Morton's curve over the points that face one of 26 directions.
     """
