@@ -1,4 +1,4 @@
-"""The sun's disc in path-traced pictures: in their pixels, or apart for its glare."""
+"""The sun's disc in path-traced pictures: in their pixels, or as a separate glare source."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def disc_seen(room: LitRoom, sky: Sky, view: View) -> SunDisc | None:
 def with_disc(
     picture: NDArray[np.float32], room: LitRoom, sky: Sky, view: View
 ) -> NDArray[np.float32]:
-    """A picture [ny, nx] that was made without the disc, with it in its pixels."""
+    """A picture [ny, nx] with the disc added to its pixels."""
     whole = picture.astype(float).ravel()
     add_disc(whole, room, sky, view)
     return whole.astype(np.float32).reshape(picture.shape)
@@ -47,7 +47,7 @@ def add_disc(picture: NDArray[np.float64], room: LitRoom, sky: Sky, view: View) 
 
 
 def add_mirrored_discs(picture: NDArray[np.float64], room: LitRoom, sky: Sky, view: View) -> None:
-    """Add the discs that smooth mirrors show to pixels [ny * nx]."""
+    """Add the images of the disc in smooth mirrors to pixels [ny * nx]."""
     sun = sky.sun.numpy().ravel()
     for tracer in (room.inside, room.outside):
         for plane in [] if tracer.gloss is None else tracer.gloss.mirrors:
@@ -59,7 +59,7 @@ def add_mirrored_discs(picture: NDArray[np.float64], room: LitRoom, sky: Sky, vi
 def _by_plane(
     room: LitRoom, view: View, tracer: TracedScene, plane: int
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float32]]:
-    """Transmittance [n] of ways [n, 3] from the eye by a mirror plane to the sky."""
+    """Transmittance [n] from the eye in directions [n, 3] by a mirror plane to the sky."""
     normal = tracer.gloss.normals[plane]
 
     def shown(ways: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -80,7 +80,7 @@ def _add(
     sun: NDArray[np.float64],
     passed: Callable[[NDArray[np.float64]], NDArray[np.float32]],
 ) -> None:
-    """Add a disc round `sun`; `passed`: what of its radiance comes from each direction."""
+    """Add a disc about `sun`; `passed`: transmittance in each direction."""
     size = pixel_size(view)
     directions, counts = pixel_directions(view)
     shown = np.flatnonzero(counts.reshape(-1))
@@ -93,7 +93,7 @@ def _add(
 
 
 def _straight(room: LitRoom, view: View, ways: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Transmittance [n] of the straight way from the eye to the sky in directions [n, 3]."""
+    """Transmittance [n] from the eye straight to the sky in directions [n, 3]."""
     towards = vectors(ways)
     active = dr.full(mi.Bool, True, len(ways))
     return straight_to_sky(room, eye_of(room, view), towards, mi.Bool(False), active).numpy()

@@ -1,7 +1,7 @@
-"""What a view shows of other rooms straight through glass between rooms, pixel by pixel.
+"""Adjacent rooms in a view, straight through glass between rooms, pixel by pixel.
 
-The phase methods have the room beyond in the patches of a Klems basis, 10 to 15 degrees wide, and
-as the mean over a part of the glass: a bright window there is smeared over the wall around it.
+The phase methods resolve the adjacent room by Klems patches, 10 to 15 degrees wide, and by the mean
+over a part of the glass, which smears a bright window there over the wall around it.
 """
 
 from __future__ import annotations
@@ -85,14 +85,14 @@ def borrowed_picture(
     seed: int = 0,
     scenes: SceneCache | None = None,
 ) -> list[RoomShown]:
-    """The rooms that a view shows straight through panes, and through panes of these.
+    """The rooms that a view shows straight through glass, and through glass of these.
 
     Args:
         interior, groups: of the eye's room.
-        behind: the rooms behind its panes.
+        behind: the rooms behind its glass.
         subdivision: Reinhart's MF of the sky.
         samples: rays of each pixel.
-        tile: pixels across of the squares that share what surfaces reflect, as of `tile_size`.
+        tile: pixels across of the squares that share reflected light, by default `tile_size`.
         max_depth: segments of a path in a room.
     """
     scenes = SceneCache() if scenes is None else scenes
@@ -116,9 +116,9 @@ def borrowed_picture(
 
 
 def _all_behind(behind: Sequence[RoomBehind]) -> list[tuple[int, RoomBehind]]:
-    """The rooms behind panes and those behind them, each with its place's number in this list.
+    """All rooms behind glass, each with the number in this list of the room in front of it.
 
-    The number is that of the room that it is behind; -1: the eye's.
+    -1: the eye's room.
     """
     found = [(-1, one) for one in behind]
     for i, (_, one) in enumerate(found):  # grows as it is read
@@ -127,7 +127,7 @@ def _all_behind(behind: Sequence[RoomBehind]) -> list[tuple[int, RoomBehind]]:
 
 
 def _into_room(tracer: TracedScene, behind: RoomBehind, lanes: PixelRays) -> PixelRays:
-    """Rays in a room that go straight on into one behind it, a step clear of its panes."""
+    """Rays in a room that pass straight into a room behind it, offset off the glass."""
     beams = np.zeros((len(tracer.groups), KLEMS_FULL.size))
     beams[behind.first : behind.first + behind.count] = behind.beam
     found = through_windows(tracer, _panes(beams), lanes)
@@ -137,7 +137,7 @@ def _into_room(tracer: TracedScene, behind: RoomBehind, lanes: PixelRays) -> Pix
 
 
 def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
-    """What passes straight on through window groups, by their patches [G, K]."""
+    """Straight beams through window groups, by their patches [G, K]."""
     dark, found = np.zeros((KLEMS_FULL.size, KLEMS_FULL.size)), {}
     for beam in beams:
         if beam.tobytes() not in found:
@@ -149,7 +149,7 @@ def _panes(beams: NDArray[np.float64]) -> list[KlemsScattering]:
 
 
 class _MetInRoom:
-    """What rays find in a room, and behind its windows: patches, and places on surfaces."""
+    """Accumulates hits of rays in a room and behind its windows: patches, points on surfaces."""
 
     def __init__(
         self, room: LendingRoom, tracer: TracedScene, tiles: Tiles, sky: SkyBins, scenes: SceneCache
@@ -164,7 +164,7 @@ class _MetInRoom:
         self._shown: list[tuple[NDArray, NDArray, NDArray, SurfacePoints]] = []
 
     def add(self, lanes: PixelRays, block: NDArray[np.int64], start: int) -> None:
-        """Add what some of a block's rays find, those by gloss too; panes onward show nothing."""
+        """Add the hits of a block's rays and their specular reflections; glass onwards is black."""
         tracer = self.tracer
         self._beyond.add(through_windows(tracer, _panes(self.room.beam), lanes), block, start)
         for bounce in range(MOST_MIRRORS + 1):
@@ -237,7 +237,7 @@ class _MetInRoom:
         max_depth: int,
         seed: int,
     ) -> NDArray[np.float32]:
-        """Mean irradiance at the places of each tile per unit luminance of the windows [C, N]."""
+        """Mean irradiance at the points of each tile per unit luminance of the windows [C, N]."""
         again = np.ceil(LEAST_PATHS / np.maximum(size, 1)).astype(np.int64)
         order = np.argsort(tile, kind="stable")
         order = np.repeat(order, again[tile[order]])
@@ -278,7 +278,7 @@ def _joined(parts: Sequence[NDArray]) -> NDArray:
 def _shares(
     share: NDArray, place: tuple[NDArray, NDArray], shape: tuple[int, int]
 ) -> sparse.csr_array:
-    """A matrix with entries at rows and columns, those that come again summed."""
+    """A sparse matrix from entries at rows and columns, repeated ones summed."""
     rows, columns = (part.astype(np.int64) for part in place)
     entries = share.astype(np.float32), (rows, columns)
     return sparse.csr_array(sparse.coo_array(entries, shape=shape))

@@ -1,7 +1,7 @@
-"""What a view shows of the outdoors straight through its windows, pixel by pixel.
+"""The outdoors in a view, straight through the windows, pixel by pixel.
 
-The phase methods see the sky through a window in the window's Klems patches, 10 to 15 degrees wide,
-and as the mean over the window.  What the system's straight beam shows is known better than that.
+The phase methods resolve the sky through a window by Klems patches, 10 to 15 degrees wide, and by
+the mean over the window.  Here each ray of a pixel follows the straight beam outdoors.
 """
 
 from __future__ import annotations
@@ -59,10 +59,10 @@ _Met = tuple[
 class OutdoorCoefficients:
     """Luminance of the pixels through the windows' straight beam, per unit luminance of the sky.
 
-    What surfaces reflect is added by `sun`; `sky` and `reflected` are for the sky without the sun.
+    `sun` has the sunlight on surfaces; `sky` and `reflected` are for the sky without the sun.
     """
 
-    sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows itself
+    sky: sparse.csr_array  # [n, P] sky and ground that the pixel shows directly
     reflected: sparse.csr_array  # [C, P] irradiance of the faces in each tile
     beam: NDArray[np.float64]  # [G, K] transmittance of the beam, mean over each window patch
     sun: OutdoorSun
@@ -87,9 +87,9 @@ def outdoors(
 
     Args:
         subdivision: Reinhart's MF of the sky.
-        samples: paths for each pixel, at as many places within it.
-        tile: pixels across of the squares that share what varies slowly over a face, by default
-            as of `tile_size`.
+        samples: paths for each pixel.
+        tile: pixels across of the squares that share slowly varying light on a face, by default
+            `tile_size`.
     """
     scenes = SceneCache() if scenes is None else scenes
     inside = scenes.scene(interior, groups)
@@ -110,10 +110,10 @@ def outdoors(
 
 
 class SeenOutdoors:
-    """What rays of a view's pixels find outdoors, block by block."""
+    """Accumulates hits of the pixels' rays outdoors, block by block."""
 
     def __init__(self, outside: TracedScene, sky: SkyBins, tiles: Tiles) -> None:
-        """Nothing yet."""
+        """Empty."""
         self._outside, self._sky, self._tiles = outside, sky, tiles
         self._face = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])
         self._free: list[sparse.csr_array] = []
@@ -121,7 +121,7 @@ class SeenOutdoors:
         self._rough: list[RoughFaces] = []
 
     def add(self, lanes: PixelRays, block: NDArray[np.int64], start: int) -> None:
-        """Add what rays of a block of pixels, the first of them number `start`, find."""
+        """Add the hits of a block of pixels, the first of which is number `start`."""
         rows = sparse.csr_array((len(block), self._sky.size), dtype=np.float32)
         for bounce in range(MOST_MIRRORS + 1):
             if not len(lanes.row):
@@ -133,11 +133,11 @@ class SeenOutdoors:
         self._free.append(rows)
 
     def sky(self) -> sparse.csr_array:
-        """Sky and ground that each pixel shows itself [n, P]."""
+        """Sky and ground that each pixel shows directly [n, P]."""
         return sparse.csr_array(sparse.vstack(self._free))
 
     def faces(self, seed: int) -> tuple[ShownFaces, sparse.csr_array, sparse.csr_array]:
-        """The faces by tile, what smooths them [C, C], and their irradiance [C, P], smoothed."""
+        """The faces by tile, their smoothing [C, C], and their smoothed irradiance [C, P]."""
         found, keys = _joined(self._shown)
         count = np.bincount(found.tile, minlength=len(keys))
         smooth = smoothing(self._tiles, keys, count)
@@ -166,7 +166,7 @@ def view_lanes(
 def through_windows(
     inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays
 ) -> PixelRays:
-    """Those of a block's rays in a room that meet a window, and go straight on, at the window."""
+    """Rays of a block that pass a window straight, at the window."""
     found = []
     for bounce in range(MOST_MIRRORS + 1):
         if not len(lanes.row):
@@ -179,7 +179,7 @@ def through_windows(
 def _passed(
     inside: TracedScene, scattering: Sequence[Scattering], lanes: PixelRays, bounce: int
 ) -> tuple[PixelRays, PixelRays]:
-    """Rays that go straight on through windows, and those that go on by glossy surfaces."""
+    """Rays that pass windows straight, and those reflected by glossy surfaces."""
     origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(origin, way), coherent=not bounce)
     active = hit.is_valid()
@@ -201,7 +201,7 @@ def _passed(
 def _sky_and_hits(
     outside: TracedScene, sky: SkyBins, lanes: PixelRays, count: int, bounce: int
 ) -> tuple[sparse.csr_array, _Met, PixelRays]:
-    """Rows [count, P] of what is sky; what the other lanes met; lanes that go on by its gloss."""
+    """Sky in the rays by row [count, P]; hits of the others; rays reflected by gloss."""
     origin, way = vectors(lanes.origin.T, mi.Point3f), vectors(lanes.way.T)
     hit, origin = outside.met_outdoors(origin, way, mi.Bool(True))
     found = hit.is_valid()
@@ -219,7 +219,7 @@ def _sky_and_hits(
 
 
 def _rough_faces(outside: TracedScene, met: _Met, start: int) -> list[RoughFaces]:
-    """Those of the faces that rays met whose gloss is rough."""
+    """Hits on faces with rough gloss."""
     lanes, prim, _, places = met
     if outside.gloss is None or not len(prim):
         return []
@@ -230,14 +230,14 @@ def _rough_faces(outside: TracedScene, met: _Met, start: int) -> list[RoughFaces
 
 
 def _with_faces(met: _Met, block: NDArray, start: int, faces: NDArray, tiles: Tiles) -> ShownFaces:
-    """What a block's rays met, by face and tile."""
+    """Hits of a block's rays by face and tile."""
     lanes, prim, rho, places = met
     tile = tiles.of_pixels(block[lanes.row], faces[prim])
     return ShownFaces(start + lanes.row, tile, lanes.weight * rho / np.pi, places)
 
 
 def _joined(shown: Sequence[ShownFaces]) -> tuple[ShownFaces, NDArray[np.int64]]:
-    """The faces of all blocks, their tiles numbered from 0, and the keys of these."""
+    """The faces of all blocks with tiles numbered from 0, and the keys of the tiles."""
     none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
     pixel, tile = (
         np.concatenate([none, *(getattr(s, name) for s in shown)]) for name in ("pixel", "tile")
