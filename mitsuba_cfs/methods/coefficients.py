@@ -36,7 +36,7 @@ from mitsuba_cfs.methods.window_reflection import (
 )
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.kernels.scattering import patch_beams
-from mitsuba_cfs.trace.matrices.adjacent import borrowed_view
+from mitsuba_cfs.trace.matrices.adjacent import adjacent_view
 from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
 BATCHES = 4
@@ -153,7 +153,7 @@ def _straight_view(
     scene, chosen, stopping = matrices.scene, matrices.sampling, Stopping(batches=BATCHES)
     inner = g - len(scene.outdoor_groups)
     if inner >= 0:  # nothing comes straight from the sky
-        values = borrowed_view(
+        values = adjacent_view(
             (scene.interior, scene.groups), g, beam, matrices.adjacent[inner], scene.sensors(),
             samples=INNER_SHARE * chosen.sensor_samples // BATCHES, max_depth=INDOOR_DEPTH,
             stopping=stopping, seed=chosen.seed, cache=matrices.cache,

@@ -30,13 +30,13 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.scene import SceneCache
-from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind, borrowed_daylight
+from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom, adjacent_daylight
 from mitsuba_cfs.trace.matrices.cell_daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.matrices.cell_daylight import cell_daylight
 from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from mitsuba_cfs.trace.matrices.exchange import outdoor_exchange, window_exchange
 from mitsuba_cfs.trace.matrices.view import view_matrix
-from mitsuba_cfs.trace.pictures.adjacent import RoomShown, borrowed_picture
+from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, view_matrices
 from mitsuba_cfs.trace.sun.room_sun import SunElements, window_elements
 from mitsuba_cfs.window_parts import cut_group, even_regions, window_cells
@@ -66,7 +66,7 @@ class PhaseMatrices:
     five_phase: bool
     cache: MatrixCache | None  # of traced matrices
     parts: Parts  # window groups, cut where the view outdoors differs within a group
-    adjacent: tuple[LendingRoom, ...]  # rooms behind the last window groups, with their T D
+    adjacent: tuple[AdjacentRoomLight, ...]  # rooms behind the last window groups, with their T D
     daylight: Estimate  # D [Q, K, P]
     direct_daylight: NDArray[np.float64] | None = None  # D_d [Q, K, P], mirrored sky included
     straight_daylight: NDArray[np.float64] | None = None  # D_d without what mirrors show
@@ -85,7 +85,7 @@ class PhaseMatrices:
         """How many of the parts, the first ones, look outdoors."""
         return self.parts.outdoors(self.scene)
 
-    def behind(self) -> tuple[RoomBehind, ...]:
+    def behind(self) -> tuple[GlassToRoom, ...]:
         """Which parts look into which adjacent room."""
         return _rooms_behind(self.scene, self.parts, self.adjacent)
 
@@ -231,7 +231,7 @@ def with_adjacent_shown(matrices: PhaseMatrices) -> PhaseMatrices:
     if not matrices.scene.adjacent or matrices.adjacent_shown is not None:
         return matrices
     scene, chosen = matrices.scene, matrices.sampling
-    shown = borrowed_picture(
+    shown = adjacent_picture(
         scene.interior, matrices.parts.groups, matrices.behind(), scene.eye,
         subdivision=chosen.subdivision, samples=chosen.outdoor_samples,
         max_depth=INDOOR_DEPTH, seed=chosen.seed, scenes=matrices.scenes,
@@ -273,7 +273,7 @@ def view_of_light(matrices: PhaseMatrices, light: PatchLight) -> ViewMatrices:
 
 def adjacent_room(
     matrices: PhaseMatrices, transmission: Sequence[NDArray[np.float64]]
-) -> LendingRoom:
+) -> AdjacentRoomLight:
     """The room of the matrices with T of its groups [G][K, K], as an adjacent room sees it."""
     daylight, of_group = matrices.daylight.values, matrices.parts.group
     pairs = zip(of_group, daylight, strict=True)
@@ -282,7 +282,7 @@ def adjacent_room(
     for q, n in enumerate(of_group[: matrices.outdoor_parts]):
         beam[q] = matrix_beam(transmission[n], KLEMS_FULL)
     scene = matrices.scene
-    return LendingRoom(
+    return AdjacentRoomLight(
         scene.interior, matrices.parts.groups, through, scene.exterior, beam, daylight,
         matrices.behind(),
     )  # fmt: skip
@@ -408,9 +408,9 @@ def _direct_daylight(
 
 def _adjacent_rooms(
     scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, scenes: SceneCache
-) -> tuple[LendingRoom, ...]:
+) -> tuple[AdjacentRoomLight, ...]:
     """The room behind each group that looks into one, with T D of its windows' parts."""
-    rooms: dict[int, LendingRoom] = {}
+    rooms: dict[int, AdjacentRoomLight] = {}
     for room in scene.adjacent:
         if id(room.scene) not in rooms:
             matrices = phase_matrices(
@@ -426,11 +426,11 @@ def _adjacent_rooms(
 
 
 def _rooms_behind(
-    scene: DaylightScene, parts: Parts, adjacent: Sequence[LendingRoom]
-) -> tuple[RoomBehind, ...]:
+    scene: DaylightScene, parts: Parts, adjacent: Sequence[AdjacentRoomLight]
+) -> tuple[GlassToRoom, ...]:
     inner = range(len(scene.outdoor_groups), len(scene.groups))
     return tuple(
-        RoomBehind(int(parts.of(g)[0]), len(parts.of(g)), room.beam, lit)
+        GlassToRoom(int(parts.of(g)[0]), len(parts.of(g)), room.beam, lit)
         for g, room, lit in zip(inner, scene.adjacent, adjacent, strict=True)
     )
 
@@ -439,13 +439,13 @@ def _inner_daylight(
     scene: DaylightScene,
     sampling: Sampling,
     parts: Parts,
-    adjacent: Sequence[LendingRoom],
+    adjacent: Sequence[AdjacentRoomLight],
     cache: MatrixCache | None,
     scenes: SceneCache,
 ) -> list[Estimate]:
     """D [q, K, P] of the parts of each group that looks into another room."""
     return [
-        borrowed_daylight(
+        adjacent_daylight(
             room.surfaces, room.groups, room.luminance, [parts.groups[q] for q in parts.of(g)],
             samples=max(sampling.patch_samples // INNER_SHARE // BATCHES, 1),
             max_depth=INDOOR_DEPTH, stopping=Stopping(batches=BATCHES), seed=sampling.seed,

@@ -45,7 +45,7 @@ from mitsuba_cfs.methods.window_reflection import (
 )
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
-from mitsuba_cfs.trace.matrices.adjacent import RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import GlassToRoom
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown
 from mitsuba_cfs.trace.pictures.annual import FivePhasePictures, ViewMatrices
 from mitsuba_cfs.trace.pictures.outdoors import outdoors
@@ -263,7 +263,7 @@ class AdjacentRoomPictures:
     pictures: Pictures  # of hours [h], in which the glass shows its patches
     rooms: Sequence[RoomShown]
     seen: sparse.csr_array  # [n, Q * K] share of each patch of the windows in each pixel
-    behind: Sequence[RoomBehind]  # which of the windows look into the rooms
+    behind: Sequence[GlassToRoom]  # which of the windows look into the rooms
     daylight: NDArray[np.float32]  # D [Q, K, P]
     sky: NDArray[np.float32]  # [P, h] of the hours
 

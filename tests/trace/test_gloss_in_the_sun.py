@@ -84,13 +84,13 @@ def test_five_phases_have_the_sun_of_a_mirror_facade():
 def test_a_picture_by_paths_shows_the_suns_disc_in_a_mirror():
     from mitsuba_cfs.images.view import fisheye
     from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-    from mitsuba_cfs.trace.paths.scene import LitRoom
+    from mitsuba_cfs.trace.paths.scene import PathTracingScene
     from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
     sky = lit_by(np.zeros(146), SUN, 50_000.0 / SUN_SOLID_ANGLE)
     view = fisheye(EYE, (0.0, -1.0, 0.0), 32)
     for outdoors, expected in ((facade(mirror(0.8)), IMAGE), (hidden_sun(mirror(0.8)), 0.0)):
-        lit = LitRoom(black_room(None)[0], outdoors, rooms.test_room()[1], [clear()])
+        lit = PathTracingScene(black_room(None)[0], outdoors, rooms.test_room()[1], [clear()])
         picture = point_in_time_picture(lit, sky, view, samples=4, disc=False)
         assert normal_illuminance(picture, view) == pytest.approx(expected, rel=0.01)
 

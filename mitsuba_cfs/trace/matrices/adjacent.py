@@ -1,6 +1,6 @@
 """Light through glass between rooms, from the windows of the adjacent room.
 
-`borrowed_daylight` is the daylight matrix D of the glass; `borrowed_view` the irradiance of sensors
+`adjacent_daylight` is the daylight matrix D of the glass; `adjacent_view` the irradiance of sensors
 by the beam that passes it straight.
 """
 
@@ -35,7 +35,7 @@ from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.matrices.pixel_view import add_seen_and_reflected
 
 
-def borrowed_daylight(
+def adjacent_daylight(
     surfaces: Surfaces,
     groups: Sequence[WindowGroup],
     luminance: NDArray[np.float64],
@@ -89,9 +89,9 @@ def borrowed_daylight(
     return accumulate(
         lambda number: view(number) @ flat,
         stopping=stopping,
-        label="borrowed daylight",
+        label="adjacent daylight",
         entry=cache_entry(
-            cache, "borrowed daylight", surfaces, groups, flat, inner, basis, n, max_depth, seed,
+            cache, "adjacent daylight", surfaces, groups, flat, inner, basis, n, max_depth, seed,
             by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
@@ -101,7 +101,7 @@ Room = tuple[Surfaces, Sequence[WindowGroup]]
 
 
 @dataclass(frozen=True, slots=True)
-class LendingRoom:
+class AdjacentRoomLight:
     """An adjacent room with the light of its windows."""
 
     surfaces: Surfaces
@@ -110,9 +110,9 @@ class LendingRoom:
     exterior: Surfaces  # in front of the first groups, which look outdoors
     beam: NDArray[np.float64]  # [G, K] transmittance of the straight beam; 0 of glass to rooms
     daylight: NDArray[np.float64]  # D of these [G, K, P]
-    onward: tuple[RoomBehind, ...] = ()  # rooms behind the last groups
+    onward: tuple[GlassToRoom, ...] = ()  # rooms behind the last groups
 
-    def rooms(self) -> Iterator[LendingRoom]:
+    def rooms(self) -> Iterator[AdjacentRoomLight]:
         """The room itself and all rooms behind it."""
         yield self
         for behind in self.onward:
@@ -120,20 +120,20 @@ class LendingRoom:
 
 
 @dataclass(frozen=True, slots=True)
-class RoomBehind:
+class GlassToRoom:
     """The room behind some window groups, which are parts of one pane."""
 
     first: int  # number of the first group
     count: int
     beam: NDArray[np.float64]  # [K] transmittance of their straight beam
-    room: LendingRoom
+    room: AdjacentRoomLight
 
 
-def borrowed_view(
+def adjacent_view(
     room: Room,
     group: int,
     beam: NDArray[np.float64],
-    beyond: LendingRoom,
+    beyond: AdjacentRoomLight,
     sensors: tuple[ArrayLike, ArrayLike],
     *,
     samples: int = 4096,
@@ -191,16 +191,16 @@ def borrowed_view(
     return accumulate(
         batch,
         stopping=stopping,
-        label="borrowed view",
+        label="adjacent view",
         entry=cache_entry(
-            cache, "borrowed view", room, group, beam, beyond, points, directions, n,
+            cache, "adjacent view", room, group, beam, beyond, points, directions, n,
             max_depth, seed, by=__name__, stopping=stopping,
         ),
     )  # fmt: skip
 
 
 def _add_paths(
-    room: LendingRoom,
+    room: AdjacentRoomLight,
     sums: Iterator[mi.Float64],
     bins: DirectionBins,
     start: mi.Point3f,

@@ -16,7 +16,7 @@ from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import batch_key, path_generator, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE
-from mitsuba_cfs.trace.paths.scene import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene, Sky
 from mitsuba_cfs.trace.paths.sun import (
     Vertex,
     leave_by_gloss,
@@ -33,7 +33,9 @@ CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that pa
 TO_WINDOW, TO_SUN = (0.5, 0.2), (0.15, 0.05)  # (first, later)
 
 
-def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.SurfaceInteraction3f:
+def _interaction(
+    room: PathTracingScene, group: int, direction: mi.Vector3f
+) -> mi.SurfaceInteraction3f:
     """Interaction record of a ray along `direction` that meets a window from the room."""
     si = dr.zeros(mi.SurfaceInteraction3f, dr.width(direction))
     normal = mi.Normal3f(*map(float, room.inside.groups[group].frame[2]))
@@ -44,7 +46,7 @@ def _interaction(room: LitRoom, group: int, direction: mi.Vector3f) -> mi.Surfac
 
 
 def leave(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     vertex: Vertex,
     u: mi.Point2f,
@@ -71,7 +73,7 @@ def leave(
 
 
 def _density(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     cosine: mi.Float,
     direction: mi.Vector3f,
@@ -99,7 +101,7 @@ def _density(
 
 
 def window_parts(
-    room: LitRoom,
+    room: PathTracingScene,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
@@ -132,7 +134,7 @@ def window_parts(
 
 
 def scattered_at(
-    room: LitRoom,
+    room: PathTracingScene,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
@@ -150,7 +152,7 @@ def scattered_at(
 
 
 def window_sun(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     place: mi.Point3f,  # outdoors of the window
     group: mi.Int32,
@@ -172,7 +174,7 @@ def window_sun(
 
 
 def _at_window(
-    room: LitRoom,
+    room: PathTracingScene,
     group: mi.Int32,
     direction: mi.Vector3f,
     towards: mi.Vector3f,
@@ -197,7 +199,7 @@ def _at_window(
 
 @dr.syntax
 def add_paths(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     result: mi.Float64,  # [rows], or [rows * P] of a `PatchSky`, accumulated in place
     starts: PathStarts,
@@ -311,7 +313,7 @@ def add_paths(
 
 
 def point_in_time(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     points: ArrayLike,
     directions: ArrayLike,
@@ -343,7 +345,7 @@ def point_in_time(
 
 
 def sensor_batches(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     points: ArrayLike,
     directions: ArrayLike,

@@ -92,7 +92,7 @@ class PatchSky:
         dr.scatter_add(result, mi.Float64(beta), slot, active)
 
 
-class LitRoom:
+class PathTracingScene:
     """The scenes on both sides of the windows, and the systems in the windows."""
 
     def __init__(
@@ -111,7 +111,7 @@ class LitRoom:
         self.glossy = self.inside.gloss is not None or self.outside.gloss is not None
 
 
-def lit_system(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
+def path_optics(bsdf: Bsdf, angular: AngularTable | None = None) -> PathOptics:
     """Optics of a system for paths in both directions, its straight beam separate.
 
     The transmittance of the beam is that of light towards the room in both directions.

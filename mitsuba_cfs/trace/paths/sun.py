@@ -20,7 +20,7 @@ import numpy as np
 from mitsuba_cfs.sky.sun import SUN_RADIUS, SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, facet_density, facets
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
-from mitsuba_cfs.trace.paths.scene import LitRoom, PatchSky, Sky
+from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene, Sky
 
 MOST_IMAGES = 8  # mirror planes asked at a vertex; of more, so many are drawn
 
@@ -48,7 +48,7 @@ def on_disc(sky: Sky | PatchSky, u: mi.Point2f) -> mi.Vector3f:
 
 
 def through_window(
-    room: LitRoom,
+    room: PathTracingScene,
     position: mi.Point3f,
     towards: mi.Vector3f,
     outdoors: mi.Bool,
@@ -73,7 +73,7 @@ def through_window(
 
 
 def straight_to_sky(
-    room: LitRoom,
+    room: PathTracingScene,
     position: mi.Point3f,
     towards: mi.Vector3f,
     outdoors: mi.Bool,
@@ -92,7 +92,7 @@ def straight_to_sky(
 
 
 def sun_at(
-    room: LitRoom, sky: Sky | PatchSky, vertex: Vertex, u: mi.Point2f, active: mi.Bool
+    room: PathTracingScene, sky: Sky | PatchSky, vertex: Vertex, u: mi.Point2f, active: mi.Bool
 ) -> mi.Float:
     """Irradiance directly from the sun, outdoors or through a window's straight beam."""
     towards = on_disc(sky, u)
@@ -103,7 +103,7 @@ def sun_at(
 
 
 def sun_images(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     vertex: Vertex,
     generator: mi.PCG32,
@@ -134,7 +134,7 @@ def sun_images(
 
 
 def _image(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     tracer: TracedScene,
     number: mi.UInt32,
@@ -169,7 +169,7 @@ def _image(
 
 
 def by_plane(
-    room: LitRoom,
+    room: PathTracingScene,
     tracer: TracedScene,  # the room's inside or outside
     number: mi.Int32,
     position: mi.Point3f,
@@ -212,7 +212,7 @@ def _image_density(
 
 
 def surface_sun(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky | PatchSky,
     vertex: Vertex,
     triangle: mi.UInt32,
@@ -257,7 +257,11 @@ def surface_sun(
 
 
 def diffuse_share(
-    room: LitRoom, vertex: Vertex, triangle: mi.UInt32, towards: mi.Vector3f, active: mi.Bool
+    room: PathTracingScene,
+    vertex: Vertex,
+    triangle: mi.UInt32,
+    towards: mi.Vector3f,
+    active: mi.Bool,
 ) -> mi.Float:
     """Diffuse reflectance for light from a direction over that at normal incidence."""
     cosine = dr.dot(vertex.normal, towards)
@@ -271,7 +275,7 @@ def diffuse_share(
 
 
 def leave_by_gloss(
-    room: LitRoom,
+    room: PathTracingScene,
     vertex: Vertex,
     triangle: mi.UInt32,
     direction: mi.Vector3f,
@@ -313,7 +317,7 @@ def _own_weight(
 
 
 def _by_side(
-    room: LitRoom,
+    room: PathTracingScene,
     outdoors: mi.Bool,
     active: mi.Bool,
     value: Callable[[TracedGloss, mi.Bool], mi.Float],

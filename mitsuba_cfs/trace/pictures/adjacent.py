@@ -33,7 +33,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_view_paths
-from mitsuba_cfs.trace.matrices.adjacent import LendingRoom, RoomBehind
+from mitsuba_cfs.trace.matrices.adjacent import AdjacentRoomLight, GlassToRoom
 from mitsuba_cfs.trace.pictures.outdoors import (
     RAYS,
     SeenOutdoors,
@@ -72,10 +72,10 @@ class RoomShown:
         values += found.T
 
 
-def borrowed_picture(
+def adjacent_picture(
     interior: Surfaces,
     groups: Sequence[WindowGroup],
-    behind: Sequence[RoomBehind],
+    behind: Sequence[GlassToRoom],
     view: View,
     *,
     subdivision: int = 4,
@@ -115,7 +115,7 @@ def borrowed_picture(
     return [one.shown(len(pixels), max_depth, seed) for one in met]
 
 
-def _all_behind(behind: Sequence[RoomBehind]) -> list[tuple[int, RoomBehind]]:
+def _all_behind(behind: Sequence[GlassToRoom]) -> list[tuple[int, GlassToRoom]]:
     """All rooms behind glass, each with the number in this list of the room in front of it.
 
     -1: the eye's room.
@@ -126,7 +126,7 @@ def _all_behind(behind: Sequence[RoomBehind]) -> list[tuple[int, RoomBehind]]:
     return found
 
 
-def _into_room(tracer: TracedScene, behind: RoomBehind, lanes: PixelRays) -> PixelRays:
+def _into_room(tracer: TracedScene, behind: GlassToRoom, lanes: PixelRays) -> PixelRays:
     """Rays in a room that pass straight into a room behind it, offset off the glass."""
     beams = np.zeros((len(tracer.groups), KLEMS_FULL.size))
     beams[behind.first : behind.first + behind.count] = behind.beam
@@ -152,7 +152,12 @@ class _MetInRoom:
     """Accumulates hits of rays in a room and behind its windows: patches, points on surfaces."""
 
     def __init__(
-        self, room: LendingRoom, tracer: TracedScene, tiles: Tiles, sky: SkyBins, scenes: SceneCache
+        self,
+        room: AdjacentRoomLight,
+        tracer: TracedScene,
+        tiles: Tiles,
+        sky: SkyBins,
+        scenes: SceneCache,
     ) -> None:
         self.room, self.tracer, self.bins = room, tracer, DirectionBins(KLEMS_FULL)
         self._tiles, self._columns = tiles, len(room.groups) * KLEMS_FULL.size

@@ -35,7 +35,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.paths.disc import add_disc, add_mirrored_discs, eye_of
 from mitsuba_cfs.trace.paths.point_in_time import add_paths, leave, window_parts, window_sun
-from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.paths.sun import Vertex, on_disc, surface_sun
 
 BLOCK = 2**19  # paths traced at a time
@@ -43,7 +43,7 @@ WINDOW_STEPS = (1,)  # [tiles] of the smoothing where windows scatter
 
 
 def _sharp_light(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     vertex: Vertex,
     triangle: mi.UInt32,
@@ -83,7 +83,7 @@ def _sharp_light(
 
 
 def point_in_time_picture(
-    room: LitRoom,
+    room: PathTracingScene,
     sky: Sky,
     view: View,
     *,
@@ -131,7 +131,7 @@ def point_in_time_picture(
 
 
 def colour_picture(
-    rooms: Sequence[LitRoom], skies: Sequence[Sky], view: View, **options: Any
+    rooms: Sequence[PathTracingScene], skies: Sequence[Sky], view: View, **options: Any
 ) -> NDArray[np.float32]:
     """Radiance picture [ny, nx, 3] [W/m2/sr] of red, green and blue.
 
@@ -167,7 +167,7 @@ def _add_shared(
 class _Faces:
     """Numbers of faces: windows, then both sides of faces indoors, then outdoors."""
 
-    def __init__(self, room: LitRoom) -> None:
+    def __init__(self, room: PathTracingScene) -> None:
         self.windows = len(room.systems) + 1  # the last: windows seen from outdoors
         self._inside, count = self._table(room.inside)
         self._outside, _ = self._table(room.outside)
@@ -221,7 +221,7 @@ class _Kernel:
 
     def __init__(
         self,
-        room: LitRoom,
+        room: PathTracingScene,
         sky: Sky,
         view: View,
         faces: _Faces,
