@@ -88,8 +88,8 @@ def seasonal_outdoors(
     ):  # fmt: skip
         matrices = light.matrices
     else:
-        scenes = None if light is None else light.matrices.scenes
-        matrices = _traced_outdoors(room, first, scenes, progress)
+        traced = None if light is None else light.matrices.scenes
+        matrices = _traced_outdoors(room, first, traced, progress)
     of_daylight = replace(matrices, five_phase=False)  # no D_d
     scenes = [replace(matrices.scene, exterior=exterior) for exterior in others]
     later = (with_outdoors(of_daylight, scene) for scene in scenes)
