@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 
 from bim.model import Space
 from bim.report.issue import Issue
-from bim.sensors import held_grids
+from bim.sensors import model_grids
 from bim.templates import same_hues
 from bim.to_thermal import same_surfaces, shared_constructions
 from mitsuba_cfs import variants
@@ -111,7 +111,7 @@ def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Spa
     rooms = (one, other)
     if options.inner_glass and any(source_rooms(building, room) for room in rooms):
         return False  # their light depends on their neighbours
-    if any(held_grids(building, room) for room in rooms):
+    if any(model_grids(building, room) for room in rooms):
         return False
     if operation is not None:
         tables = operation.tables
