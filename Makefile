@@ -12,12 +12,13 @@ INPUTS := pyproject.toml constraints.txt .ci/set-up
 # Some hundred tests start Python anew; each would compile the program's source to bytecode again
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help demo test test-all lint format docs clean
+.PHONY: help demo test test-all matrix lint format docs clean
 
 help:
 	@echo "make demo      compare the office that the repository ships, blind up, down and controlled"
 	@echo "make test      lint and the quick tests"
 	@echo "make test-all  lint, all tests, the slow ones too, with coverage, and the documentation"
+	@echo "make matrix    the quick tests with every installed Python from 3.11 to 3.14"
 	@echo "make lint      check style and types; make format repairs what it can"
 	@echo "make docs      the documentation as a site, in site/index.html"
 	@echo "make clean     remove what these made, the virtual environment too"
@@ -30,6 +31,9 @@ test: lint
 
 test-all: lint docs
 	$(PYTEST) --cov --cov-report=term
+
+matrix:
+	WORKERS=$(WORKERS) bash .ci/matrix
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -52,5 +56,5 @@ $(VENV)/.dev: $(INPUTS)
 	@touch $@ $(VENV)/.run
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .coverage site out cfs-demo
+	rm -rf $(VENV) .venv-matrix build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .coverage site out cfs-demo
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

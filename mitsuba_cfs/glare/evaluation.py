@@ -70,7 +70,7 @@ class GlareOptions:
 
     @property
     def rule(self) -> str:
-        """What the sources are, in words."""
+        """Definition of the glare sources as text."""
         own = "a source of its own" if self.sun == "source" else "part of its pixels"
         return f"sources: {GROUPINGS[self.grouping]}; the sun's disc: {own}"
 
@@ -254,7 +254,7 @@ def _positions(
 
 
 def _in_field(disc: SunDisc, geometry: GlareView, options: GlareOptions) -> bool:
-    """Whether the disc stands in what counts as the field of view."""
+    """Whether the disc is in the evaluated field of view."""
     if options.field_of_view == "all":
         return True
     return bool(seen(geometry, options.field_of_view)[geometry.pixel_at(disc.direction)])

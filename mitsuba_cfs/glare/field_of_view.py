@@ -1,4 +1,4 @@
-"""Guth's field of view: what both eyes together see, and what each of them sees.
+"""Guth's field of view of both eyes together, and of each eye.
 
 Borders are polar curves: the largest angle sigma from the line of sight at the angle tau from the
 vertical.
