@@ -26,7 +26,8 @@ def dgp_errors(
 ) -> NDArray[np.float64]:
     """Standard error of the DGP of every hour [H] from those of some.
 
-    Args: hours: [n] as of `hours_by_halves`; errors: [n] half the difference of the DGP of two halves.
+    Args: hours: [n] as of `hours_by_halves`; errors: [n] half the difference of the DGP of two
+    halves.
     """
     if not len(hours):
         return np.full(len(dgp), np.nan)

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.glare import indices, passes
 from mitsuba_cfs.glare.areas import Zones, angles_to, split_by_zone
-from mitsuba_cfs.glare.field_of_view import seen
-from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order
+from mitsuba_cfs.glare.glare_view import GlareView, in_picture_order, seen
 from mitsuba_cfs.glare.position_index import position_index, view_angles
 from mitsuba_cfs.glare.sources import Sources, glare_sources, pixel_sources, with_disc
 from mitsuba_cfs.glare.sun_disc import SunDisc

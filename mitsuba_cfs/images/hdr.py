@@ -49,7 +49,7 @@ class Picture:
 
     @property
     def misplaced_exposure(self) -> bool:
-        """Whether an EXPOSURE entry follows a tab, as `pcomb` writes it: the exposure is unknown."""
+        """Whether an EXPOSURE entry follows a tab (`pcomb`): the exposure is unknown."""
         return any("EXPOSURE=" in line and "\t" in line for line in self.header)
 
 

@@ -30,9 +30,9 @@ def checked_sun(weather: Weather, file: str | PathLike[str]) -> Weather:
     """Weather with a note for each statement that its own radiation contradicts.
 
     A wrong time zone, a wrong sign of the longitude or the latitude, another unit of the radiation
-    leave the numbers valid but move the sun.  They show in the radiation itself: by the hour about which
-    days are centred, by the seasonal variation of the day length, and by the share of
-    the extraterrestrial radiation.
+    leave the numbers valid but move the sun.  They show in the radiation itself: by the hour about
+    which days are centred, by the seasonal variation of the day length, and by the share of the
+    extraterrestrial radiation.
 
     Raises: `DataError` where the sun would be more than 1.5 h off, the seasons are the other
         hemisphere's, or the radiation is at most 1/50 of that of clear hours.
@@ -46,7 +46,7 @@ def checked_sun(weather: Weather, file: str | PathLike[str]) -> Weather:
 
 
 def whole_days(weather: Weather) -> Days | None:
-    """Radiation, declination and solar hour [days, steps] of complete days; None if there are too few.
+    """Radiation, declination and solar hour [days, steps] of complete days; None if too few.
 
     Complete days cover midnight to midnight and have light.
     The radiation is the global horizontal, or where there is none the direct normal and diffuse
@@ -123,7 +123,7 @@ def height_of_sun(latitude_deg: float, declination: FloatArray, hour: FloatArray
 
 
 def _far_zone(weather: Weather) -> list[str]:
-    """Note on a time zone that is far from its longitude although the radiation agrees with both."""
+    """Note on a time zone far from its longitude although the radiation agrees with both."""
     apart = _wrapped(weather.timezone_h - weather.longitude_deg / 15)
     if abs(apart) <= FAR_ZONE_H:
         return []
@@ -155,7 +155,7 @@ def _seasons(weather: Weather, days: Days, file: str | PathLike[str]) -> list[st
 
 
 def _amount(weather: Weather, days: Days, file: str | PathLike[str]) -> list[str]:
-    """What is wrong with the unit of the radiation by what comes of the extraterrestrial radiation."""
+    """Error of the unit of the radiation from its share of the extraterrestrial radiation."""
     if weather.global_horizontal is None or len(days[0]) < MANY_DAYS:
         return []
     radiation, declination, hour = days

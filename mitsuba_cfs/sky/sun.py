@@ -20,8 +20,8 @@ def sun_directions(weather: Weather, *, model: str = "spa") -> NDArray[np.float6
     """Unit vectors [H, 3] towards the sun in the middle of each interval.
 
     `spa` (the default): NREL's Solar Position Algorithm, uncertainty 0.0003 deg, with
-    atmospheric refraction.  `radiance`: the formula of gensky and gendaymtx, 0.45 deg off on average and
-    1.5 deg at worst, for agreement with them.
+    atmospheric refraction.  `radiance`: the formula of gensky and gendaymtx, 0.45 deg off on
+    average and 1.5 deg at worst, for agreement with them.
 
     Source: Reda and Andreas 2004, Solar Energy 76:577 (pvlib's implementation); Radiance `sun.c`.
     """
