@@ -31,7 +31,7 @@ class StoredArrays:
         self._last: mmap.mmap | None = None
         self._next = 0  # where the next array begins in the last file
 
-    def kept(self, thing: T) -> T:
+    def stored(self, thing: T) -> T:
         """A copy of a thing whose big arrays are read only and on disk; pickle must know it."""
         buffers: list[pickle.PickleBuffer] = []
 

@@ -17,7 +17,7 @@ from scenes.fenestration.resolver import (
     window_sources,
     windows_named,
 )
-from scenes.fenestration.systems import FenestrationSystem, Given
+from scenes.fenestration.systems import FenestrationSystem, WindowOverrides
 from scenes.fenestration.thermal_system import checked_system
 from scenes.room.windows import room_windows
 
@@ -31,12 +31,12 @@ class KnownFenestration:
     systems: dict[str, FenestrationSystem]  # by window GUID
     unfilled: dict[str, list[str]]  # names of the other windows, by what is missing of them
 
-    def notes(self) -> tuple[str, ...]:
-        """Where each window's optics come from, and which windows have none."""
+    def notes(self, without: str = "written without") -> tuple[str, ...]:
+        """Where each window's optics come from, and which windows have none, as `without` says."""
         filled = [window for window in self.windows if window.guid in self.systems]
         states = {guid: (system,) for guid, system in self.systems.items()}
         none = (
-            f"{windows_named(names)}: no BSDF is attached {missing}: written without."
+            f"{windows_named(names)}: no BSDF is attached {missing}: {without}."
             for missing, names in self.unfilled.items()
         )
         return (*source_notes(window_sources(filled, states)), *none)
@@ -83,6 +83,6 @@ class KnownFenestration:
 def known_fenestration(spaces: Iterable[Space], file: Path) -> KnownFenestration:
     """What an IFC file holds for the windows of some rooms."""
     windows = tuple(window for space in spaces for window in space.windows)
-    systems, unfilled = held_systems(windows, Given(light_only=True), file)
+    systems, unfilled = held_systems(windows, WindowOverrides(light_only=True), file)
     first = {guid: states[0] for guid, states in systems.items()}
     return KnownFenestration(file, windows, first, unfilled)

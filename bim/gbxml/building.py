@@ -24,7 +24,8 @@ from bim.gbxml.use import UseReader
 from bim.model import Building, Element
 from bim.planes import newell_normal
 from bim.polygon_rooms import DrawnFace, DrawnOpening, DrawnRoom, triangles_of_rings
-from bim.report.issue import Issue
+from bim.report.issue import Effect, Issue
+from mitsuba_cfs.surfaces import triangle_areas
 
 KINDS = {  # of a surface: kind of the face of its first room, and what lies beyond with one room
     "InteriorWall": ("wall", "adiabatic"),
@@ -99,6 +100,7 @@ class _Reader:
             elif kind not in KINDS:
                 unplaced[kind] += 1
             else:
+                self._note_inner_glass(surface, beside)
                 for number, guid in enumerate(beside):
                     faces[guid].append(self._face(surface, ring @ self.turn.T, beside, number))
         self.issues += [
@@ -152,6 +154,21 @@ class _Reader:
             if name not in spaces:
                 raise self.document.fault(f"no Space {name!r:.60}", surface, "AdjacentSpaceId")
         return list(dict.fromkeys(named))[:2]
+
+    def _note_inner_glass(self, surface: ElementTree.Element, beside: Sequence[str]) -> None:
+        """Report the glass of a surface that has the same room on both sides: it lights nothing."""
+        if len(beside) == 2 or KINDS[surface.get("surfaceType", "")][1] == "outside":
+            return
+        for opening in surface.iterfind("Opening"):
+            ring = self.document.ring(opening)
+            if opening.get("openingType", "") in GLAZED and ring is not None:
+                area = float(triangle_areas(triangles_of_rings((ring,))).sum())
+                values = {"element": _name(opening), "surface": _name(surface)}
+                self.issues.append(
+                    Issue(
+                        "glass-within-room", opening.get("id", ""), values, Effect("window", area)
+                    )
+                )
 
     def _face(
         self,

@@ -70,9 +70,9 @@ class Constructions:
         name = _name(material)
         fields = ("Thickness", "Conductivity", "Density", "SpecificHeat")
         thickness, conductivity, density, capacity = (
-            self.document.quantity(material, field) for field in fields
+            self._quantity(material, field) for field in fields
         )
-        resistance = self.document.quantity(material, "R-value")
+        resistance = self._quantity(material, "R-value")
         if not thickness or not conductivity:
             if not resistance:
                 values = {"material": name}
@@ -100,8 +100,10 @@ class Constructions:
         """What a window type states; where its U and g are both nought, it states nothing."""
         name, panes = _name(known), len(known.findall("Glaze")) or None
         g_text = known.find("SolarHeatGainCoeff")
-        g_value = None if g_text is None else self.document.number(g_text, least=0.0, most=1.0)
-        u_value = self.document.quantity(known, "U-value") or None
+        g_value = None if g_text is None else self.document.optional(
+            lambda: self.document.number(g_text, least=0.0, most=1.0), self.issues
+        )  # fmt: skip
+        u_value = self._quantity(known, "U-value") or None
         if u_value is None and g_value == 0:
             values = {"type": name}
             self.issues.append(Issue("window-type-of-zeros", known.get("id", ""), values))
@@ -109,8 +111,15 @@ class Constructions:
         visible, solar = (self._share(known, "Transmittance", k) for k in ("Visible", "Solar"))
         return GlazingValues(u_value, g_value, visible, solar, panes, name)
 
+    def _quantity(self, owner: ElementTree.Element, name: str) -> float | None:
+        """A quantity [SI]; None where it is not stated or cannot be read."""
+        return self.document.optional(lambda: self.document.quantity(owner, name), self.issues)
+
     def _share(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
-        """A share of 1 of that kind; near normal incidence where there are several."""
+        """A share of 1 of that kind, near normal incidence; None as for `_quantity`."""
+        return self.document.optional(lambda: self._stated(owner, what, kind), self.issues)
+
+    def _stated(self, owner: ElementTree.Element, what: str, kind: str) -> float | None:
         for one in owner.iterfind(what):
             if one.get("type") == kind and one.get("incidentAngle", "0") in ("0", "0.0", ""):
                 value = self.document.number(one, least=0.0, most=100.0)

@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.report.issue import Issue
 from bim.xml_elements import xml_elements
 from mitsuba_cfs.errors import DataError
 
+T = TypeVar("T")
 MOST_BYTES = 256 << 20
 METRES = {
     "Kilometers": 1e3, "Meters": 1.0, "Centimeters": 0.01, "Millimeters": 1e-3, "Miles": 1609.344,
@@ -36,9 +39,9 @@ CUBIC_METRES = {
 BTU_PER_HOUR, CFM, SQUARE_FOOT = 0.29307107, 4.71947443e-4, 0.3048**2
 WATT_PER_AREA = {"WattPerSquareMeter": 1.0, "WattPerSquareFoot": 1 / SQUARE_FOOT}
 FLOW_PER_AREA = {"LPerSecPerSquareM": 1e-3, "CFMPerSquareFoot": CFM / SQUARE_FOOT,
-                 "CubicMPerHourPerSquareM": 1 / 3600}  # fmt: skip
-FLOW = {"LPerSec": 1e-3, "CFM": CFM, "CubicMPerHr": 1 / 3600, "LPerSecPerPerson": 1e-3,
-        "CFMPerPerson": CFM}  # fmt: skip
+                 "CubicMPerHourPerSquareM": 1 / 3600, "CubicMPerSecPerSquareM": 1.0}  # fmt: skip
+FLOW = {"LPerSec": 1e-3, "CFM": CFM, "CubicMPerHr": 1 / 3600, "CubicMPerSec": 1.0,
+        "LPerSecPerPerson": 1e-3, "CFMPerPerson": CFM}  # fmt: skip
 BTU_INCH = 0.1442279  # BTU in/(h ft2 F) in W/(m K)
 SI = {
     "U-value": {"WPerSquareMeterK": 1.0, "BtuPerHourSquareFtF": 5.678263},
@@ -127,6 +130,20 @@ class Document:
             return units[unit] * self.number(found, least=0.0)
         except DataError as error:
             raise self.fault(error.message, owner, name) from None
+
+    def optional(self, read: Callable[[], T], issues: list[Issue]) -> T | None:
+        """A value that the simulation can do without; None where it cannot be read.
+
+        Args: issues: of the model, to which the fault is added once.
+        """
+        try:
+            return read()
+        except DataError as error:
+            values = {"field": error.field or "a value", "reason": error.message}
+            issue = Issue("value-not-read", error.element or self.file.name, values)
+            if issue not in issues:
+                issues.append(issue)
+            return None
 
     def ring(self, owner: ElementTree.Element) -> NDArray[np.float64] | None:
         """The polygon [N, 3] [m] of an element's PlanarGeometry; None without one."""

@@ -6,9 +6,9 @@ Source: gbXML schema 6.01 and 7.03, "Space", "Zone", "Schedule", "WeekSchedule",
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
-from functools import cached_property
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import cached_property, partial
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from bim.use import (
     vapour_g_h,
 )
 
+T = TypeVar("T")
 WEEKDAYS, WEEKEND = KINDS[:5], KINDS[5:7]
 DAY_TYPES = {  # the kinds of days of each; those of design days are in no year
     "Weekday": WEEKDAYS, "Weekend": WEEKEND, "Holiday": ("holiday",),
@@ -46,12 +47,12 @@ class UseReader:
     def __init__(self, document: Document) -> None:
         self.document = document
         self._schedules: dict[str, YearSchedule] = {}
-        self._issues: dict[Issue, None] = {}  # each once
+        self._issues: list[Issue] = []
 
     @property
     def issues(self) -> tuple[Issue, ...]:
-        """What was taken otherwise than the file may mean it."""
-        return tuple(self._issues)
+        """Values that are not used, or may mean something else, each once."""
+        return tuple(dict.fromkeys(self._issues))
 
     def use(self, space: Space) -> StatedUse | None:
         """What the file states of a room's use; None where it states nothing.
@@ -62,10 +63,18 @@ class UseReader:
         if element is None:
             return None
         zone = self._by_id["Zone"].get(element.get("zoneIdRef", ""))
-        found = dict(self._people(element, space)) | dict(self._gains(element, space))
-        found |= dict(self._air(element, zone, found.get("persons"), space))
-        found |= dict(self._set_points(element, zone))
-        return StatedUse(**found) if found else None
+        stated = self._optional(lambda: dict(self._people(element, space))) or {}
+        stated |= dict(self._gains(element, space))
+        stated |= dict(self._air(element, zone, stated.get("persons"), space))
+        stated |= dict(self._set_points(element, zone))
+        return StatedUse(**stated) if stated else None
+
+    def _optional(self, read: Callable[[], T]) -> T | None:
+        return self.document.optional(read, self._issues)
+
+    def _quantity(self, owner: ElementTree.Element, name: str) -> float | None:
+        """A quantity [SI]; None where it is not stated or cannot be read."""
+        return self._optional(lambda: self.document.quantity(owner, name))
 
     @cached_property
     def _by_id(self) -> dict[str, dict[str, ElementTree.Element]]:
@@ -99,17 +108,24 @@ class UseReader:
         if "Latent" in heat:
             yield "person_vapour_g_h", vapour_g_h(heat["Latent"])
         if set(heat) == {"Total"}:
-            self._issues[Issue("heat-gain-not-split", self.document.file.name)] = None
+            self._issues.append(Issue("heat-gain-not-split", self.document.file.name))
 
     def _gains(self, element: ElementTree.Element, space: Space) -> Iterator[tuple[str, Any]]:
         for field, key, schedule in (
             ("LightPowerPerArea", "lighting_w", "lightScheduleIdRef"),
             ("EquipPowerPerArea", "equipment_w", "equipmentScheduleIdRef"),
         ):
-            power = self.document.quantity(element, field)
+            power = self._optional(partial(self._power, element, field, schedule, space))
             if power is not None:
-                share = self._share(element, schedule)
-                yield key, ScheduledValue(power * space.floor_area, share)
+                yield key, power
+
+    def _power(
+        self, element: ElementTree.Element, field: str, schedule: str, space: Space
+    ) -> ScheduledValue | None:
+        power = self.document.quantity(element, field)
+        if power is None:
+            return None
+        return ScheduledValue(power * space.floor_area, self._share(element, schedule))
 
     def _air(
         self,
@@ -118,11 +134,23 @@ class UseReader:
         persons: ScheduledValue | None,
         space: Space,
     ) -> Iterator[tuple[str, Any]]:
-        leaks = self.document.quantity(element, "InfiltrationFlowPerArea")
+        leaks = self._quantity(element, "InfiltrationFlowPerArea")
         if leaks is not None:
             outside = [f.area for f in space.faces if f.adjacency == "outside"]
             outside += [window.area for window in space.windows]
             yield "infiltration_m3_s", ScheduledValue(leaks * sum(outside))
+        ventilation = self._optional(lambda: self._ventilation(element, zone, persons, space))
+        if ventilation is not None:
+            yield "ventilation_m3_s", ventilation
+
+    def _ventilation(
+        self,
+        element: ElementTree.Element,
+        zone: ElementTree.Element | None,
+        persons: ScheduledValue | None,
+        space: Space,
+    ) -> ScheduledValue | None:
+        """Outdoor air [m3/s] of the space, else of its zone; None where neither states any."""
         flow, stated = 0.0, False
         amounts = {
             "OAFlowPerArea": space.floor_area,
@@ -133,45 +161,47 @@ class UseReader:
             if owner is None or stated:
                 continue
             for field, amount in amounts.items():
-                value = self.document.quantity(owner, field)
+                value = self._quantity(owner, field)
                 flow, stated = flow + (value or 0.0) * amount, stated or value is not None
             changes = owner.find("AirChangesPerHour")
             if changes is not None:
                 flow += self.document.number(changes, least=0.0) * space.volume / 3600.0
                 stated = True
-        if stated:
-            name = None if zone is None else zone.get("outAirSchedIdRef")
-            share = None if not name else self._schedule(zone, name)
-            yield "ventilation_m3_s", ScheduledValue(flow, share)
+        if not stated:
+            return None
+        name = None if zone is None else zone.get("outAirSchedIdRef")
+        return ScheduledValue(flow, None if not name else self._schedule(zone, name))
 
     def _set_points(
         self, element: ElementTree.Element, zone: ElementTree.Element | None
     ) -> Iterator[tuple[str, Any]]:
+        if zone is None:
+            return
         kind = element.get("conditionType", "HeatedAndCooled")
         for word, field, name in (
             ("Heated", "DesignHeatT", "heatSchedIdRef"),
             ("Cooled", "DesignCoolT", "coolSchedIdRef"),
         ):
-            if zone is None or word not in kind:
-                continue
-            schedule = zone.get(name)
-            design = zone.find(field)
-            if schedule:
-                values = self._schedule(zone, schedule)
-                unit = self.document.root.get("temperatureUnit", "C")
-                yield (
-                    HELD[word],
-                    YearSchedule(values.name, self._celsius(values.values, unit, zone)),
-                )
-            elif design is not None:
-                at = self._celsius(
-                    np.array(self.document.number(design, least=-459.67, most=400.0)),
-                    design.get("unit", self.document.root.get("temperatureUnit", "C")), zone,
-                )  # fmt: skip
-                yield HELD[word], YearSchedule.constant(field, float(at))
-                values = {"field": field}
-                issue = Issue("set-point-without-schedule", self.document.file.name, values)
-                self._issues[issue] = None
+            if word in kind:
+                values = self._optional(partial(self._set_point, zone, field, name))
+                if values is not None:
+                    yield HELD[word], values
+
+    def _set_point(self, zone: ElementTree.Element, field: str, name: str) -> YearSchedule | None:
+        """Set point [C] of a zone's schedule, else its design temperature all year."""
+        file_unit = self.document.root.get("temperatureUnit", "C")
+        schedule, design = zone.get(name), zone.find(field)
+        if schedule:
+            values = self._schedule(zone, schedule)
+            return YearSchedule(values.name, self._celsius(values.values, file_unit, zone))
+        if design is None:
+            return None
+        stated = np.array(self.document.number(design, least=-459.67, most=400.0))
+        constant = float(self._celsius(stated, design.get("unit", file_unit), zone))
+        self._issues.append(
+            Issue("set-point-without-schedule", self.document.file.name, {"field": field})
+        )
+        return YearSchedule.constant(field, constant)
 
     def _celsius(self, values: np.ndarray, unit: str, owner: ElementTree.Element) -> np.ndarray:
         if unit not in CELSIUS:

@@ -140,7 +140,7 @@ def evaluate(
 
     Args:
         luminance: [ny, nx] row 0 at the top [cd/m2].
-        view: the picture's view, or its `GlareView`, worked out once for many pictures.
+        view: the picture's view, or its `GlareView`, computed once for many pictures.
         options: how glare is rated; `changes` are single options by name.
         disc: the sun, where the picture's pixels are without it.
 
@@ -248,7 +248,7 @@ def _positions(
 ) -> NDArray[np.float64]:
     """Position index [n] of pixels in directions [n, 3]."""
     if options.position_model == "guth" and options.grouping == "pixels":
-        return geometry.guth[pixel]  # worked out once for all pictures of the view
+        return geometry.guth[pixel]  # computed once for all pictures of the view
     return position_index(direction, geometry.view, model=options.position_model)
 
 

@@ -1,4 +1,4 @@
-"""A view's geometry as glare needs it: worked out once, used for every picture of that view."""
+"""Geometry of a view for glare evaluation, computed once for all pictures of the view."""
 
 from __future__ import annotations
 

@@ -37,16 +37,16 @@ BATCH_BYTES = 64 * 2**20  # of the pictures of a batch of hours
 
 @dataclass(frozen=True, slots=True)
 class DgpCheck:
-    """DGP of some hours by the pictures themselves and by what is kept of them."""
+    """DGP of some hours from the pictures and from their compressed form."""
 
     hours: NDArray[np.int64]  # [c] numbers among the hours of the year's pictures
     dgp: NDArray[np.float64]  # [c]
-    kept: NDArray[np.float64]  # [c]
+    compressed_dgp: NDArray[np.float64]  # [c]
 
     @property
     def largest(self) -> float:
         """The largest difference."""
-        return float(np.abs(self.kept - self.dgp).max(initial=0.0))
+        return float(np.abs(self.compressed_dgp - self.dgp).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ class SkySeries:
         return relative_luminance(self.model.coefficients[:, hours], directions[:, 2], cosine)
 
 
-def given_series(
+def series_for_suns(
     sun: ArrayLike,
     direct_normal: ArrayLike,
     diffuse_horizontal: ArrayLike,
@@ -128,7 +128,7 @@ def sky_series(
     """
     if towards is None:
         towards = sun_module.sun_directions(weather, model=sun_model)
-    series = given_series(
+    series = series_for_suns(
         sun_module.rotated(towards, rotation_deg),
         weather.direct_normal,
         weather.diffuse_horizontal,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -218,7 +219,6 @@ def test_air_between_rooms_is_joined(tmp_path):
          "Opening window: Coordinate: expected a number, got 'low'"),
         ('spaceIdRef="Hall"', 'spaceIdRef="Attic"', ": AdjacentSpaceId: no Space 'Attic'"),
         ('materialIdRef="wool"', 'materialIdRef="straw"', "Layer l1: no Material 'straw'"),
-        ('unit="WPerMeterK"', 'unit="x"', "Material brick: Conductivity: unit 'x'"),
         ('lengthUnit="Meters"', 'lengthUnit="Ells"', "gbXML: lengthUnit: 'Ells'"),
         ("gbXML", "cityXML", "expected gbXML, got cityXML"),
         ("</Campus>", "", "is no XML: mismatched tag"),
@@ -232,6 +232,39 @@ def test_faults_are_one_line_with_element_and_field(tmp_path, old, new, said):
         read_gbxml(path)
     assert str(caught.value).startswith(str(path)) and said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where", "reason"),
+    [
+        ('unit="WPerMeterK"', 'unit="x"', "Material brick", "unit 'x'"),
+        ('unit="WPerSquareMeterK">1.1', 'unit="y">1.1', "WindowType unit", "unit 'y'"),
+        ('type="IntVis" unit="Fraction">0.6', 'type="IntVis" unit="Fraction">six',
+         "Reflectance", "got 'six'"),
+    ],
+)  # fmt: skip
+def test_a_value_that_cannot_be_read_is_an_issue_and_refuses_no_file(
+    tmp_path, old, new, where, reason
+):
+    text = two_rooms()
+    assert old in text
+    building = read_gbxml(written(tmp_path, text.replace(old, new)))
+    (issue,) = [one for one in building.issues if one.code == "value-not-read"]
+    assert issue.where == where and reason in issue.values["reason"]
+    assert len(building.spaces) == 2
+
+
+def test_glass_with_one_room_on_both_sides_is_an_issue(tmp_path):
+    """The surface of the window is made inner, and names its own room twice."""
+    text = two_rooms()
+    start = text.rindex("<Surface ", 0, text.index('<Opening id="window"'))
+    end = text.index("</Surface>", start)
+    surface = text[start:end].replace("ExteriorWall", "InteriorWall")
+    (room,) = re.findall(r'<AdjacentSpaceId spaceIdRef="[^"]*"\s*/>', surface)
+    path = written(tmp_path, text[:start] + surface.replace(room, 2 * room) + text[end:])
+    (issue,) = [one for one in read_gbxml(path).issues if one.code == "glass-within-room"]
+    assert (issue.where, issue.effect.lost) == ("window", "window")
+    assert issue.effect.glass == pytest.approx(4.5)
 
 
 def test_the_suffix_leads_to_it(tmp_path):

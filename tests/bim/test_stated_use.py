@@ -176,24 +176,49 @@ def test_spaces_and_zones_of_gbxml_state_their_use(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "where", "reason", "lost"),
     [
-        ("WattPerSquareFoot", "Candles", "Space Office: LightPowerPerArea: unit 'Candles'"),
-        ('weekScheduleIdRef="w2"', 'weekScheduleIdRef="w9"', "YearSchedule y2: no WeekSchedule"),
-        ('dayType="Weekday"', 'dayType="Payday"', "WeekSchedule w: dayType: 'Payday'"),
-        ("2019-07-01", "2019-02-31", "YearSchedule y2: BeginDate: expected YYYY-MM-DD"),
-        ('unit="F"', 'unit="Re"', "Zone z: temperature unit 'Re'"),
-        ("<ScheduleValue>21</ScheduleValue>", "", "DaySchedule warm: ScheduleValue: holds 0"),
+        ("WattPerSquareFoot", "Candles", "Space Office", "unit 'Candles'", "lighting_w"),
+        ('weekScheduleIdRef="w2"', 'weekScheduleIdRef="w9"', "YearSchedule y2", "no WeekSchedule",
+         "persons"),
+        ('dayType="Weekday"', 'dayType="Payday"', "WeekSchedule w", "'Payday'", None),
+        ("2019-07-01", "2019-02-31", "YearSchedule y2", "expected YYYY-MM-DD", None),
+        ('unit="F"', 'unit="Re"', "Zone z", "temperature unit 'Re'", "cooling_c"),
+        ("<ScheduleValue>21</ScheduleValue>", "", "DaySchedule warm", "holds 0", "heating_c"),
     ],
-)
-def test_faults_of_gbxmls_use_are_one_line(tmp_path, old, new, said):
+)  # fmt: skip
+def test_a_use_that_cannot_be_read_is_an_issue_and_the_rest_is_used(
+    tmp_path, old, new, where, reason, lost
+):
     path = tmp_path / "used.xml"
     text = used_gbxml()
     assert old in text
     path.write_text(text.replace(old, new))
-    with pytest.raises(DataError) as caught:
-        read_gbxml(path)
-    assert said in str(caught.value) and "\n" not in str(caught.value)
+    building = read_gbxml(path)
+    issues = [one for one in building.issues if one.code == "value-not-read"]
+    assert where in {one.where for one in issues}
+    assert any(reason in one.values["reason"] for one in issues)
+    (use,) = building.uses.values()
+    if lost is not None:
+        assert getattr(use, lost) is None
+    assert use.equipment_w is not None
+
+
+def test_a_flow_in_cubic_metres_a_second_is_read(tmp_path):
+    """The unit of two of the format's own test models."""
+    text = used_gbxml().replace(
+        '<PeopleNumber unit="SquareMPerPerson">10</PeopleNumber>',
+        '<PeopleNumber unit="SquareMPerPerson">10</PeopleNumber>'
+        '<InfiltrationFlowPerArea unit="CubicMPerSecPerSquareM">0.0003</InfiltrationFlowPerArea>',
+    )
+    path = tmp_path / "used.xml"
+    path.write_text(text)
+    building = read_gbxml(path)
+    ((guid, use),) = building.uses.items()
+    (space,) = [one for one in building.spaces if one.guid == guid]
+    outside = sum(face.area for face in space.faces if face.adjacency == "outside")
+    outside += sum(window.area for window in space.windows)
+    assert use.infiltration_m3_s.peak == pytest.approx(0.0003 * outside)
 
 
 def test_random_bytes_of_gbxmls_use_give_one_line(tmp_path):

@@ -31,7 +31,7 @@ def test_every_state_is_walked_and_agrees(run, folder, tmp_path) -> None:
     years = run.spaces[0].explored.pictures
     assert len(found) == len(years) == 2
     for state, year in zip(found, years, strict=True):
-        assert state.dgp == pytest.approx(year.check.kept, abs=1e-6)
+        assert state.dgp == pytest.approx(year.check.compressed_dgp, abs=1e-6)
         assert np.abs(state.dgp - state.own).max() < 0.002
         assert np.all(state.milliseconds >= state.picture + state.glare)
         assert f"{len(year.check.hours)} hours" in str(state)
@@ -43,6 +43,6 @@ def test_sizes_are_those_on_disk_and_the_command_prints_both(run, folder, capsys
     assert sizes(folder) == [
         f"{run.spaces[0].space.label}: {SIZE} x {SIZE} pixels, 2 states, {total:.1f} MB on disk"
     ]
-    main([str(folder)])
+    main(folder)
     lines = capsys.readouterr().out.splitlines()
     assert sum("a full hour: median" in line for line in lines) == 2

@@ -95,7 +95,7 @@ def _shared(room: DaylitRoom) -> int:
 def test_rooms_held_on_disk_have_the_same_year(variant, weather, skies) -> None:
     rooms = [lit(s, {"loads": WARM} if s.name == "w" else {}, weather, skies) for s in two_boxes()]
     store = StoredArrays()
-    held = [store.kept(room) for room in rooms]
+    held = [store.stored(room) for room in rooms]
     found, _ = coupled_years(rooms, weather, 3600.0, OperationTables())
     again, _ = coupled_years(held, weather, 3600.0, OperationTables(), store=store)
     for one, other in zip(found, again, strict=True):
@@ -152,7 +152,7 @@ def test_a_run_has_the_temperatures_of_a_coupled_study(variant, weather, blind, 
     building = read_ifc(OFFICE)
     systems = in_all_windows(building, blind)
     operation = read_operation(tmp_path / "operation.toml")
-    inputs = run.JobInputs(building, list(building.spaces), weather, systems, operation)
+    inputs = run.Inputs(building, list(building.spaces), weather, systems, operation)
     room = study.options.changed(picture_size=32, picture_samples=1, picture_count=1)
     skies = skies_for(weather, room.method, room.sampling, **room.sky)
     options = JobOptions(OFFICE, WEATHER, cache=False, room=room)

@@ -18,7 +18,7 @@ from mitsuba_cfs.images.exr import read_exr
 from scenes.cli import run
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.resolver import fill_windows, windows_named
-from scenes.fenestration.systems import FenestrationSystem, Given, read_system
+from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system
 from scenes.fenestration.thermal_system import thermal_system
 from tests.bim.small_ifc import box_room
 from tests.scenes.fenestration_models import (
@@ -38,9 +38,9 @@ TINY = ["--quick", "--size", "64", "--picture", "06-21 12", "--spacing", "2",
 YEAR = ["--quick", "--size", "64", "--metric", "sDGP", "--method", "three-phase"]
 
 
-def filled(path: Path, given: Given | None = None) -> FenestrationSystem:
+def filled(path: Path, given: WindowOverrides | None = None) -> FenestrationSystem:
     """What fills the only window of a model, in its first state."""
-    (states,) = fill_windows(read_ifc(path).windows, given or Given(), path).values()
+    (states,) = fill_windows(read_ifc(path).windows, given or WindowOverrides(), path).values()
     return states[0]
 
 
@@ -79,16 +79,16 @@ def test_each_rung_goes_before_the_next(tmp_path, schema, typed) -> None:
     holder = "window type fixed pane" if typed else "the window itself"
     assert attached.source == f"what is attached to {holder} in room.ifc"
     blind = read_system(VENETIAN_BLIND, by="--cfs")
-    assert filled(path, Given((blind,))) is blind
+    assert filled(path, WindowOverrides((blind,))) is blind
     assert blind.source == "--cfs venetian_blind.xml"
 
 
 def test_u_and_g_of_the_flags_go_before_those_of_the_file(tmp_path) -> None:
     path = room(tmp_path / "room.ifc", STATED)
-    system = filled(path, Given(u_value=0.8, g_value=0.45))
+    system = filled(path, WindowOverrides(u_value=0.8, g_value=0.45))
     assert (system.u_value, system.g_value) == (0.8, 0.45)
     with_attached(path, 0.3, u_value=0.9, g_normal=0.4)
-    system = filled(path, Given(u_value=1.5))
+    system = filled(path, WindowOverrides(u_value=1.5))
     assert (system.u_value, system.g_value) == (1.5, 0.4)
     assert system.source.endswith("room.ifc, U of --u")
 
@@ -142,7 +142,7 @@ def test_a_shade_without_a_bsdf_is_no_clear_glazing(tmp_path) -> None:
 
 def test_the_light_alone_needs_no_g(tmp_path) -> None:
     path = room(tmp_path / "room.ifc", NOTHING["no g"][0])
-    assert normal(filled(path, Given(light_only=True)))[0] == pytest.approx(0.7, rel=2e-4)
+    assert normal(filled(path, WindowOverrides(light_only=True)))[0] == pytest.approx(0.7, rel=2e-4)
 
 
 def words_of(command: str, path: Path, folder: Path) -> list[str]:
@@ -316,7 +316,7 @@ def test_a_change_of_a_file_that_the_model_names_changes_the_years_key(tmp_path)
 def test_exports_write_what_is_known(tmp_path, capsys) -> None:
     path = room(tmp_path / "room.ifc", STATED)
     out = {option: tmp_path / option for option in ("radiance", "mitsuba", "epjson")}
-    words = ["ifc", "export", str(path)]
+    words = ["export", str(path)]
     for option, place in out.items():
         words += [f"--{option}", str(place)]
     assert run(words) == 0
@@ -343,7 +343,7 @@ def test_the_mitsuba_scene_is_lit_through_its_bsdf(tmp_path, variant) -> None:
     for number, share in enumerate((0.2, 0.4)):
         path = with_attached(room(tmp_path / f"{number}.ifc"), share)
         out = tmp_path / str(number)
-        assert run(["ifc", "export", str(path), "--mitsuba", str(out)]) == 0
+        assert run(["export", str(path), "--mitsuba", str(out)]) == 0
         (scene,) = out.rglob("scene.xml")
         means.append(float(np.array(mi.render(mi.load_file(str(scene)), spp=1)).mean()))
     # twice the transmittance, a little more for what the window throws back: 512^2 paths
@@ -353,13 +353,13 @@ def test_the_mitsuba_scene_is_lit_through_its_bsdf(tmp_path, variant) -> None:
 def test_exports_say_what_is_not_known(tmp_path, capsys) -> None:
     path = room(tmp_path / "room.ifc")
     out = tmp_path / "a.epJSON"
-    assert run(["ifc", "export", str(path), "--epjson", str(out)]) == 0
+    assert run(["export", str(path), "--epjson", str(out)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "Window W1: no U is known, 1.3 is written" in said
     assert "Window W1: no g is known, 0.6 is written" in said
     write_text(out, "")
     assert run(["ifc", "attach", str(path), "--all", "--u", "0.9", "-o", str(path)]) == 0
-    assert run(["ifc", "export", str(path), "--epjson", str(out)]) == 0
+    assert run(["export", str(path), "--epjson", str(out)]) == 0
     (values,) = json.loads(out.read_text())["WindowMaterial:SimpleGlazingSystem"].values()
     assert values["u_factor"] == 0.9
 
