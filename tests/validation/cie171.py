@@ -22,14 +22,13 @@ import numpy as np
 from mitsuba_cfs import variants
 from mitsuba_cfs.bsdf.glazing import Pane, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.methods.by_name import traced_scene, with_systems
+from mitsuba_cfs.methods.light import daylight, illuminance
 from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics, SystemOptics
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
-from mitsuba_cfs.trace.paths.scene import LitRoom
+from mitsuba_cfs.trace.paths.scene import PathTracingScene
 from tests.validation.cie171_cases import GLASS, SKIES, Case, cases, cie_sky, reported
 from tests.validation.cie171_quadrature import INDEX, Array
 
@@ -67,15 +66,15 @@ def computed(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING)
     sky = cie_sky(sampling.subdivision)
     group, filled = case.group(), optics(case, glass)
     if method == "two-phase":
-        room = LitRoom(Surfaces.none(), case.exterior(), [group], [filled.paths])
+        room = PathTracingScene(Surfaces.none(), case.exterior(), [group], [filled.paths])
         found = daylight_coefficients(
             room, case.points, case.normals, subdivision=sampling.subdivision,
             samples=MORE * sampling.hour_samples // BATCHES, stopping=Stopping(batches=BATCHES),
         )  # fmt: skip
         return found.values @ sky.whole
     scene = DaylightScene(Surfaces.none(), case.exterior(), [group], case.points, case.normals)
-    traced = traced_scene(METHODS[method], scene, sampling)
-    return with_systems(traced, [[filled]]).light(sky).illuminance()
+    light = daylight(scene, [[filled]], sky, method=METHODS[method], sampling=sampling)
+    return illuminance(light)
 
 
 def deviations(case: Case, method: str, glass: str, sampling: Sampling = SAMPLING) -> Array:

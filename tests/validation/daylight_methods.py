@@ -25,11 +25,11 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.matrices.fine_basis import fine_basis
-from mitsuba_cfs.methods.optics import BsdfOptics, GivenOptics
-from mitsuba_cfs.methods.phase_light import PhaseSystems
-from mitsuba_cfs.methods.phase_scene import PhaseScene
-from mitsuba_cfs.methods.sampling import Sampling
-from mitsuba_cfs.methods.scene import DaylightScene
+from mitsuba_cfs.methods.light import illuminance, illuminance_with_error
+from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics
+from mitsuba_cfs.methods.phase_light import phase_light
+from mitsuba_cfs.methods.phase_matrices import phase_matrices
+from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
@@ -42,7 +42,7 @@ from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from mitsuba_cfs.trace.matrices.view import view_matrix
 from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky, lit_system
+from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky, path_optics
 from tests.validation.blind_room import (
     TILTS,
     BlindRoom,
@@ -97,14 +97,17 @@ def by_phases(
     room = DaylightScene(scene.interior, empty(), scene.groups, scene.points, scene.up)
     known, found = BsdfOptics(system), {}
     systems = [
-        [GivenOptics(known.transmission, way, reflection=known.reflection) for way in ways.values()]
+        [
+            MatrixOptics(known.transmission, way, reflection=known.reflection)
+            for way in ways.values()
+        ]
     ]
-    three_phase = PhaseSystems(PhaseScene(room, SAMPLING, five_phase=False), systems).light(sky)
-    found["three-phase"] = three_phase.illuminance()
-    light = PhaseSystems(PhaseScene(room, SAMPLING), systems).light(sky)
+    three_phase = phase_light(phase_matrices(room, SAMPLING, five_phase=False), systems, sky)
+    found["three-phase"] = illuminance(three_phase)
+    light = phase_light(phase_matrices(room, SAMPLING), systems, sky)
     for number, name in enumerate(ways):
-        found[f"five-phase, {name}"] = light.illuminance(np.full(len(sky.lit), number))
-    return found, float(three_phase.relative_error().max())
+        found[f"five-phase, {name}"] = illuminance(light, np.full(len(sky.lit), number))
+    return found, float(illuminance_with_error(three_phase)[1].max())
 
 
 def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> NDArray[np.float64]:
@@ -122,7 +125,7 @@ def by_fine_matrix(scene: BlindRoom, tilt_deg: float | None, sky: AnnualSky) -> 
 
 def by_coefficients(scene: BlindRoom, system: PathOptics, sky: AnnualSky) -> NDArray[np.float64]:
     """Illuminance [S, H] by two phases: daylight coefficients through the system's BSDF."""
-    room = LitRoom(scene.interior, empty(), scene.groups, [system])
+    room = PathTracingScene(scene.interior, empty(), scene.groups, [system])
     coefficients = daylight_coefficients(
         room, scene.points, scene.up, subdivision=SUBDIVISION, samples=COEFFICIENT_PATHS
     )
@@ -133,7 +136,7 @@ def by_paths(
     scene: BlindRoom, exterior: Surfaces, system: PathOptics, sky: AnnualSky, samples: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Illuminance [S, H] by point-in-time paths, and its standard error."""
-    room = LitRoom(scene.interior, exterior, scene.groups, [system])
+    room = PathTracingScene(scene.interior, exterior, scene.groups, [system])
     runs = []
     for h in range(len(sky.lit)):
         luminance = sky.illuminance[h] / SUN_SOLID_ANGLE
@@ -192,7 +195,7 @@ def one_case(scene: BlindRoom, sky: AnnualSky, tilt_deg: float | None, samples: 
     """All methods against the explicit geometry for one system."""
     exterior = empty() if tilt_deg is None else slats(scene.groups[0], tilt_deg)
     klems = known_klems(tilt_deg, KLEMS_FULL, 65536)
-    ways, systems = {"Klems": sun_scattering(klems)}, {"Klems": lit_system(klems)}
+    ways, systems = {"Klems": sun_scattering(klems)}, {"Klems": path_optics(klems)}
     if tilt_deg is not None:
         tree = known_system(blind_layer(tilt_deg))
         ways["tensor tree"], systems["tensor tree"] = tree.scattering, tree.paths

@@ -27,6 +27,7 @@ from mitsuba_cfs import variants
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.gloss import Gloss, lacquer, mirror, pane
 from mitsuba_cfs.images.view import View, fisheye
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.sky.cie import cie_patches
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -34,7 +35,7 @@ from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam
 from mitsuba_cfs.trace.paths.point_in_time import point_in_time
-from mitsuba_cfs.trace.paths.scene import LitRoom, PathOptics, Sky
+from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks import radiance
@@ -80,10 +81,10 @@ class Case:
         return Sky(self.patches, SUN, self.sun_luminance)
 
     @property
-    def lit(self) -> LitRoom:
+    def lit(self) -> PathTracingScene:
         """The room behind a clear opening."""
         clear = [PathOptics(None, AngularBeam(np.ones(16)))]
-        return LitRoom(self.interior, self.exterior, self.groups, clear)
+        return PathTracingScene(self.interior, self.exterior, self.groups, clear)
 
 
 @dataclass(frozen=True)
@@ -218,13 +219,13 @@ def _five_phase(given: Case, view: View, seed: int) -> tuple[np.ndarray, float]:
     around = given.interior, given.exterior, given.groups
     scene = cfs.DaylightScene(*around, points, normals, view=view)
     sampling = cfs.Sampling(outdoor_samples=16, view_samples=16, seed=seed)
-    traced = cfs.PhaseScene(scene, sampling)
+    traced = cfs.phase_matrices(scene, sampling)
     clear = cfs.AngularOptics(np.ones(64))
-    light = cfs.PhaseSystems(traced, [[clear]]).light(sky)
-    shown = light.pictures(np.array([0]), [0])
+    light = cfs.phase_light(traced, [[clear]], sky)
+    shown = pictures_in_state(light, np.array([0]), [0])
     picture = np.zeros(view.width * view.height, dtype=np.float32)
     picture[shown.pixels] = shown.values(np.array([0]))[0]
-    return picture.reshape(view.height, view.width), float(light.illuminance()[0, 0])
+    return picture.reshape(view.height, view.width), float(cfs.illuminance(light)[0, 0])
 
 
 def _eye(given: Case, view: View):

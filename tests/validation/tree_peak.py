@@ -32,10 +32,11 @@ from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.glare.annual import full_picture
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.view import View, fisheye
+from mitsuba_cfs.methods.phase_pictures import pictures_in_state
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.sampling import lattice_2d
-from mitsuba_cfs.trace.paths.scene import LitRoom, Sky
+from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 from scenes.cost import room
 from tests.benchmarks.annual_product import WEATHER
@@ -97,7 +98,7 @@ def outcomes(
     peer = replace(rendered.rendered_room(folder, fenestration), of_points=POINT)
     bsdf = read_bsdf_xml(file).band("Visible")
     optics, group = cfs.BsdfOptics(klems_of(bsdf), bsdf), room.window_groups()[0]
-    lit = LitRoom(room.room(), room.NOTHING, [group], [fenestration.system])
+    lit = PathTracingScene(room.room(), room.NOTHING, [group], [fenestration.system])
     phases = five_phase(optics, chosen, view)
     for moment, third in zip(chosen, phases, strict=True):
         local = group.frame @ moment.sun
@@ -142,8 +143,8 @@ def five_phase(
     sun[stands, np.arange(n)] = strength / reinhart.solid_angles[stands]
     sky = cfs.AnnualSky(patches + sun, towards, strength, np.arange(n), 8760, sun=sun)
     scene = cfs.DaylightScene(room.room(), room.NOTHING, room.window_groups(), view=view)
-    traced = cfs.PhaseScene(scene, cfs.Sampling(subdivision=rendered.SUBDIVISION))
-    shown = cfs.PhaseSystems(traced, [[optics]]).light(sky).pictures(np.arange(n), [0])
+    traced = cfs.phase_matrices(scene, cfs.Sampling(subdivision=rendered.SUBDIVISION))
+    shown = pictures_in_state(cfs.phase_light(traced, [[optics]], sky), np.arange(n), [0])
     values = shown.values(np.arange(n))
     return [full_picture(row, shown.pixels, view) for row in values]
 
